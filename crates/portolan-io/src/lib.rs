@@ -1,0 +1,1 @@
+//! Every file format that portolan reads or writes, one file each.

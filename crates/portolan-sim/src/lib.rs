@@ -1,0 +1,1 @@
+//! Worlds, robots and sensors, deterministic from a seed.

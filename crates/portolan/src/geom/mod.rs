@@ -1,0 +1,25 @@
+//! Lattices, boxes, poses and the walk of a ray through cells. Imports nothing of the rest.
+//!
+//! The conventions that hold everywhere, stated once:
+//!
+//! - Metres and radians. World coordinates and poses are `f64`.
+//! - Cell `i` of a lattice covers `[i, i + 1) * resolution` from the origin along each axis: a point on
+//!   a face belongs to the cell above it (`floor`). The sample of a cell sits at its centre,
+//!   `(i + 1/2) * resolution`.
+//! - x is the fastest axis in memory. Frames are right-handed, angles counter-clockwise.
+//! - A pose is named `target_from_source` and maps points of the source frame into the target frame.
+
+mod aabb;
+mod block;
+mod grid;
+mod lattice;
+mod pose;
+pub mod vector;
+mod walk;
+
+pub use aabb::Aabb;
+pub use block::{BLOCK_EDGE, BlockKey, block_cells};
+pub use grid::Grid;
+pub use lattice::Lattice;
+pub use pose::{Pose, PoseError};
+pub use walk::RayWalk;

@@ -1,0 +1,44 @@
+//! One beam of a scan.
+
+/// What a beam says; the table in [`crate::scan`] tells what each kind does to a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BeamKind {
+    /// A surface at the beam's range.
+    Hit,
+    /// Nothing up to the beam's range; what lies beyond is not used.
+    MaxRange,
+    /// No echo. Frees space up to the beam's range, which is zero unless the caller knows better.
+    NoReturn,
+    /// No information.
+    Dropped,
+    /// The sensor saw the robot that carries it: no information about the world.
+    SelfHit,
+}
+
+/// A beam in the sensor's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beam<const D: usize> {
+    /// Unit vector from the sensor.
+    pub direction: [f64; D],
+    /// Metres; its meaning depends on the kind.
+    pub range: f64,
+    /// What the beam says.
+    pub kind: BeamKind,
+}
+
+impl<const D: usize> Beam<D> {
+    /// Whether the beam ends on a surface.
+    #[inline(always)]
+    pub fn is_hit(&self) -> bool {
+        self.kind == BeamKind::Hit
+    }
+
+    /// Arc length up to which the beam saw free space (metres); 0 where it says nothing.
+    #[inline(always)]
+    pub fn free_range(&self) -> f64 {
+        match self.kind {
+            BeamKind::Hit | BeamKind::MaxRange | BeamKind::NoReturn => self.range,
+            BeamKind::Dropped | BeamKind::SelfHit => 0.0,
+        }
+    }
+}

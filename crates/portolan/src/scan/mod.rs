@@ -1,0 +1,23 @@
+//! What a sensor delivers: beams with a direction, a range and a kind, in the sensor's frame.
+//!
+//! What each kind of beam does to a map:
+//!
+//! | kind | what the sensor says | frees space | adds a surface |
+//! |---|---|---|---|
+//! | [`BeamKind::Hit`] | a surface at `range` | up to it | yes |
+//! | [`BeamKind::MaxRange`] | nothing nearer than `range` (a reading beyond the caller's limit) | up to `range` | never |
+//! | [`BeamKind::NoReturn`] | no echo: open space, glass, black cloth | up to `range`, which is 0 unless the caller knows better | never |
+//! | [`BeamKind::Dropped`] | nothing at all, or a reading that was refused | no | never |
+//! | [`BeamKind::SelfHit`] | the robot's own body | no | never |
+
+mod beam;
+mod incidence;
+mod laser;
+mod scan;
+mod stats;
+
+pub use beam::{Beam, BeamKind};
+pub use incidence::cos_incidence;
+pub use laser::RangeLimits;
+pub use scan::{BeamOrder, Scan};
+pub use stats::{BeamCounts, RefusedBeams, ScanStats};

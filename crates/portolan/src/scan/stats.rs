@@ -1,0 +1,101 @@
+//! What became of the beams: nothing is dropped in silence.
+
+use super::BeamKind;
+
+/// Beams by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BeamCounts {
+    /// Ended on a surface.
+    pub hit: u64,
+    /// Cut at the caller's limit.
+    pub max_range: u64,
+    /// Came back without an echo.
+    pub no_return: u64,
+    /// Carry no information.
+    pub dropped: u64,
+    /// Saw the robot itself.
+    pub self_hit: u64,
+}
+
+impl BeamCounts {
+    /// Counts one beam.
+    pub fn count(&mut self, kind: BeamKind) {
+        *match kind {
+            BeamKind::Hit => &mut self.hit,
+            BeamKind::MaxRange => &mut self.max_range,
+            BeamKind::NoReturn => &mut self.no_return,
+            BeamKind::Dropped => &mut self.dropped,
+            BeamKind::SelfHit => &mut self.self_hit,
+        } += 1;
+    }
+
+    /// All beams.
+    pub fn total(&self) -> u64 {
+        self.hit + self.max_range + self.no_return + self.dropped + self.self_hit
+    }
+}
+
+impl std::ops::AddAssign for BeamCounts {
+    fn add_assign(&mut self, o: Self) {
+        self.hit += o.hit;
+        self.max_range += o.max_range;
+        self.no_return += o.no_return;
+        self.dropped += o.dropped;
+        self.self_hit += o.self_hit;
+    }
+}
+
+/// Readings that could not be used, by cause. They stay in the scan as [`BeamKind::Dropped`], so that their
+/// neighbours keep their places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RefusedBeams {
+    /// NaN or infinite range or direction.
+    pub not_finite: u64,
+    /// Negative range.
+    pub negative: u64,
+    /// Nearer than the caller's minimum range (zero readings among them).
+    pub too_near: u64,
+}
+
+impl RefusedBeams {
+    /// All refused readings.
+    pub fn total(&self) -> u64 {
+        self.not_finite + self.negative + self.too_near
+    }
+}
+
+impl std::ops::AddAssign for RefusedBeams {
+    fn add_assign(&mut self, o: Self) {
+        self.not_finite += o.not_finite;
+        self.negative += o.negative;
+        self.too_near += o.too_near;
+    }
+}
+
+/// What integrating one scan did; sums over scans with `+=`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ScanStats {
+    /// Scans fused.
+    pub scans: u64,
+    /// Scans refused whole, because the pose is not rigid or not finite or has no cell index.
+    pub refused_poses: u64,
+    /// Beams of the fused scans, by kind.
+    pub beams: BeamCounts,
+    /// Readings that were refused when the scans were built, by cause.
+    pub refused: RefusedBeams,
+    /// Cell observations applied.
+    pub cells: u64,
+    /// Observations that fell outside the map's bounds.
+    pub cells_outside: u64,
+}
+
+impl std::ops::AddAssign for ScanStats {
+    fn add_assign(&mut self, o: Self) {
+        self.scans += o.scans;
+        self.refused_poses += o.refused_poses;
+        self.beams += o.beams;
+        self.refused += o.refused;
+        self.cells += o.cells;
+        self.cells_outside += o.cells_outside;
+    }
+}
