@@ -5,5 +5,12 @@
 //! Read-only **fields** are derived from maps. The crate does no input or output, prints nothing and reads
 //! no clock.
 
+mod answer;
+pub mod cell;
 pub mod geom;
+pub mod map;
 pub mod scan;
+pub mod store;
+pub mod sweep;
+
+pub use answer::Answer;

@@ -14,10 +14,10 @@ const MAX_SLOPE: f64 = 5.67;
 /// the chord between the nearest neighbours that are at least 10 cm apart and connected to the beam. Beams
 /// whose neighbourhood says nothing (no fan, no hit, a lone point) get 1. `out` is cleared and refilled,
 /// one entry per beam.
-pub fn cos_incidence(scan: &Scan<2>, out: &mut Vec<f32>) {
+pub fn cos_incidence<const D: usize>(scan: &Scan<D>, out: &mut Vec<f32>) {
     out.clear();
     out.extend((0..scan.len()).map(|i| {
-        let tangent = tangent(scan, i).unwrap_or([0.0, 0.0]);
+        let tangent = tangent(scan, i).unwrap_or([0.0; D]);
         let direction = scan.beam(i).direction;
         let along = dot(tangent, direction);
         // The sine of the angle to the tangent is the cosine of the angle to the normal.
@@ -25,7 +25,7 @@ pub fn cos_incidence(scan: &Scan<2>, out: &mut Vec<f32>) {
     }));
 }
 
-fn tangent(scan: &Scan<2>, i: usize) -> Option<[f64; 2]> {
+fn tangent<const D: usize>(scan: &Scan<D>, i: usize) -> Option<[f64; D]> {
     if !scan.beam(i).is_hit() {
         return None;
     }
@@ -46,15 +46,18 @@ fn tangent(scan: &Scan<2>, i: usize) -> Option<[f64; 2]> {
     unit(sub(point(left), point(right)))
 }
 
-/// Whether two neighbouring hits can belong to one surface: the chord between them is not steeper than 80
-/// degrees of incidence.
-pub(crate) fn connected(scan: &Scan<2>, a: usize, b: usize) -> bool {
+/// Neighbours further apart than this know nothing of what is between them (sine of the angle, 11 degrees).
+pub(crate) const MAX_OPENING: f64 = 0.2;
+
+/// Whether two neighbouring hits can belong to one surface: they are near to each other in angle, and the
+/// chord between them is not steeper than 80 degrees of incidence.
+pub(crate) fn connected<const D: usize>(scan: &Scan<D>, a: usize, b: usize) -> bool {
     let (a, b) = (scan.beam(a), scan.beam(b));
     if !a.is_hit() || !b.is_hit() {
         return false;
     }
     let opening = distance(a.direction, b.direction); // sine of the angle between them, for small angles
-    (a.range - b.range).abs() <= MAX_SLOPE * opening * a.range.min(b.range) + 0.03
+    opening <= MAX_OPENING && (a.range - b.range).abs() <= MAX_SLOPE * opening * a.range.min(b.range) + 0.03
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ mod stats;
 
 pub use beam::{Beam, BeamKind};
 pub use incidence::cos_incidence;
+pub(crate) use incidence::{MAX_OPENING, connected};
 pub use laser::RangeLimits;
 pub use scan::{BeamOrder, Scan};
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};

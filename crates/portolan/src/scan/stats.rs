@@ -85,8 +85,8 @@ pub struct ScanStats {
     pub refused: RefusedBeams,
     /// Cell observations applied.
     pub cells: u64,
-    /// Observations that fell outside the map's bounds.
-    pub cells_outside: u64,
+    /// Hits whose end point lies outside the map's bounds; their beams free what is inside.
+    pub hits_outside: u64,
 }
 
 impl std::ops::AddAssign for ScanStats {
@@ -96,6 +96,6 @@ impl std::ops::AddAssign for ScanStats {
         self.beams += o.beams;
         self.refused += o.refused;
         self.cells += o.cells;
-        self.cells_outside += o.cells_outside;
+        self.hits_outside += o.hits_outside;
     }
 }

@@ -1,0 +1,87 @@
+//! The estimators: how one scan's evidence moves what is believed of a cell.
+//!
+//! Every cell is a recursive filter. [`Cell::fuse`] is its definition, one cell and one observation at a
+//! time; [`Cell::fuse_run`] is the same filter over a run of neighbouring cells, equal to the last bit, and
+//! what the stores call.
+
+mod distances;
+mod hit_miss;
+mod log_odds;
+mod model;
+mod signed_distance;
+
+pub use distances::{DistanceObservation, Distances};
+pub use hit_miss::{Endpoint, HitMiss};
+pub use log_odds::{LogOdds8, LogOdds32, LogOddsEvent, LogOddsRule, LogOddsValue};
+pub use model::{OccupancyModel, OccupancyModelError};
+pub use signed_distance::{DistancePlanes, FusionEvent, SignedDistance, TsdfRule, TsdfRuleError};
+
+/// What one scan says about the cells of a block: at most one observation per cell.
+pub trait Evidence: Clone + Send + Sync {
+    /// The observation of one cell.
+    type One: Copy;
+
+    /// Evidence about a block of `cells` cells that says nothing yet.
+    fn silent(cells: usize) -> Self;
+
+    /// Forgets everything.
+    fn clear(&mut self);
+
+    /// What it says about cell `i` of the block; `None`: nothing.
+    fn one(&self, i: usize) -> Option<Self::One>;
+
+    /// Number of cells that it says something about.
+    fn observed(&self) -> usize;
+}
+
+/// Cells in structure-of-arrays form.
+pub trait Planes<C>: Clone + Send + Sync {
+    /// `n` cells that were never observed.
+    fn unobserved(n: usize) -> Self;
+
+    /// Number of cells.
+    fn len(&self) -> usize;
+
+    /// Whether there is no cell.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Cell `i`; `None`: never observed.
+    fn get(&self, i: usize) -> Option<C>;
+
+    /// Overwrites cell `i`.
+    fn set(&mut self, i: usize, cell: Option<C>);
+
+    /// Bytes that the planes hold.
+    fn bytes(&self) -> usize;
+}
+
+/// A recursive estimator of one cell.
+pub trait Cell: Copy + PartialEq + std::fmt::Debug + Send + Sync {
+    /// The filter's settings.
+    type Rule: Sync;
+    /// Many cells.
+    type Planes: Planes<Self>;
+    /// One scan's evidence about a block.
+    type Evidence: Evidence;
+    /// What one step of the filter did.
+    type Event;
+
+    /// One step of the filter. `cell` is `None` where nothing was ever observed.
+    fn fuse(
+        cell: Option<Self>,
+        observation: <Self::Evidence as Evidence>::One,
+        rule: &Self::Rule,
+    ) -> (Self, Self::Event);
+
+    /// [`Cell::fuse`] over `len` cells, `planes[start..]` against `evidence[from..]`: the same bits.
+    fn fuse_run(
+        planes: &mut Self::Planes,
+        start: usize,
+        evidence: &Self::Evidence,
+        from: usize,
+        len: usize,
+        rule: &Self::Rule,
+    );
+}

@@ -1,0 +1,52 @@
+//! Why a map cannot be made.
+
+use crate::cell::{OccupancyModelError, TsdfRuleError};
+use crate::geom::Grid;
+
+/// What is wrong with a map's settings.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// The resolution is no length.
+    #[error("resolution must be a positive, finite length in metres, got {0}")]
+    Resolution(f64),
+    /// The origin is no point.
+    #[error("origin must be finite, got {0}")]
+    Origin(f64),
+    /// The box has no cell, or more than a dense map may have.
+    #[error("a dense map of {cells} cells is not possible: between 1 and {limit} cells are")]
+    Cells {
+        /// Number of cells asked for (saturated).
+        cells: usize,
+        /// The largest number possible.
+        limit: usize,
+    },
+    /// The tree's depth is out of range.
+    #[error("tree depth {0} is not between 3 and 28")]
+    Depth(u32),
+    /// The occupancy model is not valid.
+    #[error(transparent)]
+    Model(#[from] OccupancyModelError),
+    /// The fusion filter's settings are not valid.
+    #[error(transparent)]
+    Rule(#[from] TsdfRuleError),
+}
+
+/// Dense maps stop here: 2^31 cells are 16 GiB of distances and weights. Callers with less memory check the
+/// size of a grid before they make a map of it.
+const DENSE_LIMIT: usize = 1 << 31;
+
+/// Checks that a dense map of this grid can be made.
+pub(super) fn check_grid<const D: usize>(grid: &Grid<D>) -> Result<(), MapError> {
+    let resolution = grid.lattice.resolution;
+    if !(resolution > 0.0 && resolution.is_finite()) {
+        return Err(MapError::Resolution(resolution));
+    }
+    if let Some(&bad) = grid.lattice.origin.iter().find(|v| !v.is_finite()) {
+        return Err(MapError::Origin(bad));
+    }
+    match grid.checked_len() {
+        Some(1..=DENSE_LIMIT) => Ok(()),
+        cells => Err(MapError::Cells { cells: cells.unwrap_or(usize::MAX), limit: DENSE_LIMIT }),
+    }
+}

@@ -1,0 +1,142 @@
+//! The log-odds quadtree and octree.
+
+use super::error::check_grid;
+use super::integrate::integrate;
+use super::{Abilities, MapError, MapRepr};
+use crate::answer::Answer;
+use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
+use crate::geom::{Aabb, Grid, Pose, block_cells};
+use crate::scan::{Scan, ScanStats};
+use crate::store::{Store, Tree};
+use crate::sweep::Rays;
+
+/// The same filter as the occupancy grid in a pruned tree (Hornung et al. 2013).
+#[derive(Clone, Debug)]
+pub struct TreeMap<const D: usize> {
+    tree: Tree<LogOdds8, D>,
+    rule: LogOddsRule<i8>,
+    model: OccupancyModel,
+    bounds: Aabb<D>,
+    sweep: Rays<D>,
+    scratch: HitMiss,
+}
+
+/// A log-odds tree of the plane.
+pub type Quadtree = TreeMap<2>;
+/// A log-odds tree of space.
+pub type Octree = TreeMap<3>;
+
+impl<const D: usize> TreeMap<D> {
+    /// An empty tree on the lattice of a grid and at least as large.
+    ///
+    /// # Errors
+    /// Where the lattice or the model is not possible.
+    pub fn covering(grid: &Grid<D>, model: OccupancyModel) -> Result<Self, MapError> {
+        let tree = Tree::covering(grid).ok_or(MapError::Depth(29))?;
+        Self::from_tree(tree, model)
+    }
+
+    /// An empty tree whose root covers `2^depth` leaves along each axis from `origin` upwards.
+    ///
+    /// # Errors
+    /// Where the lattice, the depth or the model is not possible.
+    pub fn new(origin: [f64; D], resolution: f64, depth: u32, model: OccupancyModel) -> Result<Self, MapError> {
+        Self::from_tree(Tree::new(origin, resolution, depth).ok_or(MapError::Depth(depth))?, model)
+    }
+
+    /// A map of a stored tree.
+    ///
+    /// # Errors
+    /// Where the lattice or the model is not possible.
+    pub fn from_tree(tree: Tree<LogOdds8, D>, model: OccupancyModel) -> Result<Self, MapError> {
+        check_grid(&Grid { shape: [1; D], ..tree.grid() })?;
+        let rule = LogOddsRule::<i8>::new(&model)?;
+        let bounds = tree.grid().aabb();
+        let sweep = Rays::new(model.wall_depth.unwrap_or(tree.grid().lattice.resolution));
+        Ok(Self { tree, rule, model, bounds, sweep, scratch: HitMiss::silent(block_cells::<D>()) })
+    }
+
+    /// Fuses a scan taken at a known pose; prunes on the way.
+    pub fn integrate(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
+        let at = (world_from_sensor, scan);
+        integrate::<LogOdds8, _, _, D>(&mut self.tree, &mut self.sweep, &mut self.scratch, &self.rule, &self.bounds, at)
+    }
+
+    /// P(occupied) at a point. O(depth).
+    #[inline]
+    pub fn probability(&self, p_world: impl Into<[f64; D]>) -> Answer<f64> {
+        let p = p_world.into();
+        let Some(cell) = self.tree.lattice().cell_of(p).filter(|_| self.bounds.contains(p)) else { return Answer::Outside };
+        self.tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(v.probability(&self.rule)))
+    }
+
+    /// The tree.
+    pub fn tree(&self) -> &Tree<LogOdds8, D> {
+        &self.tree
+    }
+
+    /// Gives memory that no node uses back.
+    pub fn compact(&mut self) {
+        self.tree.compact();
+    }
+
+    /// The model that the filter's numbers come from.
+    pub fn model(&self) -> &OccupancyModel {
+        &self.model
+    }
+}
+
+impl<const D: usize> MapRepr<D> for TreeMap<D> {
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
+        self.integrate(world_from_sensor, scan)
+    }
+
+    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
+        self.probability(p_world).known()
+    }
+
+    fn distance(&self, _: [f64; D]) -> Option<f64> {
+        None
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.tree.memory_bytes()
+    }
+
+    fn abilities(&self) -> Abilities {
+        Abilities { occupancy: true, distance: false }
+    }
+}
+
+/// Nodes per surface cell, over all levels: `c_d = 2^(d-1) / (2^(d-1) - 1)`; 2 in the plane, 4/3 in space.
+fn nodes_per_surface_cell<const D: usize>() -> f64 {
+    let faces = f64::from(1u32 << (D - 1));
+    faces / (faces - 1.0)
+}
+
+/// Predicted bytes of a tree against a dense array of one-byte cells: `b c_d S r / V` (chapter 3.1, D1), for
+/// `node_bytes` a node, surface measure `S` (metres in the plane, square metres in space), bounded volume `V`.
+pub fn memory_ratio<const D: usize>(node_bytes: f64, surface: f64, volume: f64, resolution: f64) -> f64 {
+    node_bytes * nodes_per_surface_cell::<D>() * surface * resolution / volume
+}
+
+/// The resolution (metres) below which a tree is smaller than a dense array of one-byte cells:
+/// `r* = V / (b c_d S)`, where [`memory_ratio`] is 1.
+pub fn crossover_resolution<const D: usize>(node_bytes: f64, surface: f64, volume: f64) -> f64 {
+    volume / (node_bytes * nodes_per_surface_cell::<D>() * surface)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chapter19_crossover() {
+        let r = crossover_resolution::<2>(20.0, 180.6, 108.0);
+        assert!((r - 0.015).abs() < 1e-4);
+        assert!((memory_ratio::<2>(20.0, 180.6, 108.0, r) - 1.0).abs() < 1e-12);
+        assert!((memory_ratio::<2>(20.0, 180.6, 108.0, 0.0625) - 4.2).abs() < 0.05);
+        let block_of_airspace = crossover_resolution::<3>(36.0, 6e4, 2.4e6);
+        assert!((block_of_airspace - 0.83).abs() < 0.01);
+    }
+}

@@ -1,0 +1,125 @@
+//! Which blocks a planar fan says something about.
+
+use super::fan::Spoke;
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
+
+/// Marks blocks in a bitmap over the scan's surroundings, one bit a block, row by row.
+#[derive(Clone, Debug, Default)]
+pub(super) struct BlockBitmap {
+    first: [i64; 2],
+    size: [i64; 2],
+    words: usize,
+    bits: Vec<u64>,
+}
+
+impl BlockBitmap {
+    /// An empty bitmap over the blocks that meet the box (world).
+    pub(super) fn reset<const D: usize>(&mut self, lattice: &Lattice<D>, window: &Aabb<D>) {
+        let block = |v: f64, k: usize| {
+            let cells = (v - lattice.origin[k]) / lattice.resolution;
+            (cells / BLOCK_EDGE as f64).floor().clamp(-1e8, 1e8) as i64
+        };
+        for k in 0..2 {
+            self.first[k] = block(window.min[k], k);
+            self.size[k] = (block(window.max[k], k) - self.first[k] + 1).max(0);
+        }
+        self.words = (self.size[0] as usize).div_ceil(64);
+        self.bits.clear();
+        self.bits.resize(self.words * self.size[1] as usize, 0);
+    }
+
+    /// Marks the blocks of row `y` (block index) from `x0` to `x1`, both included, as far as they are inside.
+    #[inline(always)]
+    fn mark(&mut self, y: i64, x0: i64, x1: i64) {
+        let row = y - self.first[1];
+        let (x0, x1) = ((x0 - self.first[0]).max(0), (x1 - self.first[0]).min(self.size[0] - 1));
+        if row < 0 || row >= self.size[1] || x0 > x1 {
+            return;
+        }
+        let row = &mut self.bits[row as usize * self.words..][..self.words];
+        let (w0, w1) = ((x0 >> 6) as usize, (x1 >> 6) as usize);
+        let (from, to) = (!0u64 << (x0 & 63), !0u64 >> (63 - (x1 & 63)));
+        if w0 == w1 {
+            row[w0] |= from & to;
+        } else {
+            row[w0] |= from;
+            row[w0 + 1..w1].fill(!0);
+            row[w1] |= to;
+        }
+    }
+
+    /// The marked blocks, ascending.
+    pub(super) fn collect<const D: usize>(&self, keys: &mut Vec<BlockKey<D>>) {
+        keys.clear();
+        for (w, &word) in self.bits.iter().enumerate() {
+            let mut word = word;
+            while word != 0 {
+                let x = self.first[0] + ((w % self.words) * 64) as i64 + i64::from(word.trailing_zeros());
+                let y = self.first[1] + (w / self.words) as i64;
+                let mut key = [0; D];
+                (key[0], key[1]) = (x as i32, y as i32);
+                keys.push(BlockKey(key));
+                word &= word - 1;
+            }
+        }
+    }
+}
+
+/// The stretch of a beam that says something, arc lengths in metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Stretch {
+    /// What a beam observes: the truncation band of a hit, with `carve` all that is free before it.
+    pub(super) fn of(spoke: &Spoke, truncation: f64, carve: bool) -> Option<Self> {
+        let z = f64::from(spoke.range);
+        let from = if carve { 0.0 } else { (z - truncation).max(0.0) };
+        let to = if spoke.hit { z + truncation } else { z };
+        (z > 0.0 && (spoke.hit || carve)).then_some(Self { from, to })
+    }
+}
+
+/// Marks all blocks with a cell centre in the quadrilateral that two neighbouring beams span, widened by
+/// `margin` metres. Too many are harmless: their evidence is empty; too few are not.
+pub(super) fn mark_between<const D: usize>(
+    bitmap: &mut BlockBitmap,
+    lattice: &Lattice<D>,
+    origin: [f64; 2],
+    (a, b): ([f32; 2], [f32; 2]),
+    stretch: Stretch,
+    margin: f64,
+) {
+    let block = lattice.resolution * BLOCK_EDGE as f64;
+    let inverse = 1.0 / block;
+    // Everything in units of blocks.
+    let zero = [(origin[0] - lattice.origin[0]) * inverse, (origin[1] - lattice.origin[1]) * inverse];
+    let margin = margin * inverse;
+    let point = |d: [f32; 2], s: f64| [zero[0] + f64::from(d[0]) * s * inverse, zero[1] + f64::from(d[1]) * s * inverse];
+    let corners = [point(a, stretch.from), point(a, stretch.to), point(b, stretch.to), point(b, stretch.from)];
+    let low = corners.iter().map(|c| c[1]).fold(f64::INFINITY, f64::min) - margin;
+    let high = corners.iter().map(|c| c[1]).fold(f64::NEG_INFINITY, f64::max) + margin;
+    let rows = (bitmap.first[1], bitmap.first[1] + bitmap.size[1] - 1);
+    let (y0, y1) = ((low.floor() as i64).max(rows.0), (high.floor() as i64).min(rows.1));
+    for y in y0..=y1 {
+        let (bottom, top) = (y as f64 - margin, (y + 1) as f64 + margin);
+        let (mut x0, mut x1) = (f64::INFINITY, f64::NEG_INFINITY);
+        for k in 0..4 {
+            let (p, q) = (corners[k], corners[(k + 1) % 4]);
+            let (p, q) = if p[1] <= q[1] { (p, q) } else { (q, p) };
+            if q[1] < bottom || p[1] > top {
+                continue;
+            }
+            let slope = if q[1] > p[1] { (q[0] - p[0]) / (q[1] - p[1]) } else { 0.0 };
+            let enter = if p[1] >= bottom { p[0] } else { p[0] + (bottom - p[1]) * slope };
+            let leave = if q[1] <= top { q[0] } else { p[0] + (top - p[1]) * slope };
+            x0 = x0.min(enter).min(leave);
+            x1 = x1.max(enter).max(leave);
+        }
+        if x0 <= x1 {
+            bitmap.mark(y, (x0 - margin).floor() as i64, (x1 + margin).floor() as i64);
+        }
+    }
+}

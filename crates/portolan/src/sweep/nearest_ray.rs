@@ -1,0 +1,100 @@
+//! Cell centres against the nearest beam, for scans that do not know which beams are neighbours.
+
+use super::touched::Touched;
+use super::clip;
+use crate::cell::{DistanceObservation, Distances, Evidence};
+use crate::geom::vector::{along, dot, sub};
+use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
+use crate::scan::Scan;
+
+/// Distances, and how far aside of each cell's centre the beam passed that they come from.
+#[derive(Clone, Debug)]
+pub(super) struct NearestBeam {
+    distances: Distances,
+    aside_sq: Box<[f32]>,
+}
+
+impl Evidence for NearestBeam {
+    type One = DistanceObservation;
+
+    fn silent(cells: usize) -> Self {
+        Self { distances: Distances::silent(cells), aside_sq: vec![0.0; cells].into() }
+    }
+
+    fn clear(&mut self) {
+        self.distances.clear();
+    }
+
+    fn one(&self, i: usize) -> Option<DistanceObservation> {
+        self.distances.one(i)
+    }
+
+    fn observed(&self) -> usize {
+        self.distances.observed()
+    }
+}
+
+/// Walks every beam through the cells exactly; a cell listens to the beam that passes nearest to its centre,
+/// and gets that beam's distance at the centre. Ties go to the earlier beam.
+#[derive(Clone, Debug)]
+pub(super) struct NearestRay<const D: usize> {
+    touched: Touched<NearestBeam, D>,
+}
+
+impl<const D: usize> NearestRay<D> {
+    pub(super) fn new() -> Self {
+        Self { touched: Touched::new() }
+    }
+
+    pub(super) fn plan(
+        &mut self,
+        scan: &Scan<D>,
+        world_from_sensor: &Pose<D>,
+        (lattice, bounds): (&Lattice<D>, &Aabb<D>),
+        weights: &[f32],
+        (tau, carve): (f64, bool),
+    ) {
+        self.touched.clear();
+        let origin = world_from_sensor.translation;
+        for (beam, &weight) in scan.beams().zip(weights) {
+            let z = beam.free_range();
+            if z <= 0.0 || (!beam.is_hit() && !carve) {
+                continue;
+            }
+            let direction = world_from_sensor.rotate(beam.direction);
+            let length = if beam.is_hit() { z + tau } else { z };
+            let Some((near, far)) = clip(bounds, origin, direction, length) else { continue };
+            let near = if carve { near } else { near.max(z - tau) };
+            let Some(mut walk) = RayWalk::new(lattice, along(origin, direction, near), direction) else { continue };
+            loop {
+                let cell = walk.cell();
+                let offset = sub(lattice.center(cell), origin);
+                let s = dot(offset, direction);
+                let d = if beam.is_hit() { z - s } else if s <= z - tau { tau } else { f64::NEG_INFINITY };
+                let w = weight * (1.0 + d / tau).clamp(0.0, 1.0) as f32;
+                if w > 0.0 && (carve || d <= tau) {
+                    let aside_sq = (dot(offset, offset) - s * s) as f32;
+                    let i = BlockKey::offset(cell);
+                    let evidence = self.touched.of_cell(cell);
+                    if !evidence.distances.is_set(i) || aside_sq < evidence.aside_sq[i] {
+                        evidence.distances.set(i, DistanceObservation { distance: d.min(tau) as f32, weight: w });
+                        evidence.aside_sq[i] = aside_sq;
+                    }
+                }
+                if near + walk.exit() >= far {
+                    break;
+                }
+                walk.advance();
+            }
+        }
+        self.touched.sort();
+    }
+
+    pub(super) fn blocks(&self) -> &[BlockKey<D>] {
+        self.touched.keys()
+    }
+
+    pub(super) fn evidence(&self, i: usize) -> &Distances {
+        &self.touched.evidence(i).distances
+    }
+}

@@ -1,0 +1,196 @@
+//! Exact rays: every cell that a beam passes through.
+
+use super::touched::Touched;
+use super::{Sweep, clip};
+use crate::cell::HitMiss;
+use crate::geom::vector::{along, distance};
+use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
+use crate::scan::Scan;
+
+/// Walks every beam through the cells (Amanatides & Woo 1987) and marks hits and misses.
+///
+/// With `r` the distance of a cell's centre from the sensor, a cell on a beam of range `z` is hit where
+/// `|r - z| < wall_depth / 2`, missed where `r < z`, else nothing is said. The cell that holds the end point
+/// is hit in any case. A hit by any beam overrules the misses of all others: the order of the beams does not
+/// matter. (The textbook takes the first beam that touches a cell, so that there it does.)
+#[derive(Clone, Debug)]
+pub struct Rays<const D: usize> {
+    wall_depth: f64,
+    touched: Touched<HitMiss, D>,
+}
+
+impl<const D: usize> Rays<D> {
+    /// A sweep that calls a depth of `wall_depth` metres around each end point occupied.
+    pub fn new(wall_depth: f64) -> Self {
+        Self { wall_depth, touched: Touched::new() }
+    }
+
+    fn beam(&mut self, lattice: &Lattice<D>, bounds: &Aabb<D>, origin: [f64; D], direction: [f64; D], z: f64, hit: bool) {
+        let half = 0.5 * self.wall_depth;
+        let length = if hit { z + half } else { z };
+        let Some((near, far)) = clip(bounds, origin, direction, length) else { return };
+        let start = if near > 0.0 { along(origin, direction, near) } else { origin };
+        let Some(mut walk) = RayWalk::new(lattice, start, direction) else { return };
+        // Up to here every centre is nearer than z - half, whatever the angle: no square root needed.
+        let diagonal = 0.5 * lattice.resolution * (D as f64).sqrt();
+        let surely_missed = z - half - diagonal;
+        while near + walk.exit() < surely_missed.min(far) {
+            let cell = walk.cell();
+            self.touched.of_cell(cell).mark_miss(BlockKey::offset(cell));
+            walk.advance();
+        }
+        let end = if hit { lattice.cell_of(along(origin, direction, z)) } else { None };
+        loop {
+            let cell = walk.cell();
+            let r = distance(lattice.center(cell), origin);
+            if hit && ((r - z).abs() < half || Some(cell) == end) {
+                self.touched.of_cell(cell).mark_hit(BlockKey::offset(cell));
+            } else if r < z {
+                self.touched.of_cell(cell).mark_miss(BlockKey::offset(cell));
+            }
+            if near + walk.exit() >= far {
+                return;
+            }
+            walk.advance();
+        }
+    }
+}
+
+impl<const D: usize> Sweep<D> for Rays<D> {
+    type Evidence = HitMiss;
+
+    fn plan(&mut self, scan: &Scan<D>, world_from_sensor: &Pose<D>, lattice: &Lattice<D>, bounds: &Aabb<D>) {
+        self.touched.clear();
+        for beam in scan.beams() {
+            let z = beam.free_range();
+            if z > 0.0 {
+                let direction = world_from_sensor.rotate(beam.direction);
+                self.beam(lattice, bounds, world_from_sensor.translation, direction, z, beam.is_hit());
+            }
+        }
+        self.touched.sort();
+    }
+
+    fn blocks(&self) -> &[BlockKey<D>] {
+        self.touched.keys()
+    }
+
+    fn evidence<'a>(&'a self, i: usize, _: &'a mut HitMiss) -> &'a HitMiss {
+        self.touched.evidence(i)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::{Endpoint, Evidence};
+    use crate::geom::block_cells;
+    use crate::geom::vector::unit;
+    use crate::scan::{Beam, BeamKind};
+    use proptest::prelude::*;
+    use std::collections::HashMap;
+
+    /// The definition, cell by cell in a hash map, straight from the documentation.
+    fn oracle<const D: usize>(scan: &Scan<D>, pose: &Pose<D>, lattice: &Lattice<D>, depth: f64) -> HashMap<[i32; D], Endpoint> {
+        let mut said = HashMap::new();
+        for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
+            let (z, origin, direction) = (beam.range, pose.translation, pose.rotate(beam.direction));
+            let length = if beam.is_hit() { z + depth / 2.0 } else { z };
+            let end = lattice.cell_of(along(origin, direction, z));
+            let mut walk = RayWalk::new(lattice, origin, direction).unwrap();
+            loop {
+                let cell = walk.cell();
+                let r = distance(lattice.center(cell), origin);
+                if beam.is_hit() && ((r - z).abs() < depth / 2.0 || Some(cell) == end) {
+                    said.insert(cell, Endpoint::Hit);
+                } else if r < z {
+                    said.entry(cell).or_insert(Endpoint::Miss);
+                }
+                if walk.exit() >= length {
+                    break;
+                }
+                walk.advance();
+            }
+        }
+        said
+    }
+
+    fn equals_the_oracle<const D: usize>(beams: &[([f64; D], f64, u8)], origin: [f64; D], depth: f64) {
+        let kinds = [BeamKind::Hit, BeamKind::Hit, BeamKind::MaxRange, BeamKind::NoReturn, BeamKind::Dropped];
+        let scan = Scan::from_beams(beams.iter().filter(|b| unit(b.0).is_some()).map(|&(direction, range, kind)| {
+            Beam { direction, range, kind: kinds[usize::from(kind)] }
+        }));
+        let pose = Pose { translation: origin, ..Pose::IDENTITY };
+        let lattice = Lattice::new([-0.3; D], 0.1);
+        let mut sweep = Rays::new(depth);
+        let everywhere = Aabb::new([-100.0; D], [100.0; D]);
+        for _ in 0..2 {
+            sweep.plan(&scan, &pose, &lattice, &everywhere);
+        }
+        assert!(sweep.blocks().is_sorted());
+        let mut said = HashMap::new();
+        for (i, key) in sweep.blocks().iter().enumerate() {
+            let mut scratch = HitMiss::silent(block_cells::<D>());
+            let e = sweep.evidence(i, &mut scratch);
+            for k in 0..block_cells::<D>() {
+                if let Some(o) = e.one(k) {
+                    said.insert(key.cell(k), o);
+                }
+            }
+        }
+        assert_eq!(said, oracle(&scan, &pose, &lattice, depth));
+    }
+
+    proptest! {
+        #[test]
+        fn equals_a_hash_map_2d(
+            beams in prop::collection::vec((prop::array::uniform2(-1.0..1.0f64), 0.0..3.0f64, 0u8..5), 1..40),
+            o in prop::array::uniform2(-1.0..1.0f64), depth in 0.0..0.3f64,
+        ) {
+            equals_the_oracle(&beams, o, depth);
+        }
+        #[test]
+        fn equals_a_hash_map_3d(
+            beams in prop::collection::vec((prop::array::uniform3(-1.0..1.0f64), 0.0..3.0f64, 0u8..5), 1..40),
+            o in prop::array::uniform3(-1.0..1.0f64), depth in 0.0..0.3f64,
+        ) {
+            equals_the_oracle(&beams, o, depth);
+        }
+    }
+
+    #[test]
+    fn what_each_kind_of_beam_marks() {
+        let marks = |kind| {
+            let mut sweep = Rays::<2>::new(0.1);
+            let scan = Scan::from_beams([Beam { direction: [1.0, 0.0], range: 1.0, kind }]);
+            let pose = Pose::<2>::new(0.05, 0.05, 0.0);
+            sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.1), &Aabb::new([0.0; 2], [5.0; 2]));
+            let mut counts = (0, 0);
+            let mut scratch = HitMiss::silent(64);
+            for i in 0..sweep.blocks().len() {
+                for k in 0..64 {
+                    match sweep.evidence(i, &mut scratch).one(k) {
+                        Some(Endpoint::Hit) => counts.0 += 1,
+                        Some(Endpoint::Miss) => counts.1 += 1,
+                        None => {}
+                    }
+                }
+            }
+            counts
+        };
+        assert_eq!(marks(BeamKind::Hit), (1, 10));
+        assert_eq!(marks(BeamKind::MaxRange), (0, 10));
+        assert_eq!(marks(BeamKind::NoReturn), (0, 10));
+        assert_eq!(marks(BeamKind::Dropped), (0, 0));
+        assert_eq!(marks(BeamKind::SelfHit), (0, 0));
+    }
+
+    #[test]
+    fn a_far_sensor_costs_nothing_outside_the_bounds() {
+        let mut sweep = Rays::<2>::new(0.1);
+        let scan = Scan::from_beams([Beam { direction: [1.0, 0.0], range: 1e7, kind: BeamKind::Hit }]);
+        let pose = Pose::<2>::new(-5e6, 0.5, 0.0);
+        sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.1), &Aabb::new([0.0; 2], [5.0; 2]));
+        assert_eq!(sweep.blocks().len(), 7);
+    }
+}

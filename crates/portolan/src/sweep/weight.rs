@@ -1,0 +1,38 @@
+//! How much a beam is trusted: variance modelling, not a heuristic.
+
+use crate::scan::{Scan, cos_incidence};
+
+/// Weight of a beam's observations, before the taper behind the surface
+/// (Oleynikova et al. 2017, section III; chapter 3.3, D2 step 5).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WeightModel {
+    /// Every beam 1.
+    #[default]
+    Constant,
+    /// `1 / z^2` for ranges beyond 1 m, else 1: range noise grows with the range.
+    InverseSquare,
+    /// `cos(theta)` of the incidence angle: grazing beams know their distance to the surface badly.
+    CosIncidence,
+    /// `cos(theta) / z^2`: both.
+    InverseSquareCosIncidence,
+}
+
+impl WeightModel {
+    /// One weight per beam of the scan, into `weights`; `cosines` is scratch. Incidence comes from neighbouring
+    /// beams and is 1 where there are none.
+    pub(super) fn weigh<const D: usize>(self, scan: &Scan<D>, cosines: &mut Vec<f32>, weights: &mut Vec<f32>) {
+        let (square, cosine) = match self {
+            Self::Constant => (false, false),
+            Self::InverseSquare => (true, false),
+            Self::CosIncidence => (false, true),
+            Self::InverseSquareCosIncidence => (true, true),
+        };
+        weights.clear();
+        weights.extend(scan.beams().map(|b| if square { (b.range.max(1.0).powi(2).recip()) as f32 } else { 1.0 }));
+        if cosine {
+            cos_incidence(scan, cosines);
+            // Never quite 0: a grazing beam still knows that there is something.
+            weights.iter_mut().zip(cosines).for_each(|(w, c)| *w *= c.max(0.02));
+        }
+    }
+}
