@@ -7,10 +7,12 @@
 
 mod answer;
 pub mod cell;
+pub mod field;
 pub mod geom;
 pub mod map;
 pub mod scan;
 pub mod store;
+pub mod surface;
 pub mod sweep;
 
 pub use answer::Answer;

@@ -1,7 +1,7 @@
 //! Occupancy as clamped log odds, in a byte or in an `f32`.
 
 use super::model::logit;
-use super::{Cell, Endpoint, Evidence, HitMiss, OccupancyModel, OccupancyModelError, Planes};
+use super::{Cell, Endpoint, HitMiss, OccupancyModel, OccupancyModelError, Planes};
 
 /// The clamped log-odds filter: `l <- clamp(l + delta, min, max)`
 /// (Moravec & Elfes 1985; the clamp: Yguel et al. 2007, Hornung et al. 2013).
@@ -225,6 +225,7 @@ log_odds_cell!(LogOdds32, f32, step_float);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cell::Evidence;
     use proptest::prelude::*;
 
     #[test]

@@ -1,6 +1,6 @@
 //! Truncated signed distance: a scalar information filter per cell.
 
-use super::{Cell, DistanceObservation, Distances, Evidence, Planes};
+use super::{Cell, DistanceObservation, Distances, Planes};
 
 /// Settings of the fusion filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +61,14 @@ impl TsdfRule {
         let total = weight_before + weight;
         let gain = weight / total;
         let after = before + gain * (observation - before);
-        FusionEvent { before, weight_before, observation, after, weight_after: total.min(f64::from(self.w_max)), gain }
+        FusionEvent {
+            before,
+            weight_before,
+            observation,
+            after,
+            weight_after: total.min(f64::from(self.w_max)),
+            gain,
+        }
     }
 }
 
@@ -104,7 +111,8 @@ impl DistancePlanes {
     /// negative or NaN, distance not finite).
     pub fn from_parts(distance: Vec<f32>, weight: Vec<f32>) -> Option<Self> {
         let sane = |(&d, &w): (&f32, &f32)| d.is_finite() && w >= 0.0;
-        (distance.len() == weight.len() && distance.iter().zip(&weight).all(sane)).then_some(Self { distance, weight })
+        (distance.len() == weight.len() && distance.iter().zip(&weight).all(sane))
+            .then_some(Self { distance, weight })
     }
 
     /// `D` of every cell (metres); meaningless where the weight is 0.
@@ -153,8 +161,7 @@ impl Cell for SignedDistance {
     #[inline]
     fn fuse(cell: Option<Self>, o: DistanceObservation, rule: &TsdfRule) -> (Self, FusionEvent) {
         let prior = cell.unwrap_or(Self { distance: 0.0, weight: 0.0 });
-        let event =
-            rule.step(prior.distance.into(), prior.weight.into(), o.distance.into(), o.weight.into());
+        let event = rule.step(prior.distance.into(), prior.weight.into(), o.distance.into(), o.weight.into());
         (Self { distance: event.after as f32, weight: event.weight_after as f32 }, event)
     }
 
@@ -175,7 +182,8 @@ impl Cell for SignedDistance {
         if len % 8 == 0 {
             let rows = distance.chunks_exact_mut(8).zip(weight.chunks_exact_mut(8));
             for ((d, w), (o, g)) in rows.zip(observed.chunks_exact(8).zip(gained.chunks_exact(8))) {
-                if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into()) {
+                if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into())
+                {
                     fuse_lanes::<8>(d, w, o, g, rule);
                 }
             }
@@ -190,7 +198,13 @@ impl Cell for SignedDistance {
 }
 
 #[inline(always)]
-fn fuse_lanes<const N: usize>(d: &mut [f32; N], w: &mut [f32; N], o: &[f32; N], g: &[f32; N], rule: &TsdfRule) {
+fn fuse_lanes<const N: usize>(
+    d: &mut [f32; N],
+    w: &mut [f32; N],
+    o: &[f32; N],
+    g: &[f32; N],
+    rule: &TsdfRule,
+) {
     for i in 0..N {
         // A lane without observation is computed with weight 1 and thrown away: no 0/0, no branch.
         let said = g[i] > 0.0;
@@ -203,6 +217,7 @@ fn fuse_lanes<const N: usize>(d: &mut [f32; N], w: &mut [f32; N], o: &[f32; N], 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cell::Evidence;
     use proptest::prelude::*;
 
     #[test]
@@ -231,7 +246,9 @@ mod tests {
 
     #[test]
     fn nonsense_settings_are_refused() {
-        for (truncation, w_max) in [(0.0, 1.0), (f32::NAN, 1.0), (0.1, 0.0), (0.1, f32::NAN), (f32::INFINITY, 1.0)] {
+        for (truncation, w_max) in
+            [(0.0, 1.0), (f32::NAN, 1.0), (0.1, 0.0), (0.1, f32::NAN), (f32::INFINITY, 1.0)]
+        {
             assert!(TsdfRule { truncation, w_max }.validate().is_err());
         }
     }

@@ -12,6 +12,7 @@
 mod aabb;
 mod block;
 mod grid;
+mod interpolation;
 mod lattice;
 mod pose;
 pub mod vector;
@@ -20,6 +21,7 @@ mod walk;
 pub use aabb::Aabb;
 pub use block::{BLOCK_EDGE, BlockKey, block_cells};
 pub use grid::Grid;
+pub use interpolation::interpolate;
 pub use lattice::Lattice;
 pub use pose::{Pose, PoseError};
 pub use walk::RayWalk;

@@ -45,7 +45,8 @@ impl<const D: usize> Cloud<D> {
 
     /// Builds the tree over all points so far. O(n log n).
     pub fn rebuild(&mut self) {
-        self.tree = if self.points.is_empty() { None } else { ImmutableKdTree::new_from_slice(&self.points).ok() };
+        self.tree =
+            if self.points.is_empty() { None } else { ImmutableKdTree::new_from_slice(&self.points).ok() };
     }
 
     /// The points (world, metres), in the order in which they came.

@@ -50,7 +50,14 @@ impl<const D: usize> OccupancyGrid<D> {
     /// Fuses a scan taken at a known pose.
     pub fn integrate(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
         let at = (world_from_sensor, scan);
-        integrate::<LogOdds8, _, _, D>(&mut self.store, &mut self.sweep, &mut self.scratch, &self.rule, &self.bounds, at)
+        integrate::<LogOdds8, _, _, D>(
+            &mut self.store,
+            &mut self.sweep,
+            &mut self.scratch,
+            &self.rule,
+            &self.bounds,
+            at,
+        )
     }
 
     /// P(occupied) at a point. O(1).
@@ -190,7 +197,8 @@ mod tests {
     }
 
     fn one_beam<const D: usize>() {
-        let mut map = OccupancyGrid::<D>::new(Grid::new([0.0; D], 0.1, [40; D]), OccupancyModel::default()).unwrap();
+        let mut map =
+            OccupancyGrid::<D>::new(Grid::new([0.0; D], 0.1, [40; D]), OccupancyModel::default()).unwrap();
         let mut direction = [0.0; D];
         direction[0] = 1.0;
         let scan = Scan::from_beams([Beam { direction, range: 2.0, kind: BeamKind::Hit }]);
@@ -227,7 +235,9 @@ mod tests {
 
     #[test]
     fn impossible_maps_are_refused() {
-        let new = |r: f64, n: usize| OccupancyGrid::<2>::new(Grid::new([0.0; 2], r, [n; 2]), OccupancyModel::default());
+        let new = |r: f64, n: usize| {
+            OccupancyGrid::<2>::new(Grid::new([0.0; 2], r, [n; 2]), OccupancyModel::default())
+        };
         assert!(matches!(new(-0.1, 10), Err(MapError::Resolution(_))));
         assert!(matches!(new(f64::NAN, 10), Err(MapError::Resolution(_))));
         assert!(matches!(new(0.1, 0), Err(MapError::Cells { .. })));

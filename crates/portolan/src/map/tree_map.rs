@@ -40,7 +40,12 @@ impl<const D: usize> TreeMap<D> {
     ///
     /// # Errors
     /// Where the lattice, the depth or the model is not possible.
-    pub fn new(origin: [f64; D], resolution: f64, depth: u32, model: OccupancyModel) -> Result<Self, MapError> {
+    pub fn new(
+        origin: [f64; D],
+        resolution: f64,
+        depth: u32,
+        model: OccupancyModel,
+    ) -> Result<Self, MapError> {
         Self::from_tree(Tree::new(origin, resolution, depth).ok_or(MapError::Depth(depth))?, model)
     }
 
@@ -59,14 +64,23 @@ impl<const D: usize> TreeMap<D> {
     /// Fuses a scan taken at a known pose; prunes on the way.
     pub fn integrate(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
         let at = (world_from_sensor, scan);
-        integrate::<LogOdds8, _, _, D>(&mut self.tree, &mut self.sweep, &mut self.scratch, &self.rule, &self.bounds, at)
+        integrate::<LogOdds8, _, _, D>(
+            &mut self.tree,
+            &mut self.sweep,
+            &mut self.scratch,
+            &self.rule,
+            &self.bounds,
+            at,
+        )
     }
 
     /// P(occupied) at a point. O(depth).
     #[inline]
     pub fn probability(&self, p_world: impl Into<[f64; D]>) -> Answer<f64> {
         let p = p_world.into();
-        let Some(cell) = self.tree.lattice().cell_of(p).filter(|_| self.bounds.contains(p)) else { return Answer::Outside };
+        let Some(cell) = self.tree.lattice().cell_of(p).filter(|_| self.bounds.contains(p)) else {
+            return Answer::Outside;
+        };
         self.tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(v.probability(&self.rule)))
     }
 

@@ -4,7 +4,9 @@ use super::error::check_grid;
 use super::integrate::integrate;
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
-use crate::cell::{Cell, DistanceObservation, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule};
+use crate::cell::{
+    Cell, DistanceObservation, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
+};
 use crate::geom::{Aabb, Grid, Pose, block_cells};
 use crate::scan::{Scan, ScanStats};
 use crate::store::{Dense, Store};
@@ -92,7 +94,9 @@ enum CellCentreOrMarch<const D: usize> {
 impl<const D: usize> CellCentreOrMarch<D> {
     fn new(config: &TsdfConfig<D>, carve: bool) -> Self {
         match config.sweep {
-            SweepKind::CellCentre => Self::CellCentre(Box::new(CellCentre::new(config.truncation, carve, config.weights))),
+            SweepKind::CellCentre => {
+                Self::CellCentre(Box::new(CellCentre::new(config.truncation, carve, config.weights)))
+            }
             SweepKind::March => Self::March(Box::new(March::new(config.truncation, carve, config.weights))),
         }
     }
@@ -188,6 +192,11 @@ impl<const D: usize> Tsdf<D> {
     /// The filter.
     pub fn rule(&self) -> &TsdfRule {
         &self.rule
+    }
+
+    /// Number of cells with a weight of at least `min_weight` (and above 0).
+    pub fn observed_cells(&self, min_weight: f32) -> usize {
+        self.store.planes().weights().iter().filter(|&&w| w > 0.0 && w >= min_weight).count()
     }
 
     /// Shape and place.

@@ -110,7 +110,9 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
 
     /// Gives memory that no node uses back to the system.
     pub fn compact(&mut self) {
-        if let Ok(tight) = Self::from_records(self.lattice.origin, self.lattice.resolution, self.depth, &self.records()) {
+        if let Ok(tight) =
+            Self::from_records(self.lattice.origin, self.lattice.resolution, self.depth, &self.records())
+        {
             *self = tight;
         }
     }
@@ -201,7 +203,9 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
     /// The slot at the end of the path: its record, or its value where it is a leaf.
     fn block_slot(&self) -> Result<V, u32> {
         match self.path.last() {
-            Some(&(parent, child)) if self.arena.mask(parent) >> child & 1 != 0 => Err(self.arena.child(parent, child)),
+            Some(&(parent, child)) if self.arena.mask(parent) >> child & 1 != 0 => {
+                Err(self.arena.child(parent, child))
+            }
             Some(&(parent, child)) => Ok(self.arena.values(parent)[child]),
             None if self.root != NONE => Err(self.root),
             None => Ok(self.root_value),
@@ -236,7 +240,11 @@ impl<V: LogOddsValue, const D: usize> Store<V, D> for Tree<V, D> {
             height -= 1;
             let child = child_index(cell, height);
             value = self.arena.values(record)[child];
-            record = if self.arena.mask(record) >> child & 1 != 0 { self.arena.child(record, child) } else { NONE };
+            record = if self.arena.mask(record) >> child & 1 != 0 {
+                self.arena.child(record, child)
+            } else {
+                NONE
+            };
         }
         (!value.is_unobserved()).then_some(value)
     }

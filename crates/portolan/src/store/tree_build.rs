@@ -45,10 +45,11 @@ pub(super) fn expand<V: LogOddsValue, const D: usize>(
 fn fill<V: LogOddsValue, const D: usize>(block: &mut [V], offset: usize, height: u32, value: V) {
     let edge = 1usize << height;
     for row in 0..edge.pow(D as u32 - 1) {
-        let start = offset + match D {
-            2 => row << 3,
-            _ => ((row & (edge - 1)) << 3) + ((row >> height) << 6),
-        };
+        let start = offset
+            + match D {
+                2 => row << 3,
+                _ => ((row & (edge - 1)) << 3) + ((row >> height) << 6),
+            };
         block[start..start + edge].fill(value);
     }
 }

@@ -113,7 +113,10 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         for c in 0..children::<D>() {
             if read.mask >> c & 1 != 0 {
                 let child = self.arena.child(record, c);
-                assert!(read.values[c].same(value_above(&self.arena.read(child), children::<D>())), "stale value");
+                assert!(
+                    read.values[c].same(value_above(&self.arena.read(child), children::<D>())),
+                    "stale value"
+                );
                 self.check_below(child, height - 1);
             }
         }
@@ -134,7 +137,8 @@ fn read_below<V: LogOddsValue, const D: usize>(
         return Err(TreeRecordsError::TooDeep(i));
     }
     let mut contents = Record { values: [V::UNOBSERVED; 8], first_child: NONE, mask };
-    contents.values[..children::<D>()].copy_from_slice(&records.values[i * children::<D>()..][..children::<D>()]);
+    contents.values[..children::<D>()]
+        .copy_from_slice(&records.values[i * children::<D>()..][..children::<D>()]);
     let n = mask.count_ones();
     if n > 0 {
         contents.first_child = arena.allocate(n as usize);
@@ -165,7 +169,10 @@ mod tests {
     type Scans = Vec<Vec<(u8, u64, u64, u8)>>;
 
     fn scans() -> impl Strategy<Value = Scans> {
-        prop::collection::vec(prop::collection::vec((0u8..64, any::<u64>(), any::<u64>(), 0u8..6), 1..6), 1..30)
+        prop::collection::vec(
+            prop::collection::vec((0u8..64, any::<u64>(), any::<u64>(), 0u8..6), 1..6),
+            1..30,
+        )
     }
 
     fn evidence<const D: usize>(hit: u64, miss: u64, style: u8) -> HitMiss {
@@ -281,7 +288,11 @@ mod tests {
             for k in 0..64u64 {
                 let noise = (n * 64 + k).wrapping_mul(0x9E37_79B9_7F4A_7C15);
                 let key = BlockKey([(k % 8) as i32, (k / 8) as i32]);
-                tree.apply(key, &evidence::<2>(noise, !noise.rotate_left(17), (noise >> 60) as u8 % 6), &rule);
+                tree.apply(
+                    key,
+                    &evidence::<2>(noise, !noise.rotate_left(17), (noise >> 60) as u8 % 6),
+                    &rule,
+                );
             }
             tree.arena.slots()
         };
@@ -290,7 +301,8 @@ mod tests {
         assert!(late <= early + early / 4, "{early} slots grew to {late}");
         tree.compact();
         tree.check_invariants();
-        let per_node = |bytes: usize, n: usize| (bytes - size_of::<Tree<LogOdds8, 2>>() - 64) as f64 / n as f64;
+        let per_node =
+            |bytes: usize, n: usize| (bytes - size_of::<Tree<LogOdds8, 2>>() - 64) as f64 / n as f64;
         assert!(per_node(tree.memory_bytes(), tree.inner_nodes()) <= 9.0 * 1.13);
     }
 }

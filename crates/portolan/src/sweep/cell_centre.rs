@@ -56,7 +56,13 @@ impl<const D: usize> CellCentre<D> {
         }
     }
 
-    fn plan_fan(&mut self, scan: &Scan<D>, world_from_sensor: &Pose<D>, lattice: &Lattice<D>, bounds: &Aabb<D>) {
+    fn plan_fan(
+        &mut self,
+        scan: &Scan<D>,
+        world_from_sensor: &Pose<D>,
+        lattice: &Lattice<D>,
+        bounds: &Aabb<D>,
+    ) {
         let settings = (self.truncation, self.carve, lattice.resolution);
         self.fan.rebuild(scan, world_from_sensor, &self.weights, settings, &mut self.spokes);
         let origin = world_from_sensor.translation;
@@ -88,7 +94,9 @@ impl<const D: usize> CellCentre<D> {
                     mark(b.direction, hull);
                 }
                 (Some(p), ..) => mark(a.direction, p),
-                (None, Some(q), Some(b)) => mark_between(&mut self.bitmap, lattice, zero, (b.direction, b.direction), q, margin),
+                (None, Some(q), Some(b)) => {
+                    mark_between(&mut self.bitmap, lattice, zero, (b.direction, b.direction), q, margin)
+                }
                 _ => {}
             }
         }
@@ -161,7 +169,13 @@ mod tests {
     }
 
     /// The definition, for every cell of a large square: no block may be missing from the plan.
-    fn oracle(scan: &Scan<2>, pose: &Pose<2>, lattice: &Lattice<2>, tau: f64, carve: bool) -> HashMap<[i32; 2], f64> {
+    fn oracle(
+        scan: &Scan<2>,
+        pose: &Pose<2>,
+        lattice: &Lattice<2>,
+        tau: f64,
+        carve: bool,
+    ) -> HashMap<[i32; 2], f64> {
         let mut all = HashMap::new();
         for x in -80..80 {
             for y in -80..80 {
@@ -174,7 +188,9 @@ mod tests {
                     (bearing - d[1].atan2(d[0])).rem_euclid(std::f64::consts::TAU)
                 };
                 // The beam last passed going counter-clockwise.
-                let Some(a) = (0..scan.len()).min_by(|&i, &j| angle(i).total_cmp(&angle(j))) else { continue };
+                let Some(a) = (0..scan.len()).min_by(|&i, &j| angle(i).total_cmp(&angle(j))) else {
+                    continue;
+                };
                 let b = scan.next(a);
                 let d = if let Some(b) = b.filter(|&b| crate::scan::connected(scan, a, b)) {
                     let end = |i: usize| {

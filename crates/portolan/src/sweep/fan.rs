@@ -89,7 +89,8 @@ impl Fan {
             let next = scan.next(i);
             let b = spokes[(i + 1) % n];
             let joined = next.is_some_and(|j| connected(scan, i, j));
-            let narrow = next.is_some_and(|j| distance(scan.beam(i).direction, scan.beam(j).direction) <= MAX_OPENING);
+            let narrow =
+                next.is_some_and(|j| distance(scan.beam(i).direction, scan.beam(j).direction) <= MAX_OPENING);
             self.wedges.push(Wedge::new(spokes[i], b, joined, narrow));
             let lowest = self.start.last().copied().unwrap_or(0.0);
             self.start.push(angle(&spokes[i]).max(lowest)); // ascending, rounding included

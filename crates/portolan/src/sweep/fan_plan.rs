@@ -97,8 +97,11 @@ pub(super) fn mark_between<const D: usize>(
     // Everything in units of blocks.
     let zero = [(origin[0] - lattice.origin[0]) * inverse, (origin[1] - lattice.origin[1]) * inverse];
     let margin = margin * inverse;
-    let point = |d: [f32; 2], s: f64| [zero[0] + f64::from(d[0]) * s * inverse, zero[1] + f64::from(d[1]) * s * inverse];
-    let corners = [point(a, stretch.from), point(a, stretch.to), point(b, stretch.to), point(b, stretch.from)];
+    let point = |d: [f32; 2], s: f64| {
+        [zero[0] + f64::from(d[0]) * s * inverse, zero[1] + f64::from(d[1]) * s * inverse]
+    };
+    let corners =
+        [point(a, stretch.from), point(a, stretch.to), point(b, stretch.to), point(b, stretch.from)];
     let low = corners.iter().map(|c| c[1]).fold(f64::INFINITY, f64::min) - margin;
     let high = corners.iter().map(|c| c[1]).fold(f64::NEG_INFINITY, f64::max) + margin;
     let rows = (bitmap.first[1], bitmap.first[1] + bitmap.size[1] - 1);

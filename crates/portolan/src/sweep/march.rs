@@ -89,9 +89,10 @@ mod tests {
     use std::collections::HashMap;
 
     fn equals_the_oracle<const D: usize>(beams: &[([f64; D], f64, bool)], carve: bool) {
-        let scan = Scan::from_beams(beams.iter().filter(|b| unit(b.0).is_some()).map(|&(direction, range, hit)| {
-            Beam { direction, range, kind: if hit { BeamKind::Hit } else { BeamKind::MaxRange } }
-        }));
+        let scan =
+            Scan::from_beams(beams.iter().filter(|b| unit(b.0).is_some()).map(|&(direction, range, hit)| {
+                Beam { direction, range, kind: if hit { BeamKind::Hit } else { BeamKind::MaxRange } }
+            }));
         let pose = Pose { translation: [0.013; D], ..Pose::IDENTITY };
         let lattice = Lattice::new([-0.3; D], 0.1);
         let tau = 0.3;

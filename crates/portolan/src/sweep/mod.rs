@@ -41,7 +41,12 @@ pub trait Sweep<const D: usize> {
 }
 
 /// The part of `origin + s * direction`, `0 <= s <= length`, inside a box: `None` where it misses.
-fn clip<const D: usize>(bounds: &Aabb<D>, origin: [f64; D], direction: [f64; D], length: f64) -> Option<(f64, f64)> {
+fn clip<const D: usize>(
+    bounds: &Aabb<D>,
+    origin: [f64; D],
+    direction: [f64; D],
+    length: f64,
+) -> Option<(f64, f64)> {
     let (mut near, mut far) = (0.0f64, length);
     for k in 0..D {
         if direction[k] == 0.0 {

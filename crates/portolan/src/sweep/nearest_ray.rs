@@ -1,7 +1,7 @@
 //! Cell centres against the nearest beam, for scans that do not know which beams are neighbours.
 
-use super::touched::Touched;
 use super::clip;
+use super::touched::Touched;
 use crate::cell::{DistanceObservation, Distances, Evidence};
 use crate::geom::vector::{along, dot, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
@@ -65,19 +65,29 @@ impl<const D: usize> NearestRay<D> {
             let length = if beam.is_hit() { z + tau } else { z };
             let Some((near, far)) = clip(bounds, origin, direction, length) else { continue };
             let near = if carve { near } else { near.max(z - tau) };
-            let Some(mut walk) = RayWalk::new(lattice, along(origin, direction, near), direction) else { continue };
+            let Some(mut walk) = RayWalk::new(lattice, along(origin, direction, near), direction) else {
+                continue;
+            };
             loop {
                 let cell = walk.cell();
                 let offset = sub(lattice.center(cell), origin);
                 let s = dot(offset, direction);
-                let d = if beam.is_hit() { z - s } else if s <= z - tau { tau } else { f64::NEG_INFINITY };
+                let d = if beam.is_hit() {
+                    z - s
+                } else if s <= z - tau {
+                    tau
+                } else {
+                    f64::NEG_INFINITY
+                };
                 let w = weight * (1.0 + d / tau).clamp(0.0, 1.0) as f32;
                 if w > 0.0 && (carve || d <= tau) {
                     let aside_sq = (dot(offset, offset) - s * s) as f32;
                     let i = BlockKey::offset(cell);
                     let evidence = self.touched.of_cell(cell);
                     if !evidence.distances.is_set(i) || aside_sq < evidence.aside_sq[i] {
-                        evidence.distances.set(i, DistanceObservation { distance: d.min(tau) as f32, weight: w });
+                        evidence
+                            .distances
+                            .set(i, DistanceObservation { distance: d.min(tau) as f32, weight: w });
                         evidence.aside_sq[i] = aside_sq;
                     }
                 }

@@ -25,7 +25,15 @@ impl<const D: usize> Rays<D> {
         Self { wall_depth, touched: Touched::new() }
     }
 
-    fn beam(&mut self, lattice: &Lattice<D>, bounds: &Aabb<D>, origin: [f64; D], direction: [f64; D], z: f64, hit: bool) {
+    fn beam(
+        &mut self,
+        lattice: &Lattice<D>,
+        bounds: &Aabb<D>,
+        origin: [f64; D],
+        direction: [f64; D],
+        z: f64,
+        hit: bool,
+    ) {
         let half = 0.5 * self.wall_depth;
         let length = if hit { z + half } else { z };
         let Some((near, far)) = clip(bounds, origin, direction, length) else { return };
@@ -91,7 +99,12 @@ mod tests {
     use std::collections::HashMap;
 
     /// The definition, cell by cell in a hash map, straight from the documentation.
-    fn oracle<const D: usize>(scan: &Scan<D>, pose: &Pose<D>, lattice: &Lattice<D>, depth: f64) -> HashMap<[i32; D], Endpoint> {
+    fn oracle<const D: usize>(
+        scan: &Scan<D>,
+        pose: &Pose<D>,
+        lattice: &Lattice<D>,
+        depth: f64,
+    ) -> HashMap<[i32; D], Endpoint> {
         let mut said = HashMap::new();
         for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
             let (z, origin, direction) = (beam.range, pose.translation, pose.rotate(beam.direction));
@@ -117,9 +130,13 @@ mod tests {
 
     fn equals_the_oracle<const D: usize>(beams: &[([f64; D], f64, u8)], origin: [f64; D], depth: f64) {
         let kinds = [BeamKind::Hit, BeamKind::Hit, BeamKind::MaxRange, BeamKind::NoReturn, BeamKind::Dropped];
-        let scan = Scan::from_beams(beams.iter().filter(|b| unit(b.0).is_some()).map(|&(direction, range, kind)| {
-            Beam { direction, range, kind: kinds[usize::from(kind)] }
-        }));
+        let scan = Scan::from_beams(
+            beams.iter().filter(|b| unit(b.0).is_some()).map(|&(direction, range, kind)| Beam {
+                direction,
+                range,
+                kind: kinds[usize::from(kind)],
+            }),
+        );
         let pose = Pose { translation: origin, ..Pose::IDENTITY };
         let lattice = Lattice::new([-0.3; D], 0.1);
         let mut sweep = Rays::new(depth);

@@ -20,7 +20,12 @@ pub enum WeightModel {
 impl WeightModel {
     /// One weight per beam of the scan, into `weights`; `cosines` is scratch. Incidence comes from neighbouring
     /// beams and is 1 where there are none.
-    pub(super) fn weigh<const D: usize>(self, scan: &Scan<D>, cosines: &mut Vec<f32>, weights: &mut Vec<f32>) {
+    pub(super) fn weigh<const D: usize>(
+        self,
+        scan: &Scan<D>,
+        cosines: &mut Vec<f32>,
+        weights: &mut Vec<f32>,
+    ) {
         let (square, cosine) = match self {
             Self::Constant => (false, false),
             Self::InverseSquare => (true, false),
@@ -28,7 +33,9 @@ impl WeightModel {
             Self::InverseSquareCosIncidence => (true, true),
         };
         weights.clear();
-        weights.extend(scan.beams().map(|b| if square { (b.range.max(1.0).powi(2).recip()) as f32 } else { 1.0 }));
+        weights.extend(
+            scan.beams().map(|b| if square { (b.range.max(1.0).powi(2).recip()) as f32 } else { 1.0 }),
+        );
         if cosine {
             cos_incidence(scan, cosines);
             // Never quite 0: a grazing beam still knows that there is something.

@@ -1,0 +1,13 @@
+//! Read-only fields that answer in constant time.
+
+mod distance_transform;
+mod envelope;
+mod esdf;
+
+pub use distance_transform::squared_distance_transform;
+pub use esdf::{Esdf, EsdfError, EsdfSettings, esdf_from_tsdf};
+
+/// A Euclidean signed distance field of the plane.
+pub type Esdf2 = Esdf<2>;
+/// A Euclidean signed distance field of space.
+pub type Esdf3 = Esdf<3>;

@@ -1,0 +1,120 @@
+//! Contours: oriented segments in the plane.
+
+use super::{ContourSettings, Polyline, marching_squares};
+use crate::geom::vector::{distance, point_segment};
+use crate::map::{Abilities, DerivedField, Tsdf};
+
+/// Segments with shared vertices; free space lies on the left of every segment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contour {
+    /// World positions (metres).
+    pub vertices: Vec<[f64; 2]>,
+    /// Pairs of vertex indices, from start to end.
+    pub segments: Vec<[u32; 2]>,
+}
+
+impl Contour {
+    /// Start and end of every segment.
+    pub fn ends(&self) -> impl ExactSizeIterator<Item = [[f64; 2]; 2]> + '_ {
+        self.segments.iter().map(|s| s.map(|i| self.vertices[i as usize]))
+    }
+
+    /// Length of all segments (metres).
+    pub fn length(&self) -> f64 {
+        self.ends().map(|[a, b]| distance(a, b)).sum()
+    }
+
+    /// Distance from a point to the nearest segment (metres), unsigned. `None` where there is no segment.
+    /// O(segments): the contour has no index; where many distances are asked for, the ESDF is the map to ask.
+    pub fn nearest_distance(&self, p_world: impl Into<[f64; 2]>) -> Option<f64> {
+        let p = p_world.into();
+        let mut best = f64::INFINITY;
+        for [a, b] in self.ends() {
+            let (ab, ap) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+            let length_sq = ab[0] * ab[0] + ab[1] * ab[1];
+            let t = ((ap[0] * ab[0] + ap[1] * ab[1]) / length_sq.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let off = [ap[0] - t * ab[0], ap[1] - t * ab[1]];
+            best = best.min(off[0] * off[0] + off[1] * off[1]);
+        }
+        (best < f64::INFINITY).then(|| best.sqrt())
+    }
+
+    /// Index of the nearest segment, and the distance to it (metres). O(segments).
+    pub fn nearest_segment(&self, p_world: impl Into<[f64; 2]>) -> Option<(usize, f64)> {
+        let p = p_world.into();
+        let distances = self.ends().map(|[a, b]| point_segment(p, a, b).0).enumerate();
+        distances.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Whether a point lies inside by the crossing number of the ray to the right: odd is inside. `None` where
+    /// there is no segment. Right for closed contours only: through a gap in the contour, where a wall was not
+    /// observed, the count is off by one, and a contour cannot tell free from unknown. O(segments).
+    pub fn is_inside(&self, p_world: impl Into<[f64; 2]>) -> Option<bool> {
+        let p = p_world.into();
+        let crossings = self
+            .ends()
+            .filter(|[a, b]| {
+                // Half-open in y, so that a ray through a vertex counts once.
+                (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            })
+            .count();
+        (!self.segments.is_empty()).then_some(crossings % 2 == 1)
+    }
+
+    /// The segments joined end to end.
+    pub fn polylines(&self) -> Vec<Polyline> {
+        super::polyline::join(self)
+    }
+}
+
+impl DerivedField<2> for Contour {
+    type Settings = ContourSettings;
+
+    fn derive(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Self {
+        marching_squares(tsdf, settings)
+    }
+
+    fn occupancy(&self, p_world: [f64; 2]) -> Option<f64> {
+        self.is_inside(p_world).map(|inside| if inside { 1.0 } else { 0.0 })
+    }
+
+    /// None: a contour has to search ([`Contour::nearest_distance`]).
+    fn distance(&self, _: [f64; 2]) -> Option<f64> {
+        None
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.vertices.capacity() * size_of::<[f64; 2]>() + self.segments.capacity() * size_of::<[u32; 2]>()
+    }
+
+    fn abilities() -> Abilities {
+        Abilities { occupancy: true, distance: false }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> Contour {
+        Contour {
+            vertices: vec![[0.0, 0.0], [0.0, 2.0], [2.0, 2.0], [2.0, 0.0]],
+            segments: vec![[0, 1], [1, 2], [2, 3], [3, 0]],
+        }
+    }
+
+    #[test]
+    fn distance_and_crossing_number() {
+        let c = square();
+        assert_eq!(c.nearest_distance([1.0, 0.5]), Some(0.5));
+        assert_eq!(c.nearest_distance([5.0, 6.0]), Some(5.0));
+        assert_eq!(c.nearest_segment([1.0, 1.9]).unwrap().0, 1);
+        assert_eq!(
+            (c.is_inside([1.0, 1.0]), c.is_inside([3.0, 1.0]), c.is_inside([-1.0, 0.0])),
+            (Some(true), Some(false), Some(false))
+        );
+        assert_eq!(c.length(), 8.0);
+        assert_eq!(Contour::default().nearest_distance([0.0, 0.0]), None);
+        assert_eq!(Contour::default().is_inside([0.0, 0.0]), None);
+    }
+}

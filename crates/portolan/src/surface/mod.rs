@@ -1,0 +1,13 @@
+//! Surfaces extracted from distance fields, and the questions they answer.
+
+mod contour;
+mod measures;
+mod polyline;
+mod ray_cast;
+mod squares;
+
+pub use contour::Contour;
+pub use measures::{DoubledLength, ThinWalls, doubled_length, thin_walls};
+pub use polyline::Polyline;
+pub use ray_cast::{RayCast, RayCastSettings, cast_ray};
+pub use squares::{Ambiguity, ContourSettings, marching_squares};

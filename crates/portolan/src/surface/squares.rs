@@ -1,0 +1,243 @@
+//! Marching squares over cell centres.
+
+use super::Contour;
+use crate::map::Tsdf;
+
+/// What to do with a square whose diagonal corners agree and whose neighbours differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Ambiguity {
+    /// The sign of the bilinear field at its saddle decides (asymptotic decider, Nielson & Hamann 1991),
+    /// computed exactly.
+    #[default]
+    Decide,
+    /// Always keep the inside corners apart, as the chapter's table does.
+    FixedTable,
+}
+
+/// How a contour is extracted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContourSettings {
+    /// A square with a corner of smaller weight has no sign and gets no segment: no geometry is invented.
+    pub min_weight: f32,
+    /// Ambiguous squares.
+    pub ambiguity: Ambiguity,
+}
+
+impl Default for ContourSettings {
+    /// The chapter's `W_min` 0.5.
+    fn default() -> Self {
+        Self { min_weight: 0.5, ambiguity: Ambiguity::Decide }
+    }
+}
+
+const NONE: u32 = u32::MAX;
+
+/// Vertices on the lattice edges around one row of squares; each crossing is made once and shared.
+struct RowEdges {
+    /// Along x, at the row's lower centres and at its upper ones.
+    below: Vec<u32>,
+    above: Vec<u32>,
+    /// Along y, between the two.
+    side: Vec<u32>,
+}
+
+/// The zero level set of a field as oriented segments, free space on the left.
+///
+/// Squares join the centres of four neighbouring cells; a crossing is placed on an edge by linear
+/// interpolation, `t = D_a / (D_a - D_b)`, which is exact for the piecewise-linear field of the samples.
+/// Negative is inside, zero is free. O(cells).
+pub fn marching_squares(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Contour {
+    let grid = tsdf.grid();
+    let [width, height] = grid.shape;
+    let planes = tsdf.store().planes();
+    let (distance, weight) = (planes.distances(), planes.weights());
+    let mut contour = Contour::default();
+    if width < 2 || height < 2 {
+        return contour;
+    }
+    let mut edges = RowEdges { below: vec![NONE; width], above: vec![NONE; width], side: vec![NONE; width] };
+    for y in 0..height - 1 {
+        std::mem::swap(&mut edges.below, &mut edges.above);
+        edges.above.fill(NONE);
+        edges.side.fill(NONE);
+        let (lower, upper) = (&distance[y * width..][..width], &distance[(y + 1) * width..][..width]);
+        let (lower_w, upper_w) = (&weight[y * width..][..width], &weight[(y + 1) * width..][..width]);
+        for x in 0..width - 1 {
+            // Corners counter-clockwise from the lower left.
+            let d = [lower[x], lower[x + 1], upper[x + 1], upper[x]];
+            let code = d.iter().enumerate().fold(0, |code, (n, &v)| code | usize::from(v < 0.0) << n);
+            if code == 0 || code == 15 {
+                continue;
+            }
+            let w = [lower_w[x], lower_w[x + 1], upper_w[x + 1], upper_w[x]];
+            if w.iter().any(|&w| w < settings.min_weight || w == 0.0) {
+                continue;
+            }
+            for &[from, to] in segments(code, &d, settings.ambiguity) {
+                let ends = [from, to].map(|edge| vertex(&mut contour, &mut edges, tsdf, [x, y], &d, edge));
+                contour.segments.push(ends);
+            }
+        }
+    }
+    contour
+}
+
+/// Pairs of edges to join: from the edge where, counter-clockwise, the inside begins to the one where it ends.
+/// Edge `n` runs from corner `n` to corner `n + 1`.
+fn segments(code: usize, d: &[f32; 4], ambiguity: Ambiguity) -> &'static [[u8; 2]] {
+    const TABLE: [&[[u8; 2]]; 16] = [
+        &[],
+        &[[3, 0]],
+        &[[0, 1]],
+        &[[3, 1]],
+        &[[1, 2]],
+        &[[3, 0], [1, 2]],
+        &[[0, 2]],
+        &[[3, 2]],
+        &[[2, 3]],
+        &[[2, 0]],
+        &[[0, 1], [2, 3]],
+        &[[2, 1]],
+        &[[1, 3]],
+        &[[1, 0]],
+        &[[0, 3]],
+        &[],
+    ];
+    // The saddle lies inside where the product of the inside corners is the larger one; products of two f32
+    // are exact in f64, and so is the sign of their difference.
+    let [a, b, c, e] = d.map(f64::from);
+    match (code, ambiguity) {
+        (5, Ambiguity::Decide) if a * c > b * e => &[[3, 2], [1, 0]],
+        (10, Ambiguity::Decide) if b * e > a * c => &[[0, 3], [2, 1]],
+        _ => TABLE[code],
+    }
+}
+
+fn vertex(
+    contour: &mut Contour,
+    edges: &mut RowEdges,
+    tsdf: &Tsdf<2>,
+    [x, y]: [usize; 2],
+    d: &[f32; 4],
+    edge: u8,
+) -> u32 {
+    // Interpolate from the lower end to the upper one, so that both squares at an edge compute the same bits.
+    let (slot, low, axis, da, db) = match edge {
+        0 => (&mut edges.below[x], [x, y], 0, d[0], d[1]),
+        1 => (&mut edges.side[x + 1], [x + 1, y], 1, d[1], d[2]),
+        2 => (&mut edges.above[x], [x, y + 1], 0, d[3], d[2]),
+        _ => (&mut edges.side[x], [x, y], 1, d[0], d[3]),
+    };
+    if *slot == NONE {
+        let (da, db) = (f64::from(da), f64::from(db));
+        let lattice = &tsdf.grid().lattice;
+        let mut p = lattice.center(low.map(|v| v as i32));
+        p[axis] += da / (da - db) * lattice.resolution;
+        *slot = contour.vertices.len() as u32;
+        contour.vertices.push(p);
+    }
+    *slot
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::vector::{distance, sub};
+    use crate::map::TsdfConfig;
+    use proptest::prelude::*;
+
+    /// A field with these values at the centres, observed where the value is not NaN.
+    pub(crate) fn field(shape: [usize; 2], value: impl Fn([f64; 2]) -> f64) -> Tsdf<2> {
+        let mut tsdf =
+            Tsdf::new(TsdfConfig { cells: shape, resolution: 1.0, truncation: 1e6, ..Default::default() })
+                .unwrap();
+        for i in 0..tsdf.grid().len() {
+            let cell = tsdf.grid().cell(i);
+            let v = value(tsdf.grid().lattice.center(cell));
+            if !v.is_nan() {
+                tsdf.fuse(cell, v, 1.0);
+            }
+        }
+        tsdf
+    }
+
+    #[test]
+    fn a_circle_is_closed_and_round_and_oriented() {
+        let tsdf = field([40, 40], |p| distance(p, [20.3, 19.8]) - 11.7);
+        let contour = marching_squares(&tsdf, &ContourSettings::default());
+        let lines = contour.polylines();
+        assert_eq!(lines.len(), 1);
+        assert!(lines[0].closed);
+        assert!(contour.vertices.iter().all(|&v| (distance(v, [20.3, 19.8]) - 11.7).abs() < 0.02));
+        assert!((contour.length() - std::f64::consts::TAU * 11.7).abs() < 0.2);
+        for s in &contour.segments {
+            let [a, b] = s.map(|i| contour.vertices[i as usize]);
+            let outward = sub(a, [20.3, 19.8]);
+            let along = sub(b, a);
+            // Free space, which is outside, on the left: the circle runs clockwise around its inside.
+            assert!(outward[0] * along[1] - outward[1] * along[0] < 0.0);
+        }
+    }
+
+    #[test]
+    fn unobserved_corners_give_no_geometry() {
+        let tsdf = field([20, 20], |p| if p[1] > 10.0 { f64::NAN } else { p[0] - 9.9 });
+        let contour = marching_squares(&tsdf, &ContourSettings::default());
+        assert_eq!(contour.segments.len(), 9);
+        assert!(!contour.polylines()[0].closed);
+        let strict = ContourSettings { min_weight: 1.5, ..Default::default() };
+        assert!(marching_squares(&tsdf, &strict).segments.is_empty());
+    }
+
+    #[test]
+    fn the_saddle_decides_ambiguous_squares() {
+        // Inside at the lower left and upper right; f(x, y) = bilinear.
+        let corners = |a: f64, b: f64, c: f64, e: f64| {
+            field([2, 2], move |p| match (p[0] > 1.0, p[1] > 1.0) {
+                (false, false) => a,
+                (true, false) => b,
+                (true, true) => c,
+                (false, true) => e,
+            })
+        };
+        let joined = |tsdf: &Tsdf<2>, ambiguity| {
+            let contour = marching_squares(tsdf, &ContourSettings { ambiguity, ..Default::default() });
+            assert_eq!(contour.segments.len(), 2);
+            // A segment around the lower left corner alone keeps the inside apart.
+            let first = contour.segments[0].map(|i| contour.vertices[i as usize]);
+            !first.iter().all(|v| v[0] + v[1] < 2.0)
+        };
+        let deep = corners(-3.0, 1.0, -3.0, 1.0);
+        let shallow = corners(-1.0, 3.0, -1.0, 3.0);
+        assert!(joined(&deep, Ambiguity::Decide));
+        assert!(!joined(&shallow, Ambiguity::Decide));
+        assert!(!joined(&deep, Ambiguity::FixedTable));
+        assert!(!joined(&corners(-1.0, 1.0, -1.0, 1.0), Ambiguity::Decide));
+    }
+
+    proptest! {
+        #[test]
+        fn contours_of_anything_are_chains_that_end_only_at_the_border(
+            values in prop::collection::vec(-1.0..1.0f64, 144), zeros: bool,
+        ) {
+            let tsdf = field([12, 12], |p| {
+                let v = values[p[0] as usize + 12 * p[1] as usize];
+                if zeros && v.abs() < 0.2 { 0.0 } else { v }
+            });
+            let contour = marching_squares(&tsdf, &ContourSettings::default());
+            let mut starts = vec![0; contour.vertices.len()];
+            let mut ends = vec![0; contour.vertices.len()];
+            for s in &contour.segments {
+                starts[s[0] as usize] += 1;
+                ends[s[1] as usize] += 1;
+            }
+            for (i, v) in contour.vertices.iter().enumerate() {
+                prop_assert!(starts[i] <= 1 && ends[i] <= 1);
+                let at_border = v.iter().any(|&c| c == 0.5 || c == 11.5);
+                prop_assert!(at_border || starts[i] + ends[i] == 2);
+            }
+            let joined: usize = contour.polylines().iter().map(|l| l.vertices.len() - usize::from(!l.closed)).sum();
+            prop_assert_eq!(joined, contour.segments.len());
+        }
+    }
+}
