@@ -1,0 +1,35 @@
+//! Maps and charts as PNG bytes in memory.
+//!
+//! Not a plotting library: it has the few shapes that portolan's own pictures need, in the colours of the
+//! chapter, and it opens no files. A picture is a [`Canvas`]; a [`View`] says which box of the world, in
+//! metres, lies on which rectangle of pixels; [`Panels`] puts several views side by side; a [`Chart`] has
+//! axes. Nothing here panics on empty, constant or non-finite data: such points are left out.
+//!
+//! ```
+//! use portolan_draw::{Canvas, Pen, PixelRect, View, color};
+//!
+//! let mut canvas = Canvas::new(320, 240);
+//! let view = View::fit([0.0, 0.0], [4.0, 3.0], PixelRect::new(0.0, 0.0, 320.0, 240.0));
+//! canvas.raster(&view, [8, 6], [0.0, 0.0], 0.5, |[x, _]| color::signed_distance(x as f64 - 4.0, 4.0));
+//! canvas.polyline(&view, &[[0.5, 0.5], [3.5, 2.5]], Pen::new(color::SURFACE, 2.0));
+//! assert_eq!(&canvas.encode_png()[1..4], b"PNG");
+//! ```
+
+mod canvas;
+mod chart;
+pub mod color;
+mod furniture;
+mod panels;
+mod plot;
+mod text;
+mod ticks;
+mod view;
+
+pub use canvas::{Canvas, Pen};
+pub use chart::{Axis, Chart, Line, Mark, Scale, Series};
+pub use color::Color;
+pub use furniture::{Entry, Swatch};
+pub use panels::{Panel, Panels};
+pub use text::{Anchor, Font};
+pub use ticks::{linear_ticks, log_ticks, tick_label};
+pub use view::{PixelRect, View};
