@@ -8,6 +8,7 @@
 mod answer;
 pub mod cell;
 pub mod field;
+pub mod gallery;
 pub mod geom;
 pub mod map;
 pub mod scan;
