@@ -95,6 +95,10 @@ pub struct MapServerMap {
     pub cells: Vec<MapCell>,
     /// Occupancy of each cell from 0 to 1; NaN where unknown.
     pub occupancy: Vec<f32>,
+    /// How many cells have the grey 205 or 206 that map_saver and others write for unknown, but count as free
+    /// because the file's `free_thresh` is above 0.196 (Nav2's own `depot.yaml` is such a file). They are
+    /// free here as they are for ROS; a careful caller warns.
+    pub unknown_grey_taken_for_free: usize,
 }
 
 impl MapServerMap {
@@ -116,7 +120,10 @@ impl MapServerMap {
         let table: Vec<_> = (0..=image.max_value).map(|v| cell(v, image.max_value, info)).collect();
         let rows = image.pixels.chunks(image.width.max(1)).rev();
         let (cells, occupancy) = rows.flatten().map(|&v| table[usize::from(v)]).unzip();
-        Self { grid, yaw, cells, occupancy }
+        let grey = image.pixels.iter().filter(|v| image.max_value == 255 && matches!(v, 205 | 206));
+        let as_free = |v: &&u16| table[usize::from(**v)].0 == MapCell::Free && info.mode == MapMode::Trinary;
+        let unknown_grey_taken_for_free = grey.filter(as_free).count();
+        Self { grid, yaw, cells, occupancy, unknown_grey_taken_for_free }
     }
 
     /// The pose that turns the grid's frame into the world: the identity without yaw.
@@ -222,12 +229,14 @@ fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo, IoError> {
             }
             continue;
         }
-        let Some((key, value)) = line.split_once(':') else { continue };
-        let value = unquoted(value.trim());
+        let Some((key, raw)) = line.split_once(':').map(|(key, raw)| (key, raw.trim())) else { continue };
+        let value = unquoted(raw);
         let number_in =
             |low: f64, high: f64| parse_f64(value.as_bytes()).filter(|v| (low..=high).contains(v));
         match unquoted(key.trim()) {
             "image" if value.is_empty() => return bad("image", value, "name the image file"),
+            // In single quotes a quote is written twice.
+            "image" if raw.starts_with('\'') => info.image = PathBuf::from(value.replace("''", "'")),
             "image" => info.image = PathBuf::from(value),
             "resolution" => match number_in(1e-6, 1e6) {
                 Some(v) => info.resolution = v,
@@ -359,7 +368,7 @@ mod tests {
         let scale = MapServerInfo { mode: MapMode::Scale, ..info.clone() };
         let map = MapServerMap::from_image(&image, &scale);
         let half = ((127.0 / 255.0 - 0.15) / 0.5) as f32;
-        assert!((map.occupancy[3] - half).abs() < 1e-6 && map.cells[3] == Unknown);
+        assert!((map.occupancy[1] - half).abs() < 1e-6 && map.cells[1] == Unknown);
         let raw = MapServerInfo { mode: MapMode::Raw, negate: true, ..info.clone() };
         let pixels = vec![0, 100, 50, 101];
         let map = MapServerMap::from_image(&Pgm { pixels, ..image.clone() }, &raw);
@@ -408,6 +417,9 @@ mod tests {
             for kind in [Free, Occupied] {
                 assert!(map.cells.iter().filter(|c| **c == kind).count() > 500, "{name} {kind:?}");
             }
+        }
+        if let Some(path) = real_data("maps_2d/depot.yaml") {
+            assert_eq!(MapServerMap::read(path).unwrap().unknown_grey_taken_for_free, 8894);
         }
         let Some(path) = real_data("maps_2d/willow-full.pgm") else { return };
         let map = MapServerMap::from_image(&Pgm::read(path).unwrap(), &MapServerInfo::of_image(0.1));
