@@ -8,7 +8,7 @@ use crate::cell::OccupancyModel;
 use crate::field::{Esdf2, EsdfSettings, esdf_from_tsdf};
 use crate::geom::{Aabb, Grid, Pose, vector};
 use crate::map::{Cloud, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
-use crate::scan::Scan;
+use crate::scan::{Scan, ScanStats};
 use crate::store::Store;
 use crate::surface::{Ambiguity, Contour, ContourSettings, level_set, marching_squares};
 
@@ -78,19 +78,19 @@ pub fn run(
     let march = Tsdf2Config { sweep: SweepKind::March, ..tsdf_config };
 
     let mut occupancy = OccupancyGrid::new(grid, settings.model)?;
-    let grid_update = fuse_all(clock, log, |at, scan| drop(occupancy.integrate(at, scan)));
+    let grid_update = fuse_all(clock, log, |at, scan| occupancy.integrate(at, scan));
     let mut tree = Quadtree::covering(&grid, settings.model)?;
-    let tree_update = fuse_all(clock, log, |at, scan| drop(tree.integrate(at, scan)));
+    let tree_update = fuse_all(clock, log, |at, scan| tree.integrate(at, scan));
     let mut chapter_tree = chapter_tree(&grid, settings.model)?;
-    let chapter_tree_update = fuse_all(clock, log, |at, scan| drop(chapter_tree.integrate(at, scan)));
+    let chapter_tree_update = fuse_all(clock, log, |at, scan| chapter_tree.integrate(at, scan));
     let mut tsdf = Tsdf2::new(tsdf_config)?;
-    let tsdf_update = fuse_all(clock, log, |at, scan| drop(tsdf.integrate(at, scan, true)));
+    let tsdf_update = fuse_all(clock, log, |at, scan| tsdf.integrate(at, scan, true));
     let mut banded = Tsdf2::new(tsdf_config)?;
-    let banded_update = fuse_all(clock, log, |at, scan| drop(banded.integrate(at, scan, false)));
+    let banded_update = fuse_all(clock, log, |at, scan| banded.integrate(at, scan, false));
     let mut marched = Tsdf2::new(march)?;
-    let marched_update = fuse_all(clock, log, |at, scan| drop(marched.integrate(at, scan, true)));
+    let marched_update = fuse_all(clock, log, |at, scan| marched.integrate(at, scan, true));
     let mut cloud = Cloud::new();
-    let cloud_update = fuse_all(clock, log, |at, scan| drop(cloud.integrate(at, scan)));
+    let cloud_update = fuse_all(clock, log, |at, scan| cloud.integrate(at, scan));
     let (cloud_build, ()) = seconds_of(clock, || cloud.rebuild());
     let (min_weight, band) = (settings.esdf.min_weight, settings.esdf.band_cells);
     let (esdf_build, distance) = seconds_of(clock, || esdf_from_tsdf(&tsdf, min_weight, band));
@@ -255,7 +255,7 @@ pub fn run(
 fn fuse_all(
     clock: &mut Clock<'_>,
     log: &[(Pose<2>, Scan<2>)],
-    mut fuse: impl FnMut(&Pose<2>, &Scan<2>),
+    mut fuse: impl FnMut(&Pose<2>, &Scan<2>) -> ScanStats,
 ) -> f64 {
     let start = clock();
     for (pose, scan) in log {
