@@ -5,11 +5,12 @@
 //! | mode | occupied | free | else |
 //! |---|---|---|---|
 //! | `trinary` | `p > occupied_thresh` | `p < free_thresh` | unknown |
-//! | `scale` | the same | the same | undecided, with a probability between the thresholds' 0 and 1 |
-//! | `raw` | value / 100 from 0 to 1 decided by the thresholds | | values above 100 are unknown |
+//! | `scale` | the same | the same | unknown, with an occupancy that runs from 0 to 1 between the thresholds |
+//! | `raw` | the same, where `p` is `v` percent | the same | unknown, with `p` where `v` is at most 100 |
 //!
 //! The first row of the image is the top of the map; the grids here have y up.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use portolan::geom::{Grid, Pose};
@@ -17,7 +18,6 @@ use portolan::geom::{Grid, Pose};
 use crate::bytes::{Input, Lines, open, parse_f64};
 use crate::error::shown;
 use crate::{IoError, Pgm, write_atomic};
-use std::io::Write;
 
 /// What a map says about a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

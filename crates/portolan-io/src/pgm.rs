@@ -8,7 +8,7 @@ use crate::error::shown;
 use crate::{IoError, write_atomic};
 
 /// The most pixels of an image.
-const MOST_PIXELS: u64 = 1 << 28;
+const MOST_PIXELS: u64 = 1 << 27;
 
 /// A grey image.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -202,6 +202,18 @@ mod tests {
     }
 
     #[test]
+    fn no_packed_bytes_make_it_panic() {
+        let text: Vec<u8> = (0..500u32).flat_map(|i| (i * i).to_le_bytes()).collect();
+        for whole in [gz(&text), bz(&text)] {
+            for bytes in crate::testing::bad_bytes(&whole, 3, 1000) {
+                if let Err(e) = unpack(bytes) {
+                    assert!(!e.to_string().contains('\n'), "{e}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn bombs_stop_at_the_limit() {
         let bomb = gz(&vec![b'a'; 20 << 20]);
         let error = Input::from_reader(io::Cursor::new(bomb), Path::new("x")).unwrap().read_all(1 << 20);

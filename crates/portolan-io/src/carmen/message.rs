@@ -20,7 +20,7 @@ pub(super) struct FanShape {
 impl FanShape {
     /// The fan of a `FLASER` scan.
     fn flaser(beams: usize) -> Self {
-        let steps = if beams % 2 == 0 { beams } else { (beams - 1).max(1) };
+        let steps = if beams.is_multiple_of(2) { beams } else { (beams - 1).max(1) };
         Self { start: -PI / 2.0, step: PI / steps as f64, beams }
     }
 
