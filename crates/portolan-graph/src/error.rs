@@ -64,12 +64,9 @@ pub enum GraphError {
         /// The iteration, from 0; 0 also for a start that is computed.
         iteration: usize,
     },
-    /// The cost overflows: poses or information too large.
-    #[error("the cost is not finite in iteration {iteration}")]
-    NotFinite {
-        /// The iteration, from 0.
-        iteration: usize,
-    },
+    /// The cost at the start overflows: poses or information too large.
+    #[error("the cost is not finite: poses or information are too large")]
+    NotFinite,
     /// A setting is out of range.
     #[error("setting {name} is {value}: {expected}")]
     Setting {

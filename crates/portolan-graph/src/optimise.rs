@@ -6,88 +6,10 @@ use crate::components::anchors;
 use crate::error::GraphError;
 use crate::graph::PoseGraph;
 use crate::kernel::Kernel;
+use crate::settings::{Approach, Report, Settings, Stop};
 use crate::sparse::{Cholesky, SymmetricBlocks};
 use crate::system::{Cost, System};
 use crate::tangent::stepped;
-
-/// How to optimise.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// Applied to edges of the kind [`EdgeKind::Closure`](crate::EdgeKind::Closure). None by default.
-    pub kernel: Kernel,
-    /// Whether the kernel starts wide, so that at first nothing is an outlier, and narrows to its scale by factors
-    /// of two in `k²` (graduated non-convexity, Yang et al. 2020). It makes bounded kernels nearly independent of
-    /// the start. On by default; without effect where there is no kernel.
-    pub graduated: bool,
-    /// Linear systems solved at most, in all. 100 by default.
-    pub max_iterations: usize,
-    /// Converged where a step lowers the cost by less than this part of it. 1e-6 by default.
-    pub relative_tolerance: f64,
-    /// First damping, in units of the diagonal of the system. 1e-6 by default: nearly Gauss-Newton.
-    pub damping: f64,
-    /// Whether a graph in several parts is refused. By default one vertex of each part is held.
-    pub require_connected: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            kernel: Kernel::None,
-            graduated: true,
-            max_iterations: 100,
-            relative_tolerance: 1e-6,
-            damping: 1e-6,
-            require_connected: false,
-        }
-    }
-}
-
-/// Why the optimiser stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Stop {
-    /// The last step lowered the cost by less than the tolerance.
-    Converged,
-    /// No step lowers the cost, however small: a minimum to the last digit.
-    Stalled,
-    /// The limit of [`Settings::max_iterations`] was reached before.
-    IterationLimit,
-    /// No vertex is free, or there is no edge.
-    NothingToMove,
-}
-
-/// What the optimiser did.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Report {
-    /// `sum r^T Omega r` without kernels: at the start, then after each accepted step.
-    pub chi_square: Vec<f64>,
-    /// The cost that was minimised, with kernels, at the same moments. Not monotone where the kernel narrows.
-    pub cost: Vec<f64>,
-    /// Linear systems solved, steps that were taken back included.
-    pub iterations: usize,
-    /// Why it ended.
-    pub stop: Stop,
-    /// Parts of the graph that no edge connects.
-    pub components: usize,
-    /// Ids of vertices held because no vertex of their part was fixed: the first of each such part.
-    pub held: Vec<u64>,
-    /// Blocks off the diagonal of the sparse factor: what the fill costs.
-    pub factor_blocks: usize,
-}
-
-impl Settings {
-    fn validate(&self) -> Result<(), GraphError> {
-        self.kernel.validate()?;
-        let refuse = |name, value, expected| Err(GraphError::Setting { name, value, expected });
-        if !(0.0..1.0).contains(&self.relative_tolerance) {
-            return refuse("relative_tolerance", self.relative_tolerance, "in [0, 1)");
-        }
-        if !(0.0..=1e6).contains(&self.damping) {
-            return refuse("damping", self.damping, "in [0, 1e6]");
-        }
-        Ok(())
-    }
-}
 
 impl<const D: usize> PoseGraph<D> {
     /// Moves the free vertices to a minimum of the cost, by Levenberg-Marquardt (Madsen, Nielsen & Tingleff 2004,
@@ -115,10 +37,47 @@ impl<const D: usize> PoseGraph<D> {
             factor_blocks: 0,
         };
         match D {
-            2 => Descent::<D, 3>::new(self, &anchors.held)?.run(settings, &mut report)?.write(self),
-            _ => Descent::<D, 6>::new(self, &anchors.held)?.run(settings, &mut report)?.write(self),
+            2 => Descent::<D, 3>::new(self, &anchors.held).run(settings, &mut report)?.write(self),
+            _ => Descent::<D, 6>::new(self, &anchors.held).run(settings, &mut report)?.write(self),
         }
         Ok(report)
+    }
+}
+
+/// The history of one descent, or of several after each other.
+#[derive(Default)]
+struct Trace {
+    chi_square: Vec<f64>,
+    cost: Vec<f64>,
+    iterations: usize,
+    stop: Option<Stop>,
+}
+
+impl Trace {
+    fn push(&mut self, cost: Cost) {
+        self.chi_square.push(cost.chi_square);
+        self.cost.push(cost.robust);
+    }
+
+    fn ended(self, stop: Stop) -> Self {
+        Self { stop: Some(stop), ..self }
+    }
+
+    /// Adds what came after; its first entry is the moment of our last one, under another kernel.
+    fn append(&mut self, later: Self) {
+        self.chi_square.pop();
+        self.cost.pop();
+        self.chi_square.extend(later.chi_square);
+        self.cost.extend(later.cost);
+        self.iterations += later.iterations;
+        self.stop = later.stop;
+    }
+
+    fn tell(self, report: &mut Report, other_iterations: usize) {
+        report.chi_square = self.chi_square;
+        report.cost = self.cost;
+        report.iterations = self.iterations + other_iterations;
+        report.stop = self.stop.unwrap_or(Stop::NothingToMove);
     }
 }
 
@@ -134,64 +93,77 @@ struct Descent<const D: usize, const B: usize> {
 }
 
 impl<const D: usize, const B: usize> Descent<D, B> {
-    fn new(graph: &PoseGraph<D>, held: &[bool]) -> Result<Self, GraphError> {
+    fn new(graph: &PoseGraph<D>, held: &[bool]) -> Self {
         let system = System::new(graph, held);
-        Ok(Self {
+        Self {
             poses: graph.vertices.iter().map(|v| v.world_from_vertex).collect(),
             h: SymmetricBlocks::zero(&system.pattern),
             g: vec![[0.0; B]; system.free.len()],
             factor: Cholesky::new(&system.pattern),
             system,
-        })
+        }
     }
 
-    /// All stages: one without a graduated kernel, else from wide to narrow.
+    /// The approaches asked for, and of their ends the one that costs least.
     fn run(mut self, settings: &Settings, report: &mut Report) -> Result<Self, GraphError> {
         report.factor_blocks = self.system.pattern.factor_blocks();
-        let widest = match settings.kernel.scale() {
-            Some(k) if settings.graduated => (2.0 * self.system.worst(&self.poses) / (k * k)).log2().ceil(),
-            _ => 0.0,
+        let direct = |s: &mut Self| s.descend(settings.kernel, settings.relative_tolerance, settings);
+        let Some(k) = settings.kernel.scale() else {
+            direct(&mut self)?.tell(report, 0);
+            return Ok(self);
         };
-        // 2^200 is wider than any cost that is worth a stage.
-        for stage in (0..=widest.clamp(0.0, 200.0) as i32).rev() {
-            let kernel = match settings.kernel.scale() {
-                Some(k) => settings.kernel.with_scale(k * 2f64.powi(stage).sqrt()),
-                None => Kernel::None,
-            };
-            // On the way it is enough to stay near the minimum.
-            let tolerance = settings.relative_tolerance.max(if stage > 0 { 1e-2 } else { 0.0 });
-            self.descend(kernel, tolerance, settings, report)?;
+        match settings.approach {
+            Approach::Direct => direct(&mut self)?.tell(report, 0),
+            Approach::Graduated => self.narrow(k, settings)?.tell(report, 0),
+            Approach::Better => {
+                let start = self.poses.clone();
+                let straight = direct(&mut self)?;
+                let kept = std::mem::replace(&mut self.poses, start);
+                let narrowed = self.narrow(k, settings)?;
+                if narrowed.cost.last() < straight.cost.last() {
+                    narrowed.tell(report, straight.iterations);
+                } else {
+                    self.poses = kept;
+                    straight.tell(report, narrowed.iterations);
+                }
+            }
         }
         Ok(self)
     }
 
-    fn descend(
-        &mut self,
-        kernel: Kernel,
-        tolerance: f64,
-        settings: &Settings,
-        report: &mut Report,
-    ) -> Result<(), GraphError> {
-        let mut cost = finite(self.system.cost(&self.poses, kernel), report.iterations)?;
-        if report.chi_square.is_empty() {
-            report.chi_square.push(cost.chi_square);
-            report.cost.push(cost.robust);
+    /// From a kernel so wide that no edge is an outlier to one of scale `k`, by halves.
+    fn narrow(&mut self, k: f64, settings: &Settings) -> Result<Trace, GraphError> {
+        let halvings = (0.5 * (2.0 * self.system.worst(&self.poses) / (k * k)).log2()).ceil();
+        let mut all = Trace::default();
+        // 2^200 is wider than any cost that is worth a stage; NaN (nothing is off) becomes 0.
+        for stage in (0..=halvings.clamp(0.0, 200.0) as i32).rev() {
+            let kernel = settings.kernel.with_scale(k * 2f64.powi(stage));
+            // On the way it is enough to stay near the minimum.
+            let tolerance = settings.relative_tolerance.max(if stage > 0 { 1e-2 } else { 0.0 });
+            let left = Settings { max_iterations: settings.max_iterations - all.iterations, ..*settings };
+            all.append(self.descend(kernel, tolerance, &left)?);
         }
+        Ok(all)
+    }
+
+    fn descend(&mut self, kernel: Kernel, tolerance: f64, settings: &Settings) -> Result<Trace, GraphError> {
+        let mut trace = Trace::default();
+        let mut cost = finite(self.system.cost(&self.poses, kernel))?;
+        trace.push(cost);
         if self.g.is_empty() {
-            return Ok(());
+            return Ok(trace);
         }
         let (mut damping, mut growth) = (settings.damping, 2.0);
         loop {
             self.system.linearise(&self.poses, kernel, &mut self.h, &mut self.g);
             let accepted = loop {
-                if report.iterations >= settings.max_iterations {
-                    report.stop = Stop::IterationLimit;
-                    return Ok(());
+                if trace.iterations >= settings.max_iterations {
+                    return Ok(trace.ended(Stop::IterationLimit));
                 }
-                report.iterations += 1;
+                trace.iterations += 1;
                 let Some((poses, predicted)) = self.step(damping) else {
                     if damping >= LARGEST_DAMPING {
-                        return Err(GraphError::Singular { iteration: report.iterations - 1 });
+                        return Err(GraphError::Singular { iteration: trace.iterations - 1 });
                     }
                     damping = (10.0 * damping).max(1e-9);
                     continue;
@@ -213,15 +185,12 @@ impl<const D: usize, const B: usize> Descent<D, B> {
                 growth *= 2.0;
             };
             let Some(new) = accepted else {
-                report.stop = Stop::Stalled;
-                return Ok(());
+                return Ok(trace.ended(Stop::Stalled));
             };
             let lowered = cost.robust - new.robust;
-            report.chi_square.push(new.chi_square);
-            report.cost.push(new.robust);
+            trace.push(new);
             if lowered <= tolerance * cost.robust {
-                report.stop = Stop::Converged;
-                return Ok(());
+                return Ok(trace.ended(Stop::Converged));
             }
             cost = new;
         }
@@ -257,10 +226,7 @@ fn rigid<const D: usize>(pose: Pose<D>) -> Option<Pose<D>> {
     Pose::from_matrix(pose.rotation, pose.translation).ok().map(|(pose, _)| pose)
 }
 
-fn finite(cost: Cost, iteration: usize) -> Result<Cost, GraphError> {
-    if cost.chi_square.is_finite() && cost.robust.is_finite() {
-        Ok(cost)
-    } else {
-        Err(GraphError::NotFinite { iteration })
-    }
+fn finite(cost: Cost) -> Result<Cost, GraphError> {
+    let finite = cost.chi_square.is_finite() && cost.robust.is_finite();
+    finite.then_some(cost).ok_or(GraphError::NotFinite)
 }

@@ -314,5 +314,38 @@ mod tests {
                 let _ = graph.optimise(&crate::Settings::default());
             }
         }
+
+        /// Good files with a few bytes changed: most of them fail late, some not at all.
+        #[test]
+        fn damaged_files_never_panic(
+            space in any::<bool>(),
+            damage in proptest::collection::vec((any::<proptest::sample::Index>(), 0usize..14), 0..6),
+        ) {
+            let identity = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 4 0 0 4 0 4";
+            let text = if space {
+                format!("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0.6 0.8\nFIX 1\n\
+                         EDGE_SE3:QUAT 0 1 1 2 3 0.5 0.5 0.5 0.5 {identity}\n\
+                         EDGE_SE3:QUAT 1 0 1 1 1 0.1 0.2 0.3 0.9 {identity}\n")
+            } else {
+                format!("{PLANE}\nEDGE_SE2 9 4 1 1 -3 1 0.1 0 2 0 3\nEDGE_SE2 4 5 0 0 1 1 0 0 1 0 1\n")
+            };
+            let mut bytes = text.into_bytes();
+            for (at, with) in damage {
+                let at = at.index(bytes.len());
+                bytes[at] = b"0123456789-e. "[with];
+            }
+            let settings = crate::Settings { kernel: crate::Kernel::Dcs(1.0), ..crate::Settings::default() };
+            match read_g2o(&bytes[..], "damaged") {
+                Ok(G2oFile { graph: AnyGraph::Plane(mut graph), .. }) => {
+                    let _ = graph.start_from_chordal();
+                    let _ = graph.optimise(&settings);
+                }
+                Ok(G2oFile { graph: AnyGraph::Space(mut graph), .. }) => {
+                    let _ = graph.start_from_chordal();
+                    let _ = graph.optimise(&settings);
+                }
+                Err(_) => {}
+            }
+        }
     }
 }

@@ -15,8 +15,8 @@ impl<const D: usize> PoseGraph<D> {
     /// [`Chain::Odometry`](crate::Chain::Odometry). Two sparse factorisations.
     ///
     /// # Errors
-    /// [`GraphError::Singular`] where information spans too many orders of magnitude. The graph is then left
-    /// as it was.
+    /// [`GraphError::Singular`] where information spans too many orders of magnitude, [`GraphError::NotFinite`]
+    /// where measurements are too large. The graph is then left as it was.
     pub fn start_from_chordal(&mut self) -> Result<(), GraphError> {
         let held = anchors(self).held;
         let numbering = Numbering::new(self, &held);
@@ -24,9 +24,11 @@ impl<const D: usize> PoseGraph<D> {
         self.chordal_rotations(&numbering, &mut poses)?;
         self.linear_positions(&numbering, &mut poses)?;
         for &vertex in &numbering.free {
-            let (pose, _) = Pose::from_matrix(poses[vertex].rotation, poses[vertex].translation)
-                .map_err(|_| GraphError::NotFinite { iteration: 0 })?;
-            self.vertices[vertex].world_from_vertex = pose;
+            (poses[vertex], _) = Pose::from_matrix(poses[vertex].rotation, poses[vertex].translation)
+                .map_err(|_| GraphError::NotFinite)?;
+        }
+        for (vertex, pose) in self.vertices.iter_mut().zip(poses) {
+            vertex.world_from_vertex = pose;
         }
         Ok(())
     }
