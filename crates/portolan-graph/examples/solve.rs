@@ -1,9 +1,8 @@
 //! Optimises a g2o file from every start there is: `cargo run --release -p portolan-graph --example solve -- FILE`.
-#![allow(clippy::print_stdout, reason = "a command line program")]
 
 use std::error::Error;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Write};
 use std::time::Instant;
 
 use portolan_graph::{AnyGraph, Chain, PoseGraph, Settings, read_g2o};
@@ -13,7 +12,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for path in std::env::args().skip(1) {
         let clock = Instant::now();
         let file = read_g2o(BufReader::new(File::open(&path)?), &path)?;
-        println!("{path}: read in {:.1} ms", 1e3 * clock.elapsed().as_secs_f64());
+        writeln!(std::io::stdout(), "{path}: read in {:.1} ms", 1e3 * clock.elapsed().as_secs_f64())?;
         for tolerance in [Settings::default().relative_tolerance, 1e-12] {
             let settings = settings(tolerance);
             match &file.graph {
@@ -37,7 +36,8 @@ fn solve<const D: usize>(graph: &PoseGraph<D>, settings: &Settings) -> Result<()
         }
         let started = clock.elapsed().as_secs_f64();
         let report = graph.optimise(settings)?;
-        println!(
+        writeln!(
+            std::io::stdout(),
             "  {start:9} {:14.6} -> {:14.9}  {:3} iterations, {:?}, start {:.1} ms, all {:.1} ms, {} factor blocks",
             report.chi_square[0],
             graph.chi_square(),
@@ -46,7 +46,7 @@ fn solve<const D: usize>(graph: &PoseGraph<D>, settings: &Settings) -> Result<()
             1e3 * started,
             1e3 * clock.elapsed().as_secs_f64(),
             report.factor_blocks,
-        );
+        )?;
     }
     Ok(())
 }

@@ -133,11 +133,11 @@ impl<const D: usize, const B: usize> Descent<D, B> {
 
     /// From a kernel so wide that no edge is an outlier to one of scale `k`, by halves.
     fn narrow(&mut self, k: f64, settings: &Settings) -> Result<Trace, GraphError> {
-        let halvings = (0.5 * (2.0 * self.system.worst(&self.poses) / (k * k)).log2()).ceil();
+        let halvings = (0.5 * libm::log2(2.0 * self.system.worst(&self.poses) / (k * k))).ceil();
         let mut all = Trace::default();
         // 2^200 is wider than any cost that is worth a stage; NaN (nothing is off) becomes 0.
         for stage in (0..=halvings.clamp(0.0, 200.0) as i32).rev() {
-            let kernel = settings.kernel.with_scale(k * 2f64.powi(stage));
+            let kernel = settings.kernel.with_scale(libm::scalbn(k, stage));
             // On the way it is enough to stay near the minimum.
             let tolerance = settings.relative_tolerance.max(if stage > 0 { 1e-2 } else { 0.0 });
             let left = Settings { max_iterations: settings.max_iterations - all.iterations, ..*settings };
@@ -173,7 +173,8 @@ impl<const D: usize, const B: usize> Descent<D, B> {
                 // A cost that is not finite compares false: the step is taken back.
                 if new.robust <= cost.robust && gain.is_finite() {
                     self.poses = poses;
-                    damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0);
+                    let fit = 2.0 * gain - 1.0;
+                    damping *= (1.0 - fit * fit * fit).max(1.0 / 3.0);
                     growth = 2.0;
                     break Some(new);
                 }

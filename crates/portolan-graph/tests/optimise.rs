@@ -1,5 +1,7 @@
 //! What the optimiser promises apart from a good minimum.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+
 mod common;
 
 use common::{laps, pose, position_error};
@@ -85,6 +87,24 @@ fn overflow_and_absurd_scales_are_errors_or_finite() {
         let _ = graph.optimise(&Settings::default());
         assert!(graph.vertices().iter().all(|v| v.world_from_vertex.is_rigid()));
     }
+}
+
+#[test]
+fn a_singular_system_is_an_error() {
+    let mut graph = PoseGraph::<2>::new();
+    for id in 0..3 {
+        graph.add_vertex(id, Pose::<2>::new(id as f64, 0.3, 0.1)).unwrap();
+    }
+    // The weak edge is lost in the rounding of the strong one.
+    graph.add_edge(edge(0, 1, Pose::IDENTITY, 1e100)).unwrap();
+    graph.add_edge(edge(1, 2, Pose::IDENTITY, 1e-100)).unwrap();
+    let before = graph.clone();
+    assert_eq!(graph.start_from_chordal(), Err(GraphError::Singular { iteration: 0 }));
+    assert_eq!(graph.vertices(), before.vertices());
+    // Damping makes it solvable: the strong edge holds.
+    graph.optimise(&Settings::default()).unwrap();
+    let (one, two) = (graph.pose(1).unwrap(), graph.pose(2).unwrap());
+    assert!(one.translation_to(two) < 1e-12);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! The community's benchmark graphs reach the best value that is known for them (README.md says how it was
 //! established), from every start, and survive the way through a file.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+
 mod common;
 
 use std::io::Write;

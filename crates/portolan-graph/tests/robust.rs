@@ -1,5 +1,7 @@
 //! One closure in ten is false: with a kernel the truth comes out, without it does not.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+
 mod common;
 
 use common::{laps, position_error};
