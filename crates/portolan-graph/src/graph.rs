@@ -72,7 +72,7 @@ pub struct Edge<const D: usize> {
 /// assert!((graph.pose(2).unwrap().translation[1] - 1.0).abs() < 1e-6);
 /// # Ok::<(), portolan_graph::GraphError>(())
 /// ```
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct PoseGraph<const D: usize> {
     pub(crate) vertices: Vec<Vertex<D>>,
     pub(crate) edges: Vec<Edge<D>>,
@@ -172,6 +172,12 @@ impl<const D: usize> PoseGraph<D> {
 
     pub(crate) fn index_of(&self, id: u64) -> Result<usize, GraphError> {
         self.index.get(&id).copied().ok_or(GraphError::UnknownVertex { id })
+    }
+}
+
+impl<const D: usize> Default for PoseGraph<D> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
