@@ -6,4 +6,5 @@
 //! no clock.
 
 pub mod geom;
+pub mod radiance;
 pub mod scan;

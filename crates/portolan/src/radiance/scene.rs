@@ -1,0 +1,125 @@
+//! The toy: a corridor seen along a line, ten rays, and starts to be lucky or unlucky with.
+
+use super::line::{Line, LineRay};
+use super::model::{Measurement, Noise};
+use super::rng::Rng;
+
+/// An opaque body on the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Body {
+    /// Its lower end, m.
+    pub low: f64,
+    /// Its upper end, m.
+    pub high: f64,
+    /// Reflectance of its lower face.
+    pub low_face: f64,
+    /// Reflectance of its upper face.
+    pub high_face: f64,
+}
+
+/// A line with bodies on it, as it really is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Length of the line from 0, m.
+    pub length: f64,
+    /// Number of bins in which it is to be estimated.
+    pub bins: usize,
+    /// The bodies, in order.
+    pub bodies: Vec<Body>,
+    /// Rays to learn from.
+    pub training: Vec<LineRay>,
+    /// Rays that are held out.
+    pub held_out: Vec<LineRay>,
+}
+
+impl Scene {
+    /// The scene of the chapter's toy: 80 bins over 8 m, a wall at either end, a pillar between, seven rays to learn
+    /// from and three held out, from ten origins, looking either way.
+    pub fn corridor() -> Self {
+        let ray = |origin, ascending| LineRay { origin, ascending };
+        Self {
+            length: 8.0,
+            bins: 80,
+            bodies: vec![
+                Body { low: 0.0, high: 0.4, low_face: 0.2, high_face: 0.2 },
+                Body { low: 4.6, high: 5.0, low_face: 0.9, high_face: 0.6 },
+                Body { low: 7.6, high: 8.0, low_face: 0.6, high_face: 0.6 },
+            ],
+            training: vec![
+                ray(0.75, true),
+                ray(1.35, true),
+                ray(1.95, true),
+                ray(2.55, false),
+                ray(3.65, false),
+                ray(5.35, true),
+                ray(7.05, false),
+            ],
+            held_out: vec![ray(3.95, true), ray(1.05, false), ray(6.55, true)],
+        }
+    }
+
+    /// The distance to the first face on a ray, and its reflectance; `None` when the ray leaves the line.
+    pub fn first_face(&self, ray: &LineRay) -> Option<(f64, f64)> {
+        let mut faces: Vec<(f64, f64)> = Vec::new();
+        for body in &self.bodies {
+            if ray.ascending && body.low >= ray.origin {
+                faces.push((body.low - ray.origin, body.low_face));
+            } else if !ray.ascending && body.high <= ray.origin {
+                faces.push((ray.origin - body.high, body.high_face));
+            }
+        }
+        faces.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// What a sensor measures along the rays, with Gaussian noise drawn from `seed`. Rays that meet no body are left out.
+    pub fn measure(&self, rays: &[LineRay], noise: &Noise, seed: u64) -> Vec<Measurement> {
+        let mut rng = Rng::new(seed, 1);
+        let hit = |ray: &LineRay| self.first_face(ray).map(|face| (*ray, face));
+        rays.iter()
+            .filter_map(hit)
+            .map(|(ray, (depth, reflectance))| Measurement {
+                ray,
+                depth: depth + noise.depth * rng.normal(),
+                reflectance: reflectance + noise.reflectance * rng.normal(),
+                second_moment: depth * depth + noise.second_moment * rng.normal(),
+            })
+            .collect()
+    }
+
+    /// The field that an opaque scene has: `σδ` = 10 in every bin whose centre lies in a body.
+    pub fn truth(&self) -> Line {
+        let mut line = self.uniform(0.0);
+        for bin in 0..line.bins() {
+            let x = line.centre(bin);
+            if let Some(body) = self.bodies.iter().find(|b| b.low <= x && x < b.high) {
+                line.density[bin] = 10.0 / line.resolution;
+                let nearer_low = x - body.low < body.high - x;
+                line.reflectance[bin] = if nearer_low { body.low_face } else { body.high_face };
+            }
+        }
+        line
+    }
+
+    /// A field of one density everywhere, of half reflectance.
+    pub fn uniform(&self, density: f64) -> Line {
+        Line::uniform(0.0, self.length / self.bins as f64, self.bins, density, 0.5)
+    }
+
+    /// A start drawn from `seed`: thin fog and three clumps anywhere, from translucent to solid.
+    pub fn random_start(&self, seed: u64) -> Line {
+        let mut rng = Rng::new(seed, 2);
+        let fog = rng.between(0.05, 0.4);
+        let mut line = self.uniform(fog);
+        for _ in 0..3 {
+            let centre = rng.between(0.0, self.length);
+            let width = rng.between(0.1, 0.3);
+            // Optical depth of a bin at the peak: 0.1 to 10.
+            let peak = 10_f64.powf(rng.between(-1.0, 1.0)) / line.resolution;
+            for bin in 0..line.bins() {
+                let u = (line.centre(bin) - centre) / width;
+                line.density[bin] += peak * libm::exp(-0.5 * u * u);
+            }
+        }
+        line
+    }
+}
