@@ -4,127 +4,9 @@
 //! posterior uncertainty has a closed form here, so none is offered.
 
 use super::line::{COLORS, Crossing, Far, Line};
-use super::model::{Channels, Measurement, Noise, Prior, logistic, softplus, softplus_inverse};
-use super::ray::{Passage, Rendered, Sample, SampleGradient, Upstream, backward, render};
-
-/// How a step is made from a gradient.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Optimizer {
-    /// `θ ← θ − rate ∇J`.
-    GradientDescent {
-        /// Step per unit of gradient.
-        rate: f64,
-    },
-    /// Steps normalised by running moments of the gradient *(Kingma & Ba 2015, algorithm 1)*.
-    Adam {
-        /// Largest step of a parameter.
-        rate: f64,
-        /// Decay of the first moment.
-        beta1: f64,
-        /// Decay of the second moment.
-        beta2: f64,
-        /// Added to the root of the second moment.
-        epsilon: f64,
-    },
-}
-
-impl Optimizer {
-    /// Adam with the decay rates and the epsilon of the paper.
-    pub fn adam(rate: f64) -> Self {
-        Self::Adam { rate, beta1: 0.9, beta2: 0.999, epsilon: 1e-8 }
-    }
-}
-
-/// Settings of a fit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// What enters the likelihood.
-    pub channels: Channels,
-    /// How well it was measured.
-    pub noise: Noise,
-    /// What is believed beforehand.
-    pub prior: Prior,
-    /// How steps are made.
-    pub optimizer: Optimizer,
-    /// What lies behind the line.
-    pub far: Far,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            channels: Channels::Depth,
-            noise: Noise::default(),
-            prior: Prior::default(),
-            optimizer: Optimizer::GradientDescent { rate: 2e-4 },
-            far: Far::default(),
-        }
-    }
-}
-
-/// Why a fit cannot start.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FitError {
-    /// A setting has no meaning.
-    #[error("{field} is {value}, but must be {must}")]
-    Setting {
-        /// Name of the setting.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        must: &'static str,
-    },
-    /// The line has bins without density or reflectance, or none.
-    #[error("a line needs at least one bin and as many reflectances as densities, got {densities} and {reflectances}")]
-    Line {
-        /// Number of densities.
-        densities: usize,
-        /// Number of reflectances.
-        reflectances: usize,
-    },
-    /// A measurement is not finite.
-    #[error("measurement {index} is not finite")]
-    Measurement {
-        /// Its place in the list.
-        index: usize,
-    },
-}
-
-impl Settings {
-    /// Checks every number once.
-    ///
-    /// # Errors
-    /// The first setting that has no meaning.
-    pub fn validate(&self) -> Result<(), FitError> {
-        let rate = match self.optimizer {
-            Optimizer::GradientDescent { rate } | Optimizer::Adam { rate, .. } => rate,
-        };
-        let positive = [
-            ("noise.depth", self.noise.depth),
-            ("noise.reflectance", self.noise.reflectance),
-            ("noise.second_moment", self.noise.second_moment),
-            ("prior.density_spread", self.prior.density_spread),
-            ("prior.reflectance_spread", self.prior.reflectance_spread),
-            ("optimizer.rate", rate),
-            ("far.depth", self.far.depth),
-        ];
-        for (field, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(FitError::Setting { field, value, must: "finite and positive" });
-            }
-        }
-        for (field, value) in
-            [("prior.density_mean", self.prior.density_mean), ("far.reflectance", self.far.reflectance)]
-        {
-            if !value.is_finite() {
-                return Err(FitError::Setting { field, value, must: "finite" });
-            }
-        }
-        Ok(())
-    }
-}
+use super::model::{Channels, Measurement, Noise, logistic, softplus, softplus_inverse};
+use super::ray::{Background, Passage, Rendered, Sample, SampleGradient, Upstream, backward, render};
+use super::settings::{FitError, Optimizer, Settings};
 
 /// Root mean square residuals over a set of rays; 0 for no rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -253,6 +135,16 @@ impl Fit {
         &self.gradient
     }
 
+    /// Objective and residuals of the field as it stands.
+    pub fn report(&mut self) -> Report {
+        self.descend()
+    }
+
+    /// The measurements to learn from, and the bins that their rays cross.
+    pub(super) fn measurements(&self) -> &[(Measurement, Crossing)] {
+        &self.measurements
+    }
+
     /// Residuals of any measurements under the field as it stands: for rays that were held out.
     pub fn residuals(&mut self, measurements: &[Measurement]) -> Residuals {
         let mut sums = Sums::default();
@@ -317,7 +209,8 @@ impl Fit {
             if channels.reflectance() { prior.reflectance_spread.powi(-2) } else { 0.0 };
         for bin in 0..bins {
             let off = theta[bin] - prior.density_mean;
-            by_density[bin] = by_density[bin] * logistic(theta[bin]) / self.line.resolution + density_precision * off;
+            by_density[bin] =
+                by_density[bin] * logistic(theta[bin]) / self.line.resolution + density_precision * off;
             let c = self.line.reflectance[bin];
             by_reflectance[bin] = by_reflectance[bin] * c * (1.0 - c) + reflectance_precision * phi[bin];
             objective += 0.5 * (density_precision * off * off + reflectance_precision * phi[bin] * phi[bin]);
@@ -346,7 +239,7 @@ impl Scratch {
     fn backward(
         &mut self,
         count: usize,
-        background: &super::ray::Background<COLORS>,
+        background: &Background<COLORS>,
         rendered: &Rendered<COLORS>,
         upstream: &Upstream<COLORS>,
     ) -> &[SampleGradient<COLORS>] {
@@ -374,14 +267,18 @@ impl Sums {
 }
 
 /// Rendered minus measured: depth, reflectance, second moment.
-fn differences(rendered: &Rendered<COLORS>, m: &Measurement) -> [f64; 3] {
+pub(super) fn differences(rendered: &Rendered<COLORS>, m: &Measurement) -> [f64; 3] {
     [rendered.depth - m.depth, rendered.color[0] - m.reflectance, rendered.color[1] - m.second_moment]
 }
 
 /// `1 / s²` per channel, 0 for those that are not measured.
-fn precisions(channels: Channels, noise: &Noise) -> [f64; 3] {
+pub(super) fn precisions(channels: Channels, noise: &Noise) -> [f64; 3] {
     let of = |on: bool, s: f64| if on { 1.0 / (s * s) } else { 0.0 };
-    [of(true, noise.depth), of(channels.reflectance(), noise.reflectance), of(channels.spread(), noise.second_moment)]
+    [
+        of(true, noise.depth),
+        of(channels.reflectance(), noise.reflectance),
+        of(channels.spread(), noise.second_moment),
+    ]
 }
 
 /// The field that the parameters describe.
@@ -392,5 +289,83 @@ fn apply(parameters: &[f64], line: &mut Line) {
     }
     for (reflectance, phi) in line.reflectance.iter_mut().zip(phi) {
         *reflectance = logistic(*phi);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LineRay, Prior, Scene};
+    use super::*;
+
+    fn corridor(seed: u64, channels: Channels) -> Fit {
+        let scene = Scene::corridor();
+        let settings = Settings { channels, ..Settings::default() };
+        let (training, _) = scene.measure(&settings.noise, seed);
+        Fit::new(scene.random_start(seed), &training, settings).unwrap()
+    }
+
+    #[test]
+    fn gradient_is_that_of_the_objective() {
+        for (seed, channels) in
+            [(1, Channels::Depth), (2, Channels::DepthReflectance), (3, Channels::DepthReflectanceSpread)]
+        {
+            let mut fit = corridor(seed, channels);
+            let gradient = fit.gradient().to_vec();
+            let largest = gradient.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+            for (i, g) in gradient.iter().enumerate() {
+                let at = |h: f64| {
+                    let mut moved = fit.clone();
+                    moved.parameters[i] += h;
+                    apply(&moved.parameters, &mut moved.line);
+                    moved.report().objective
+                };
+                let numeric = (at(1e-4) - at(-1e-4)) / 2e-4;
+                assert!((numeric - g).abs() < 1e-6 * largest, "{channels:?} parameter {i}: {numeric} {g}");
+            }
+        }
+    }
+
+    #[test]
+    fn runs_repeat_bit_for_bit() {
+        let run = |optimizer| {
+            let mut fit = corridor(5, Channels::DepthReflectance);
+            fit.settings.optimizer = optimizer;
+            for _ in 0..200 {
+                fit.step();
+            }
+            fit.line
+        };
+        for optimizer in [Optimizer::GradientDescent { rate: 1e-4 }, Optimizer::adam(0.02)] {
+            assert_eq!(run(optimizer), run(optimizer));
+        }
+    }
+
+    #[test]
+    fn adam_lowers_the_objective_and_densities_stay_positive() {
+        let mut fit = corridor(4, Channels::DepthReflectanceSpread);
+        fit.settings.optimizer = Optimizer::adam(0.02);
+        let before = fit.report().objective;
+        for _ in 0..1000 {
+            fit.step();
+        }
+        assert!(fit.report().objective < 0.05 * before);
+        assert!(fit.line().density.iter().all(|d| *d >= 0.0));
+        assert!(fit.line().reflectance.iter().all(|c| (0.0..=1.0).contains(c)));
+    }
+
+    #[test]
+    fn bad_input_is_refused_and_empty_input_is_not() {
+        let line = Line::uniform(0.0, 0.1, 0, 1.0, 0.5);
+        assert!(matches!(Fit::new(line, &[], Settings::default()), Err(FitError::Line { .. })));
+        let line = Line::uniform(0.0, 0.1, 4, 0.0, 0.0);
+        let ray = LineRay { origin: f64::NAN, ascending: true };
+        let m = Measurement { ray, depth: 1.0, reflectance: 0.5, second_moment: 1.0 };
+        let error = Fit::new(line.clone(), &[m], Settings::default()).unwrap_err();
+        assert_eq!(error, FitError::Measurement { index: 0 });
+        let mut fit =
+            Fit::new(line, &[], Settings { prior: Prior::default(), ..Settings::default() }).unwrap();
+        assert!(fit.step().objective.is_finite());
+        assert_eq!(fit.residuals(&[]), Residuals::default());
+        assert!(fit.memory_bytes() > 4 * 8 * 6);
     }
 }

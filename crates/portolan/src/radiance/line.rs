@@ -42,9 +42,9 @@ pub struct Far {
 }
 
 impl Default for Far {
-    /// The chapter's far plane at 10 m; it reflects nothing.
+    /// The chapter's far plane at 10 m, of middle gray.
     fn default() -> Self {
-        Self { depth: 10.0, reflectance: 0.0 }
+        Self { depth: 10.0, reflectance: 0.5 }
     }
 }
 

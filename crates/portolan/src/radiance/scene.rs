@@ -41,20 +41,20 @@ impl Scene {
             length: 8.0,
             bins: 80,
             bodies: vec![
-                Body { low: 0.0, high: 0.4, low_face: 0.2, high_face: 0.2 },
-                Body { low: 4.6, high: 5.0, low_face: 0.9, high_face: 0.6 },
-                Body { low: 7.6, high: 8.0, low_face: 0.6, high_face: 0.6 },
+                Body { low: 0.0, high: 0.4, low_face: 0.05, high_face: 0.05 },
+                Body { low: 4.6, high: 5.0, low_face: 0.95, high_face: 0.5 },
+                Body { low: 7.6, high: 8.0, low_face: 0.5, high_face: 0.5 },
             ],
             training: vec![
-                ray(0.75, true),
-                ray(1.35, true),
-                ray(1.95, true),
-                ray(2.55, false),
-                ray(3.65, false),
-                ray(5.35, true),
-                ray(7.05, false),
+                ray(0.55, true),
+                ray(1.05, true),
+                ray(3.95, false),
+                ray(4.45, false),
+                ray(5.15, true),
+                ray(5.65, true),
+                ray(7.45, false),
             ],
-            held_out: vec![ray(3.95, true), ray(1.05, false), ray(6.55, true)],
+            held_out: vec![ray(2.85, true), ray(2.15, false), ray(6.65, true)],
         }
     }
 
@@ -71,19 +71,30 @@ impl Scene {
         faces.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// What a sensor measures along the rays, with Gaussian noise drawn from `seed`. Rays that meet no body are left out.
-    pub fn measure(&self, rays: &[LineRay], noise: &Noise, seed: u64) -> Vec<Measurement> {
+    /// What a sensor measures along the training and the held-out rays, with Gaussian noise drawn from `seed`. Rays that
+    /// meet no body are left out.
+    pub fn measure(&self, noise: &Noise, seed: u64) -> (Vec<Measurement>, Vec<Measurement>) {
         let mut rng = Rng::new(seed, 1);
-        let hit = |ray: &LineRay| self.first_face(ray).map(|face| (*ray, face));
-        rays.iter()
-            .filter_map(hit)
-            .map(|(ray, (depth, reflectance))| Measurement {
+        let mut measure = |rays: &[LineRay]| -> Vec<Measurement> {
+            let hit = |ray: &LineRay| self.first_face(ray).map(|face| (*ray, face));
+            let noisy = |(ray, (depth, reflectance)): (LineRay, (f64, f64))| Measurement {
                 ray,
                 depth: depth + noise.depth * rng.normal(),
                 reflectance: reflectance + noise.reflectance * rng.normal(),
                 second_moment: depth * depth + noise.second_moment * rng.normal(),
-            })
-            .collect()
+            };
+            rays.iter().filter_map(hit).map(noisy).collect()
+        };
+        (measure(&self.training), measure(&self.held_out))
+    }
+
+    /// The bins with all surfaces of the scene more than `margin` metres away from their centre, outside of bodies.
+    pub fn empty_bins(&self, margin: f64) -> impl Iterator<Item = usize> + '_ {
+        let line = self.uniform(0.0);
+        (0..self.bins).filter(move |bin| {
+            let x = line.centre(*bin);
+            self.bodies.iter().all(|b| x < b.low - margin || x > b.high + margin)
+        })
     }
 
     /// The field that an opaque scene has: `σδ` = 10 in every bin whose centre lies in a body.
