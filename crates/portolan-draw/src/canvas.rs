@@ -242,8 +242,11 @@ impl Canvas {
         }
     }
 
-    /// The outline of a rectangle of pixels.
+    /// The outline of a rectangle, moved to the nearest middles of pixels, where thin lines are crisp.
     pub fn stroke_rect(&mut self, rect: PixelRect, pen: Pen) {
+        let snap = |v: f64| v.round() + 0.5;
+        let (x, y) = (snap(rect.x - 0.5), snap(rect.y - 0.5));
+        let rect = PixelRect::new(x, y, snap(rect.right() - 0.5) - x, snap(rect.bottom() - 0.5) - y);
         let mut path = PathBuilder::new();
         path.move_to(rect.x as f32, rect.y as f32);
         path.line_to(rect.right() as f32, rect.y as f32);

@@ -12,7 +12,7 @@ use portolan::radiance::{
 const MARGIN: f64 = 0.3;
 
 fn run(seed: NamedSeed, channels: Channels) -> Outcome {
-    Experiment::default().run(seed.seed, channels).unwrap()
+    Experiment::default().run(seed.seed, channels).expect("the default settings are valid")
 }
 
 fn optical_depth(line: &Line, bin: usize) -> f64 {
@@ -113,10 +113,19 @@ fn chapter19_exercise7_the_term_that_reflectance_repairs() {
 fn chapter19_exercise7_two_channels_are_not_always_enough() {
     let two = run(TWO_NOT_ENOUGH, Channels::DepthReflectance);
     let noise = two.fit.settings().noise;
-    // Both channels are at their noise (0.012 m, 0.032), held-out depth is not (0.913 m): in the right-hand room all surfaces and the
-    // far plane are painted alike, so the contrast of the reflectance is nil whatever the density.
+    // Both channels are at their noise (0.012 m, 0.032), held-out depth is not (0.913 m): where surfaces are gray, a dark clump in
+    // front of a bright wall has the right mean distance and the right mean colour at once.
     assert!(at_noise_floor(&two) && two.last().training.reflectance < 1.25 * noise.reflectance);
     assert!(two.last().held_out.depth > 0.5, "{:?}", two.last());
+    let bin = two.worst_bin(&Experiment::default().scene, MARGIN).unwrap();
+    assert!(optical_depth(two.fit.line(), bin) > 0.3);
+    let in_the_room = two.fit.explain(bin).into_iter().filter(|t| t.passes > 0.5);
+    let seen = in_the_room.fold([0.0_f64; 3], |worst, t| {
+        let residuals = [t.depth.residual, t.reflectance.residual, t.second_moment.residual];
+        [0, 1, 2].map(|c| worst[c].max(residuals[c].abs()))
+    });
+    // 0.7, 0.9 and 32 standard deviations: the third would see it.
+    assert!(seen[0] < 2.0 && seen[1] < 2.0 && seen[2] > 20.0, "{seen:?}");
     // What a third has to measure is how far the return is spread along the ray (0.077 m).
     let three = run(TWO_NOT_ENOUGH, Channels::DepthReflectanceSpread);
     assert!(at_noise_floor(&three) && three.last().held_out.depth < 0.15, "{:?}", three.last());

@@ -36,18 +36,20 @@ pub const PARKED: NamedSeed = NamedSeed {
     shows: "depth alone keeps density of the start parked in empty space; with reflectance it clears",
 };
 
-/// Two channels fit all they are shown and leave density parked between surfaces of one reflectance.
+/// Two channels fit all they are shown and leave density parked between gray surfaces: a dark clump in front of a bright wall has
+/// both the mean distance and the mean colour that were measured.
 pub const TWO_NOT_ENOUGH: NamedSeed = NamedSeed {
     name: "two-not-enough",
     seed: 175,
-    shows: "where all is painted alike two channels do not clear it; the spread of the return does",
+    shows: "between gray walls two channels do not clear it; the spread of the return does",
 };
 
-/// An opaque clump in empty space: nothing passes, so no channel of these rays can tell.
+/// An opaque clump in empty space: next to nothing passes, so no channel of these rays can tell. Gradient descent leaves it
+/// there; Adam, which scales small gradients up, does not.
 pub const OPAQUE: NamedSeed = NamedSeed {
     name: "opaque",
     seed: 2,
-    shows: "an invented opaque bin: its gradient is zero in every channel, and it stays",
+    shows: "an invented opaque bin has next to no gradient in any channel, and stays",
 };
 
 /// All named seeds.

@@ -3,7 +3,7 @@
 //! `J = Σ ½ ((ẑ − z) / s_z)² + ½ ((ĉ − c) / s_c)² + prior`: the negative logarithm of likelihood times prior. The optimum is a point; no
 //! posterior uncertainty has a closed form here, so none is offered.
 
-use super::line::{COLORS, Crossing, Far, Line};
+use super::line::{COLORS, Crossing, Far, Line, LineRay};
 use super::model::{Channels, Measurement, Noise, logistic, softplus, softplus_inverse};
 use super::ray::{Background, Passage, Rendered, Sample, SampleGradient, Upstream, backward, render};
 use super::settings::{FitError, Optimizer, Settings};
@@ -145,12 +145,18 @@ impl Fit {
         &self.measurements
     }
 
+    /// What the field as it stands renders along any ray.
+    pub fn render(&self, ray: &LineRay) -> Rendered<COLORS> {
+        let crossing = self.line.crossing(ray);
+        Scratch::new(crossing.count).render(&self.line, ray, &crossing, &self.settings.far)
+    }
+
     /// Residuals of any measurements under the field as it stands: for rays that were held out.
     pub fn residuals(&mut self, measurements: &[Measurement]) -> Residuals {
         let mut sums = Sums::default();
         for m in measurements {
             let crossing = self.line.crossing(&m.ray);
-            let rendered = self.scratch.render(&self.line, m, &crossing, &self.settings.far);
+            let rendered = self.scratch.render(&self.line, &m.ray, &crossing, &self.settings.far);
             sums.add(&differences(&rendered, m));
         }
         sums.residuals(measurements.len())
@@ -190,7 +196,7 @@ impl Fit {
         let mut sums = Sums::default();
         let mut objective = 0.0;
         for (m, crossing) in &self.measurements {
-            let rendered = self.scratch.render(&self.line, m, crossing, &far);
+            let rendered = self.scratch.render(&self.line, &m.ray, crossing, &far);
             let d = differences(&rendered, m);
             sums.add(&d);
             objective += 0.5 * (0..3).map(|c| precision[c] * d[c] * d[c]).sum::<f64>();
@@ -229,8 +235,8 @@ impl Scratch {
         }
     }
 
-    fn render(&mut self, line: &Line, m: &Measurement, crossing: &Crossing, far: &Far) -> Rendered<COLORS> {
-        line.sample(&m.ray, crossing, &mut self.samples);
+    fn render(&mut self, line: &Line, ray: &LineRay, crossing: &Crossing, far: &Far) -> Rendered<COLORS> {
+        line.sample(ray, crossing, &mut self.samples);
         let count = crossing.count;
         render(&self.samples[..count], &far.background(), &mut self.passages[..count])
     }
@@ -294,7 +300,7 @@ fn apply(parameters: &[f64], line: &mut Line) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{LineRay, Prior, Scene};
+    use super::super::{Prior, Scene};
     use super::*;
 
     fn corridor(seed: u64, channels: Channels) -> Fit {

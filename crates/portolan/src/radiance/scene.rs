@@ -35,6 +35,9 @@ pub struct Scene {
 impl Scene {
     /// The scene of the chapter's toy: 80 bins over 8 m, a wall at either end, a pillar between, seven rays to learn
     /// from and three held out, from ten origins, looking either way.
+    ///
+    /// The room on the left has a dark wall and a bright one, near the ends of what can be reflected: no mixture of other colours
+    /// makes them. The walls of the room on the right, and the far plane, are gray, and gray can be mixed.
     pub fn corridor() -> Self {
         let ray = |origin, ascending| LineRay { origin, ascending };
         Self {
