@@ -85,11 +85,11 @@ impl Canvas {
         data[..3].copy_from_slice(&[mixed.r, mixed.g, mixed.b]);
     }
 
-    /// A raster of `shape[0] × shape[1]` cells of `resolution` metres whose cell (0, 0) has its lower left corner at
-    /// `origin`; `color` is asked for the cells by index and its answer laid over the picture.
+    /// A raster of `shape[0] × shape[1]` cells of `resolution` metres whose cell (0, 0) has its lower left
+    /// corner at `origin`; `color` is asked for the cells by index and its answer laid over the picture.
     ///
-    /// Every pixel looks up the cell under it, so any scale works: enlarged cells are crisp squares, and where cells are smaller than
-    /// pixels up to 4 × 4 of them are averaged. O(pixels of the view).
+    /// Every pixel looks up the cell under it, so any scale works: enlarged cells are crisp squares, and
+    /// where cells are smaller than pixels up to 4 × 4 of them are averaged. O(pixels of the view).
     pub fn raster(
         &mut self,
         view: &View,

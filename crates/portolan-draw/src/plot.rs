@@ -6,8 +6,8 @@ use crate::{Anchor, Canvas, Entry, Font, Pen, PixelRect, Swatch, View, color};
 use crate::{linear_ticks, log_ticks, tick_label};
 
 impl Chart {
-    /// Draws the chart into a rectangle of the canvas and returns the view of its plot area, in the units of the
-    /// axes (on a logarithmic axis: in decades).
+    /// Draws the chart into a rectangle of the canvas and returns the view of its plot area, in the units
+    /// of the axes (on a logarithmic axis: in decades).
     pub fn draw(&self, canvas: &mut Canvas, rect: PixelRect) -> View {
         let (title, small) = (Font::new(20).bold(), Font::new(16));
         let mut top = rect.y;
@@ -99,7 +99,8 @@ impl Chart {
         series.chain(marks).filter(|entry| !entry.label.is_empty()).collect()
     }
 
-    /// Limits of an axis in its own units (decades on a log axis): as set, or those of the data with some air.
+    /// Limits of an axis in its own units (decades on a log axis): as set, or those of the data with some
+    /// air.
     fn limits(&self, which: usize) -> [f64; 2] {
         let axis = [&self.x, &self.y][which];
         let set = axis.range.map(|[low, high]| [axis.place(low), axis.place(high)]);

@@ -1,5 +1,5 @@
-//! One step of gradient descent over ten rays x 80 bins: render, differentiate, move. The allocation columns must
-//! stay at zero.
+//! One step of gradient descent over ten rays x 80 bins: render, differentiate, move. The allocation
+//! columns must stay at zero.
 
 use divan::{AllocProfiler, Bencher};
 use portolan::radiance::{Channels, Fit, Line, LineRay, Measurement, Optimizer, Settings};

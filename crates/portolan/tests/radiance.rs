@@ -60,6 +60,9 @@ fn chapter19_training_reaches_the_noise_and_held_out_rays_do_not() {
     // 0.024 m against 1.230 m.
     assert!(at_noise_floor(&outcome) && first.training.depth > 0.5, "{first:?}");
     assert!(last.held_out.depth > 30.0 * last.training.depth, "{last:?}");
+    // With the reflectance the same start and the same noise leave no such freedom: 0.066 m.
+    let two = run(AMBIGUOUS, Channels::DepthReflectance);
+    assert!(at_noise_floor(&two) && two.last().held_out.depth < 0.1, "{:?}", two.last());
 }
 
 #[test]
@@ -92,7 +95,8 @@ fn chapter19_exercise7_the_term_that_reflectance_repairs() {
     let experiment = Experiment::default();
     let stuck = run(PARKED, Channels::Depth);
     let bin = stuck.worst_bin(&experiment.scene, MARGIN).unwrap();
-    // Depth has leverage, metres of it, and light passes; but bin and far plane balance, so no residual uses it.
+    // Depth has leverage, metres of it, and light passes; but bin and far plane balance, so no residual
+    // uses it.
     let terms = stuck.fit.explain(bin);
     assert_eq!(terms.len(), 5);
     for t in &terms {
@@ -113,8 +117,9 @@ fn chapter19_exercise7_the_term_that_reflectance_repairs() {
 fn chapter19_exercise7_two_channels_are_not_always_enough() {
     let two = run(TWO_NOT_ENOUGH, Channels::DepthReflectance);
     let noise = two.fit.settings().noise;
-    // Both channels are at their noise (0.012 m, 0.032), held-out depth is not (0.913 m): where surfaces are gray, a dark clump in
-    // front of a bright wall has the right mean distance and the right mean colour at once.
+    // Both channels are at their noise (0.012 m, 0.032), held-out depth is not (0.913 m): where surfaces
+    // are gray, a dark clump in front of a bright wall has the right mean distance and the right mean
+    // colour at once.
     assert!(at_noise_floor(&two) && two.last().training.reflectance < 1.25 * noise.reflectance);
     assert!(two.last().held_out.depth > 0.5, "{:?}", two.last());
     let bin = two.worst_bin(&Experiment::default().scene, MARGIN).unwrap();

@@ -2,6 +2,7 @@
 
 mod document;
 mod pictures;
+mod text;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,8 +21,9 @@ const BEGUN: usize = 500;
 
 /// The differentiable renderer on a line, as in the last section of the chapter.
 ///
-/// Ten rays in a corridor of 80 bins, three of them held out, are fitted through the renderer by gradient descent. Writes density,
-/// transmittance, rays, residuals and the bias of depth as PNG, and all numbers as radiance.json.
+/// Ten rays in a corridor of 80 bins, three of them held out, are fitted through the renderer by gradient
+/// descent. Writes density, transmittance, rays, residuals and the bias of depth as PNG, and all numbers as
+/// radiance.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = help())]
 pub(crate) struct Args {
@@ -142,7 +144,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             document::summary(&experiment, args.seed, &runs, explanation.as_ref(), &args.out, &names);
         println!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
-        print!("{}", document::text(&experiment, args.seed, &runs, explanation.as_ref()));
+        print!("{}", text::report(&experiment, args.seed, &runs, explanation.as_ref()));
         println!("\nwrote {} to {}", names.join(", "), args.out.display());
     }
     Ok(())

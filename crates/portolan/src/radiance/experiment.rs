@@ -18,7 +18,8 @@ pub struct NamedSeed {
     pub shows: &'static str,
 }
 
-/// A lucky start: solid matter only where there are walls. Depth alone is enough, also for rays that were held out.
+/// A lucky start: solid matter only where there are walls. Depth alone is enough, also for rays that were
+/// held out.
 pub const LUCKY: NamedSeed =
     NamedSeed { name: "lucky", seed: 127, shows: "a lucky start: depth alone fits the held-out rays too" };
 
@@ -36,16 +37,16 @@ pub const PARKED: NamedSeed = NamedSeed {
     shows: "depth alone keeps density of the start parked in empty space; with reflectance it clears",
 };
 
-/// Two channels fit all they are shown and leave density parked between gray surfaces: a dark clump in front of a bright wall has
-/// both the mean distance and the mean colour that were measured.
+/// Two channels fit all they are shown and leave density parked between gray surfaces: a dark clump in
+/// front of a bright wall has both the mean distance and the mean colour that were measured.
 pub const TWO_NOT_ENOUGH: NamedSeed = NamedSeed {
     name: "two-not-enough",
     seed: 175,
     shows: "between gray walls two channels do not clear it; the spread of the return does",
 };
 
-/// An opaque clump in empty space: next to nothing passes, so no channel of these rays can tell. Gradient descent leaves it
-/// there; Adam, which scales small gradients up, does not.
+/// An opaque clump in empty space: next to nothing passes, so no channel of these rays can tell. Gradient
+/// descent leaves it there; Adam, which scales small gradients up, does not.
 pub const OPAQUE: NamedSeed = NamedSeed {
     name: "opaque",
     seed: 2,
@@ -95,14 +96,16 @@ pub struct Outcome {
     pub held_out: Vec<Measurement>,
     /// Before every step, and after the last one.
     pub curve: Vec<Progress>,
-    /// Most light that any training ray brought to each bin, at the start, at the end and every hundred steps.
+    /// Most light that any training ray brought to each bin, at the start, at the end and every hundred
+    /// steps.
     pub reach: Vec<f64>,
     /// The fit, with the field that it found.
     pub fit: Fit,
 }
 
 impl Experiment {
-    /// Measures the scene, starts at random, fits. The same seed gives the same noise and the same start for any channels.
+    /// Measures the scene, starts at random, fits. The same seed gives the same noise and the same start
+    /// for any channels.
     ///
     /// # Errors
     /// When the settings make no sense.
@@ -142,8 +145,8 @@ impl Outcome {
         self.curve[self.curve.len() - 1]
     }
 
-    /// Optical depth `Σ σδ` that the fit has in bins from which every surface of the scene is more than `margin` metres away:
-    /// matter where there is none.
+    /// Optical depth `Σ σδ` that the fit has in bins from which every surface of the scene is more than
+    /// `margin` metres away: matter where there is none.
     pub fn misplaced(&self, scene: &Scene, margin: f64) -> f64 {
         let line = self.fit.line();
         scene.empty_bins(margin).map(|bin| line.density[bin] * line.resolution).sum()

@@ -1,14 +1,14 @@
 //! Why a bin moves, or does not: the factors of its gradient, ray by ray.
 //!
-//! The chapter's `∂z/∂σ_k = δ [T_{k+1} t_k − (Σ_{i>k} T_i α_i t_i + T_n t_far)]` holds for every channel with its own
-//! values `v`. Divided by what passes bin `k`, the bracket is a difference of two values:
+//! The chapter's `∂z/∂σ_k = δ [T_{k+1} t_k − (Σ_{i>k} T_i α_i t_i + T_n t_far)]` holds for every channel
+//! with its own values `v`. Divided by what passes bin `k`, the bracket is a difference of two values:
 //!
 //! ```text
 //! ∂v/∂σ_k = δ · T_{k+1} · (v_k − v̄_k),    v̄_k = (Σ_{i>k} T_i α_i v_i + T_n v_far) / T_{k+1}
 //! ```
 //!
-//! `T_{k+1}` is the same for all channels: no channel sees past an opaque bin. The contrast `v_k − v̄_k` and the residual in
-//! front of it are each channel's own: those a second channel can repair.
+//! `T_{k+1}` is the same for all channels: no channel sees past an opaque bin. The contrast `v_k − v̄_k`
+//! and the residual in front of it are each channel's own: those a second channel can repair.
 
 use super::fit::{Fit, differences, precisions};
 use super::model::Measurement;
@@ -43,7 +43,8 @@ pub struct Terms {
 }
 
 impl Fit {
-    /// The factors of `∂J/∂σ` of a bin at the field as it stands, for every ray to learn from that crosses it.
+    /// The factors of `∂J/∂σ` of a bin at the field as it stands, for every ray to learn from that crosses
+    /// it.
     pub fn explain(&self, bin: usize) -> Vec<Terms> {
         let line = self.line();
         let settings = self.settings();

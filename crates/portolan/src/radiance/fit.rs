@@ -1,7 +1,7 @@
 //! Fitting a line to measurements: the maximum of the posterior, by gradient descent through the renderer.
 //!
-//! `J = Σ ½ ((ẑ − z) / s_z)² + ½ ((ĉ − c) / s_c)² + prior`: the negative logarithm of likelihood times prior. The optimum is a point; no
-//! posterior uncertainty has a closed form here, so none is offered.
+//! `J = Σ ½ ((ẑ − z) / s_z)² + ½ ((ĉ − c) / s_c)² + prior`: the negative logarithm of likelihood times
+//! prior. The optimum is a point; no posterior uncertainty has a closed form here, so none is offered.
 
 use super::line::{COLORS, Crossing, Far, Line, LineRay};
 use super::model::{Channels, Measurement, Noise, logistic, softplus, softplus_inverse};
@@ -51,7 +51,8 @@ struct Scratch {
 }
 
 impl Fit {
-    /// A fit that starts at `line`. Densities of zero start a little above it, where the parametrisation can hold them.
+    /// A fit that starts at `line`. Densities of zero start a little above it, where the parametrisation
+    /// can hold them.
     ///
     /// # Errors
     /// When a setting, the line or a measurement makes no sense.
@@ -102,8 +103,8 @@ impl Fit {
         self.steps
     }
 
-    /// One step of the optimiser: render every ray, send its residuals back, move the parameters. O(samples), no
-    /// allocation (`benches/radiance.rs`).
+    /// One step of the optimiser: render every ray, send its residuals back, move the parameters.
+    /// O(samples), no allocation (`benches/radiance.rs`).
     pub fn step(&mut self) -> Report {
         let report = self.descend();
         self.steps += 1;
@@ -210,9 +211,12 @@ impl Fit {
             }
         }
         let (theta, phi) = self.parameters.split_at(bins);
-        let density_precision = prior.density_spread.powi(-2);
-        let reflectance_precision =
-            if channels.reflectance() { prior.reflectance_spread.powi(-2) } else { 0.0 };
+        let density_precision = 1.0 / (prior.density_spread * prior.density_spread);
+        let reflectance_precision = if channels.reflectance() {
+            1.0 / (prior.reflectance_spread * prior.reflectance_spread)
+        } else {
+            0.0
+        };
         for bin in 0..bins {
             let off = theta[bin] - prior.density_mean;
             by_density[bin] =

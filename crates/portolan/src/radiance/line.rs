@@ -1,7 +1,7 @@
 //! A radiance field on a line: bins of density and reflectance, and the rays that cross them.
 //!
-//! A thin layer over [`ray`](super::ray): it cuts a ray into samples and says which bin each came from. A field in the plane or in
-//! space does the same with cells.
+//! A thin layer over [`ray`](super::ray): it cuts a ray into samples and says which bin each came from. A
+//! field in the plane or in space does the same with cells.
 
 use super::ray::{Background, Sample};
 
@@ -95,8 +95,8 @@ impl Line {
         self.origin + (bin as f64 + 0.5) * self.resolution
     }
 
-    /// The bins that a ray crosses. The bin of the origin counts with the part in front of it; a ray that starts
-    /// outside and looks away crosses none.
+    /// The bins that a ray crosses. The bin of the origin counts with the part in front of it; a ray that
+    /// starts outside and looks away crosses none.
     pub fn crossing(&self, ray: &LineRay) -> Crossing {
         let place = (ray.origin - self.origin) / self.resolution;
         let bins = self.bins();

@@ -1,12 +1,14 @@
 //! Rendering as a measurement model: a radiance field on a line, fitted through its renderer.
 //!
-//! Not a map to plan with. A fit by gradient descent gives a point and no posterior uncertainty (there is no closed form of one),
-//! so nothing here offers any; its depth is biased by construction, its optimum depends on the start, and density
-//! behind an opaque bin is never corrected. Where ranges are measured, a [`scan`](crate::scan) fused into a map is the better estimate. This module
-//! shows the mechanism that radiance fields and splats share, where it can be seen whole: on a line.
+//! Not a map to plan with. A fit by gradient descent gives a point and no posterior uncertainty (there is
+//! no closed form of one), so nothing here offers any; its depth is biased by construction, its optimum
+//! depends on the start, and density behind an opaque bin is never corrected. Where ranges are measured, a
+//! [`scan`](crate::scan) fused into a map is the better estimate. This module shows the mechanism that
+//! radiance fields and splats share, where it can be seen whole: on a line.
 //!
-//! A renderer that can be differentiated is a measurement model, and fitting a field to what was measured is estimation
-//! of the maximum of the posterior: `p(θ | z) ∝ Π p(z_r | θ) p(θ)` with Gaussian noise on what a ray renders.
+//! A renderer that can be differentiated is a measurement model, and fitting a field to what was measured
+//! is estimation of the maximum of the posterior: `p(θ | z) ∝ Π p(z_r | θ) p(θ)` with Gaussian noise on
+//! what a ray renders.
 //!
 //! ```text
 //!  Line (θ, φ) --samples--> render --z, c--> residual / s² = Upstream

@@ -58,8 +58,8 @@ pub struct Measurement {
 
 /// Independent Gaussian beliefs about the parameters before any ray was seen.
 ///
-/// Densities are `softplus(θ) / resolution`, so that `softplus(θ)` is the optical depth `σδ` of a bin and no step can
-/// make it negative; reflectances are `logistic(φ)`, between 0 and 1.
+/// Densities are `softplus(θ) / resolution`, so that `softplus(θ)` is the optical depth `σδ` of a bin and
+/// no step can make it negative; reflectances are `logistic(φ)`, between 0 and 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
     /// Mean of `θ`.

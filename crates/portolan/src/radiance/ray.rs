@@ -6,10 +6,11 @@
 //!          T_0 = 1    T_1 = 1-α_0           T_{n-1}     T_n: what gets through
 //! ```
 //!
-//! `α_i = 1 − exp(−σ_i δ_i)`, `T_i = Π_{j<i} (1 − α_j)`, and for anything that a sample has a value `v_i` of (its
-//! distance, its colour) the ray renders `v = Σ T_i α_i v_i + T_n v_far`: the expectation of `v` over where the ray
-//! ends *(Mildenhall et al. 2020, section 4; Max 1995)*. Nothing here knows what a sample was taken from: a field of
-//! any dimension hands in samples in the order of the ray and gets gradients back in the same order.
+//! `α_i = 1 − exp(−σ_i δ_i)`, `T_i = Π_{j<i} (1 − α_j)`, and for anything that a sample has a value `v_i`
+//! of (its distance, its colour) the ray renders `v = Σ T_i α_i v_i + T_n v_far`: the expectation of `v`
+//! over where the ray ends *(Mildenhall et al. 2020, section 4; Max 1995)*. Nothing here knows what a
+//! sample was taken from: a field of any dimension hands in samples in the order of the ray and gets
+//! gradients back in the same order.
 
 /// What a field says about one stretch of a ray, with `C` colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,8 +79,8 @@ impl<const C: usize> SampleGradient<C> {
 
 /// `(1 − e^{−x}, e^{−x})` for `x ≥ 0`, both to full relative precision with one transcendental function.
 ///
-/// For small `x` the difference `1 − e^{−x}` cancels, for large `x` the sum `1 + expm1(−x)` does: each side of
-/// `x = ln 2` computes the one that the other is safely derived from.
+/// For small `x` the difference `1 − e^{−x}` cancels, for large `x` the sum `1 + expm1(−x)` does: each side
+/// of `x = ln 2` computes the one that the other is safely derived from.
 pub fn opacity(x: f64) -> (f64, f64) {
     if x < core::f64::consts::LN_2 {
         let minus = libm::expm1(-x);
@@ -122,14 +123,15 @@ pub fn render<const C: usize>(
 
 /// Gradient of an objective by every sample's density and colours, given that by what the ray rendered.
 ///
-/// With `v_i = ∂J/∂z t_i + ∂J/∂c · c_i`, one pass from the far end carries `B_k = Σ_{i>k} T_i α_i v_i + T_n v_far`:
+/// With `v_i = ∂J/∂z t_i + ∂J/∂c · c_i`, one pass from the far end carries
+/// `B_k = Σ_{i>k} T_i α_i v_i + T_n v_far`:
 ///
 /// ```text
 /// ∂J/∂σ_k = δ_k (T_{k+1} v_k − B_k)         ∂J/∂c_k = T_k α_k ∂J/∂c
 /// ```
 ///
-/// Both carry the transmittance in front of the sample as a factor: what is hidden gets no gradient. `passages` and
-/// `rendered` are those of [`render`] for the same samples. O(samples), no allocation.
+/// Both carry the transmittance in front of the sample as a factor: what is hidden gets no gradient.
+/// `passages` and `rendered` are those of [`render`] for the same samples. O(samples), no allocation.
 ///
 /// # Panics
 /// When the slices differ in length.
