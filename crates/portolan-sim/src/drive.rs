@@ -9,6 +9,9 @@ use portolan::scan::Scan;
 /// The seed of the chapter's log.
 pub const SEED: u64 = 0x00C0_FFEE;
 
+/// Scans with the poses they were taken at.
+pub type Lap = Vec<(Pose<2>, Scan<2>)>;
+
 /// One or more laps of scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LapConfig {
@@ -49,7 +52,7 @@ pub fn lap_poses(scans: usize) -> Vec<Pose<2>> {
 }
 
 /// One lap of scans with their true poses. The world is the Apartment, perhaps with the chair elsewhere.
-pub fn lap(world: &World, config: &LapConfig) -> Vec<(Pose<2>, Scan<2>)> {
+pub fn lap(world: &World, config: &LapConfig) -> Lap {
     let scan = |(i, pose): (usize, Pose<2>)| {
         let index = config.first_index + i as u64;
         (pose, scan_at(world, &pose, &config.lidar, config.seed, index).at_time(index as f64))
