@@ -1,0 +1,13 @@
+//! Bytes in and out: compression, lines of bounded length, numbers, files that appear whole or not at all.
+
+mod atomic;
+mod lines;
+mod number;
+mod open;
+
+pub use atomic::write_atomic;
+pub use open::{Compression, Input, open};
+
+pub(crate) use lines::Lines;
+pub(crate) use number::{fields, parse_f64};
+pub(crate) use open::{open_file, read_failed};

@@ -1,0 +1,362 @@
+//! Reading a container.
+
+use std::collections::HashSet;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::{ContainerWriter, ENTRY, HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, VERSION, tag_of};
+use crate::IoError;
+use crate::bytes::open_file;
+use crate::error::shown;
+
+/// What the index says about a chunk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chunk {
+    /// Kind of content.
+    pub tag: String,
+    /// Which of this kind; may be empty.
+    pub name: String,
+    /// Length when unpacked (bytes).
+    pub length: u64,
+    /// Length in the file (bytes).
+    pub stored_length: u64,
+    position: usize,
+    crc: u32,
+}
+
+/// A container whose index was checked; chunks are checked and unpacked when they are asked for.
+#[derive(Clone, Debug)]
+pub struct Container {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    chunks: Vec<Chunk>,
+}
+
+impl Container {
+    /// Reads a file into memory, packed as it is.
+    ///
+    /// # Errors
+    /// As [`Container::parse`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let path = path.as_ref();
+        let mut bytes = Vec::new();
+        // A file of another kind may be huge: the header is looked at first.
+        let mut file = open_file(path)?;
+        let failed = |e| IoError::os(path, "read it", e);
+        file.by_ref().take(HEADER as u64).read_to_end(&mut bytes).map_err(failed)?;
+        Header::of(&bytes, path)?;
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        Self::parse(bytes, path)
+    }
+
+    /// Reads a container that is in memory, under the name that errors shall give.
+    ///
+    /// # Errors
+    /// [`IoError::Binary`] where header or index are damaged or claim what cannot be.
+    pub fn parse(bytes: Vec<u8>, name: &Path) -> Result<Self, IoError> {
+        let header = Header::of(&bytes, name)?;
+        let index = usize::try_from(header.index).ok().filter(|&at| (HEADER..=bytes.len()).contains(&at));
+        let Some(index) = index else {
+            let advice = format!("the file has {} bytes: it is cut off", bytes.len());
+            return Err(IoError::binary(
+                name,
+                16,
+                "the position of the index",
+                header.index.to_string(),
+                advice,
+            ));
+        };
+        if crc32c::crc32c(&bytes[index..]) != header.index_crc {
+            let advice = "the file is cut off or damaged: copy it again";
+            return Err(IoError::binary(name, index as u64, "the checksum of the index", "wrong", advice));
+        }
+        let chunks = chunks(&bytes, index, header.count, name)?;
+        Ok(Self { path: name.into(), bytes, chunks })
+    }
+
+    /// The chunks in the order of the file.
+    pub fn chunks(&self) -> &[Chunk] {
+        &self.chunks
+    }
+
+    /// The content of the chunk with this tag and name; `None` where there is none.
+    ///
+    /// # Errors
+    /// As [`Container::unpack`].
+    pub fn get(&self, tag: &str, name: &str) -> Result<Option<Vec<u8>>, IoError> {
+        let chunk = self.chunks.iter().find(|c| c.tag == tag && c.name == name);
+        chunk.map(|c| self.unpack(c)).transpose()
+    }
+
+    /// The chunks with this tag, in the order of the file.
+    pub fn tagged<'a>(&'a self, tag: &'a str) -> impl Iterator<Item = &'a Chunk> + 'a {
+        self.chunks.iter().filter(move |c| c.tag == tag)
+    }
+
+    /// The content of one of [`Container::chunks`]. Memory grows as it is unpacked, and no further than the
+    /// index announces.
+    ///
+    /// # Errors
+    /// [`IoError::Binary`] where the chunk is damaged or not as long as announced.
+    pub fn unpack(&self, chunk: &Chunk) -> Result<Vec<u8>, IoError> {
+        let bad = |value: String, advice: &str| {
+            let field = format!("chunk {} {}", chunk.tag, shown(chunk.name.as_bytes()));
+            Err(IoError::binary(&self.path, chunk.position as u64, field, value, advice))
+        };
+        let stored = self.stored(chunk);
+        if crc32c::crc32c(stored) != chunk.crc {
+            return bad("damaged (its checksum is wrong)".into(), "copy the file again");
+        }
+        let mut content = Vec::new();
+        let unpacked = zstd::stream::read::Decoder::with_buffer(stored)
+            .and_then(|d| d.take(chunk.length + 1).read_to_end(&mut content));
+        match unpacked {
+            Err(e) => bad(format!("damaged ({e})"), "write the file again"),
+            Ok(_) if content.len() as u64 != chunk.length => {
+                let advice = format!("the index announces {}: write the file again", chunk.length);
+                bad(format!("{} bytes or more", content.len()), &advice)
+            }
+            Ok(_) => Ok(content),
+        }
+    }
+
+    fn stored(&self, chunk: &Chunk) -> &[u8] {
+        // A chunk of another container may point anywhere.
+        let end = chunk.position.saturating_add(chunk.stored_length as usize);
+        self.bytes.get(chunk.position..end).unwrap_or(&[])
+    }
+
+    /// A writer that holds the chunks that `keep` wants, packed as they are: for programs that replace some
+    /// chunks and keep the rest, known or not.
+    ///
+    /// # Errors
+    /// None in practice: what was read can be written.
+    pub fn writer(&self, mut keep: impl FnMut(&Chunk) -> bool) -> Result<ContainerWriter, IoError> {
+        let mut writer = ContainerWriter::new();
+        for chunk in self.chunks.iter().filter(|c| keep(c)) {
+            writer.stored_chunk(&chunk.tag, &chunk.name, chunk.length, self.stored(chunk))?;
+        }
+        Ok(writer)
+    }
+}
+
+struct Header {
+    count: u32,
+    index: u64,
+    index_crc: u32,
+}
+
+impl Header {
+    fn of(bytes: &[u8], path: &Path) -> Result<Self, IoError> {
+        let bad = |at, field: &str, value: String, advice: &str| {
+            Err(IoError::binary(path, at, field, value, advice))
+        };
+        let magic = &bytes[..bytes.len().min(8)];
+        if magic != MAGIC {
+            return bad(0, "the magic", shown(magic), "give a map.portolan: it starts with PORTOLAN");
+        }
+        if bytes.len() < HEADER {
+            return bad(
+                8,
+                "the header",
+                format!("{} bytes", bytes.len()),
+                "the file is cut off: copy it again",
+            );
+        }
+        let version = u32_at(bytes, 8);
+        if version != VERSION {
+            return bad(
+                8,
+                "the version",
+                version.to_string(),
+                "this program knows version 1; use a newer one",
+            );
+        }
+        if crc32c::crc32c(&bytes[..28]) != u32_at(bytes, 28) {
+            return bad(
+                28,
+                "the checksum of the header",
+                "wrong".into(),
+                "the file is damaged: copy it again",
+            );
+        }
+        Ok(Self { count: u32_at(bytes, 12), index: u64_at(bytes, 16), index_crc: u32_at(bytes, 24) })
+    }
+}
+
+fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chunk>, IoError> {
+    let mut chunks = Vec::new();
+    let mut names = HashSet::new();
+    let (mut at, mut position) = (index, HEADER);
+    for _ in 0..count {
+        let bad = |offset: usize, field: &str, value: String, advice: &str| {
+            Err(IoError::binary(path, (at + offset) as u64, field, value, advice))
+        };
+        let Some(entry) = bytes.get(at..at + ENTRY) else {
+            return bad(
+                0,
+                "the index",
+                format!("{} entries", chunks.len()),
+                "the header announces more of them",
+            );
+        };
+        let Some(tag) = tag_of(std::array::from_fn(|k| entry[k])) else {
+            return bad(0, "a chunk tag", shown(&entry[..8]), "use 4 to 8 ASCII letters, digits or _");
+        };
+        let [place, stored_length, length] = [8, 16, 24].map(|k| u64_at(entry, k));
+        if place != position as u64 {
+            return bad(8, "a chunk position", place.to_string(), "chunks must follow each other");
+        }
+        if stored_length > (index - position) as u64 {
+            return bad(16, "a stored length", stored_length.to_string(), "it reaches behind the chunks");
+        }
+        if length > LONGEST_CHUNK {
+            return bad(24, "a chunk length", length.to_string(), "chunks have at most 2^30 bytes");
+        }
+        let name_length = u32_at(entry, 36) as usize;
+        let name = bytes.get(at + ENTRY..at + ENTRY + name_length.min(LONGEST_NAME + 1));
+        let name = name.filter(|n| n.len() <= LONGEST_NAME).and_then(|n| std::str::from_utf8(n).ok());
+        let Some(name) = name else {
+            return bad(36, "a chunk name", format!("{name_length} bytes"), "use at most 255 bytes of UTF-8");
+        };
+        if !names.insert((tag.clone(), name)) {
+            return bad(0, "a chunk name", format!("{tag} {}", shown(name.as_bytes())), "it is there twice");
+        }
+        let crc = u32_at(entry, 32);
+        chunks.push(Chunk { tag, name: name.to_owned(), length, stored_length, position, crc });
+        position += stored_length as usize;
+        at += ENTRY + name_length;
+    }
+    if at != bytes.len() || position != index {
+        let (value, advice) = (format!("{} bytes", bytes.len()), "bytes are left over: write the file again");
+        return Err(IoError::binary(path, at as u64, "the file length", value, advice));
+    }
+    Ok(chunks)
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Random, bad_bytes};
+
+    fn sample() -> Vec<u8> {
+        let mut writer = ContainerWriter::new();
+        writer.chunk("META", "", b"{}").unwrap();
+        writer.chunk("GRID_I8", "occupancy", &vec![7; 5000]).unwrap();
+        writer.chunk("GRID_I8", "empty", &[]).unwrap();
+        writer.to_bytes()
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Container, IoError> {
+        Container::parse(bytes.to_vec(), "m.portolan".as_ref())
+    }
+
+    /// The sample with the index changed and the checksums made right again.
+    fn forged(change: impl FnOnce(&mut [u8])) -> String {
+        let mut bytes = sample();
+        let index = u64_at(&bytes, 16) as usize;
+        change(&mut bytes[index..]);
+        let crc = crc32c::crc32c(&bytes[index..]);
+        bytes[24..28].copy_from_slice(&crc.to_le_bytes());
+        let crc = crc32c::crc32c(&bytes[..28]);
+        bytes[28..32].copy_from_slice(&crc.to_le_bytes());
+        let container = match parse(&bytes) {
+            Ok(container) => container,
+            Err(e) => return e.to_string(),
+        };
+        let contents: Result<Vec<_>, _> = container.chunks().iter().map(|c| container.unpack(c)).collect();
+        contents.unwrap_err().to_string()
+    }
+
+    #[test]
+    fn round_trips_and_is_deterministic() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.portolan");
+        let mut random = Random(1);
+        let noise: Vec<u8> = (0..300_000).map(|_| random.next() as u8).collect();
+        let mut writer = ContainerWriter::new();
+        writer.chunk("NOISE", "a", &noise).unwrap();
+        writer.chunk("ZERO", "b", &vec![0; 3 << 20]).unwrap();
+        writer.write(&path).unwrap();
+        let container = Container::read(&path).unwrap();
+        assert_eq!(container.get("NOISE", "a").unwrap().unwrap(), noise);
+        assert_eq!(container.get("ZERO", "b").unwrap().unwrap(), vec![0; 3 << 20]);
+        assert_eq!(container.get("ZERO", "c").unwrap(), None);
+        assert_eq!((container.tagged("ZERO").count(), container.chunks()[1].length), (1, 3 << 20));
+        assert_eq!(std::fs::read(&path).unwrap(), writer.to_bytes());
+        assert_eq!(sample(), sample());
+        assert!(parse(&ContainerWriter::new().to_bytes()).unwrap().chunks().is_empty());
+    }
+
+    #[test]
+    fn unknown_chunks_survive_a_rewrite() {
+        let old = parse(&sample()).unwrap();
+        assert_eq!(old.writer(|_| true).unwrap().to_bytes(), sample());
+        let mut writer = old.writer(|c| c.tag != "META").unwrap();
+        writer.chunk("META", "", b"new").unwrap();
+        let new = parse(&writer.to_bytes()).unwrap();
+        assert_eq!(new.get("META", "").unwrap().unwrap(), b"new");
+        assert_eq!(new.get("GRID_I8", "occupancy").unwrap().unwrap(), vec![7; 5000]);
+    }
+
+    #[test]
+    fn every_flipped_bit_is_found() {
+        let good = sample();
+        for i in 0..good.len() {
+            for bit in 0..8 {
+                let mut bytes = good.clone();
+                bytes[i] ^= 1 << bit;
+                let read =
+                    parse(&bytes).and_then(|c| c.chunks().iter().try_for_each(|k| c.unpack(k).map(drop)));
+                assert!(read.is_err(), "byte {i} bit {bit}");
+            }
+        }
+        for cut in 0..good.len() {
+            assert!(parse(&good[..cut]).is_err());
+        }
+    }
+
+    #[test]
+    fn false_claims_with_right_checksums_are_refused_at_once() {
+        let at = |k: usize, value: u64| {
+            move |index: &mut [u8]| index[k..k + 8].copy_from_slice(&value.to_le_bytes())
+        };
+        assert!(
+            forged(at(24, 1 << 60)).contains("a chunk length is 1152921504606846976; chunks have at most")
+        );
+        assert!(forged(at(16, 1 << 60)).contains("a stored length is 1152921504606846976"));
+        assert!(forged(at(8, 1 << 60)).contains("a chunk position is 1152921504606846976"));
+        assert!(forged(at(24, 1)).contains("the index announces 1:"));
+        assert!(forged(at(24, 1 << 29)).contains("the index announces 536870912:"));
+        assert!(forged(|i| i[36..40].fill(0xff)).contains("a chunk name is 4294967295 bytes"));
+        assert!(forged(|i| i[0] = b' ').contains("a chunk tag is"));
+    }
+
+    #[test]
+    fn writers_refuse_what_cannot_be_read() {
+        let mut writer = ContainerWriter::new();
+        for tag in ["", "abc", "too_long_1", "a b c", "äöü"] {
+            assert!(writer.chunk(tag, "", &[]).is_err());
+        }
+        assert!(writer.chunk("GOOD", &"n".repeat(256), &[]).is_err());
+        writer.chunk("GOOD", "n", &[]).unwrap();
+        assert!(writer.chunk("GOOD", "n", &[]).unwrap_err().to_string().contains("used twice"));
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        for bytes in bad_bytes(&sample(), 17, 4000) {
+            if let Ok(container) = parse(&bytes) {
+                container.chunks().iter().for_each(|c| drop(container.unpack(c)));
+            }
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Writing a container.
+
+use std::collections::HashSet;
+use std::io::Write;
+use std::path::Path;
+
+use super::{HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_bytes};
+use crate::{IoError, write_atomic};
+
+/// zstd's own default: small gains above it, at several times the cost.
+const LEVEL: i32 = 3;
+
+/// Collects chunks, packed as they come, and writes them all at once.
+///
+/// ```
+/// # fn main() -> Result<(), portolan_io::IoError> {
+/// use portolan_io::{Container, ContainerWriter};
+/// let mut writer = ContainerWriter::new();
+/// writer.chunk("GRID", "occupancy", &[1, 2, 3])?;
+/// let container = Container::parse(writer.to_bytes(), "memory".as_ref())?;
+/// assert_eq!(container.get("GRID", "occupancy")?, Some(vec![1, 2, 3]));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct ContainerWriter {
+    entries: Vec<u8>,
+    blocks: Vec<u8>,
+    names: HashSet<([u8; 8], String)>,
+    count: u32,
+}
+
+impl ContainerWriter {
+    /// A container without chunks.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a chunk: a tag of 4 to 8 ASCII letters, digits or `_`, a name of at most 255 bytes (may be empty),
+    /// at most 1 GiB of content.
+    ///
+    /// # Errors
+    /// [`IoError::Unwritable`] where one of these does not hold or tag and name were used before.
+    pub fn chunk(&mut self, tag: &str, name: &str, content: &[u8]) -> Result<(), IoError> {
+        let bad = |field: &str, value: String, advice: &str| {
+            Err(IoError::unwritable(unnamed(), field, value, advice))
+        };
+        if content.len() as u64 > LONGEST_CHUNK {
+            return bad(
+                "the chunk length",
+                content.len().to_string(),
+                "spread it over chunks of at most 1 GiB",
+            );
+        }
+        match zstd::bulk::compress(content, LEVEL) {
+            Ok(stored) => self.stored_chunk(tag, name, content.len() as u64, &stored),
+            Err(e) => bad("the chunk", e.to_string(), "free some memory"),
+        }
+    }
+
+    /// Adds a chunk that is packed already.
+    pub(super) fn stored_chunk(
+        &mut self,
+        tag: &str,
+        name: &str,
+        length: u64,
+        stored: &[u8],
+    ) -> Result<(), IoError> {
+        let bad = |field: &str, value: &str, advice: &str| {
+            Err(IoError::unwritable(unnamed(), field, value, advice))
+        };
+        let Some(tag8) = tag_bytes(tag) else {
+            return bad("the chunk tag", tag, "use 4 to 8 ASCII letters, digits or _");
+        };
+        if name.len() > LONGEST_NAME {
+            return bad("the chunk name", name, "use at most 255 bytes");
+        }
+        if self.count as usize == MOST_CHUNKS {
+            return bad("the number of chunks", "2^20", "join some chunks");
+        }
+        if !self.names.insert((tag8, name.to_owned())) {
+            return bad(
+                "the chunk name",
+                &format!("{tag} {name}, used twice"),
+                "give every chunk its own name",
+            );
+        }
+        let position = (HEADER + self.blocks.len()) as u64;
+        self.entries.extend(tag8);
+        for value in [position, stored.len() as u64, length] {
+            self.entries.extend(value.to_le_bytes());
+        }
+        self.entries.extend(crc32c::crc32c(stored).to_le_bytes());
+        self.entries.extend((name.len() as u32).to_le_bytes());
+        self.entries.extend(name.as_bytes());
+        self.blocks.extend(stored);
+        self.count += 1;
+        Ok(())
+    }
+
+    fn header(&self) -> [u8; HEADER] {
+        let mut header = Vec::with_capacity(HEADER);
+        header.extend(MAGIC);
+        header.extend(VERSION.to_le_bytes());
+        header.extend(self.count.to_le_bytes());
+        header.extend(((HEADER + self.blocks.len()) as u64).to_le_bytes());
+        header.extend(crc32c::crc32c(&self.entries).to_le_bytes());
+        let crc = crc32c::crc32c(&header);
+        header.extend(crc.to_le_bytes());
+        std::array::from_fn(|k| header[k])
+    }
+
+    /// The file.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        [&self.header()[..], &self.blocks, &self.entries].concat()
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// As [`write_atomic`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+        write_atomic(path, |w| {
+            w.write_all(&self.header())?;
+            w.write_all(&self.blocks)?;
+            w.write_all(&self.entries)
+        })
+    }
+}
+
+/// Chunks are checked before the file has a name.
+fn unnamed() -> &'static Path {
+    Path::new("container")
+}

@@ -1,0 +1,213 @@
+//! What kind of file this is: by its content first, then by its name.
+
+use std::path::Path;
+
+use crate::bytes::open;
+use crate::{IoError, container, esdf_bin};
+
+/// So much of a file is looked at (unpacked bytes).
+const HEAD: u64 = 64 << 10;
+
+/// What a file or folder is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FileKind {
+    /// A CARMEN log: [`crate::CarmenLog`].
+    CarmenLog,
+    /// portolan's own map: [`crate::Container`].
+    Portolan,
+    /// A folder with a `map.portolan`, as `map` and `demo` write it.
+    PortolanFolder,
+    /// A distance field: [`crate::EsdfFile`].
+    EsdfBin,
+    /// A grey image: [`crate::Pgm`].
+    Pgm,
+    /// The yaml file of a map_server map: [`crate::MapServerMap`].
+    MapServerYaml,
+    /// Contours: [`crate::read_geojson`].
+    GeoJson,
+    /// A picture of contours; not read.
+    Svg,
+    /// OctoMap's binary tree; not read yet.
+    OctomapBt,
+    /// OctoMap's full tree; not read yet.
+    OctomapOt,
+    /// None of these; the text says what was seen and what would be known.
+    Unknown(String),
+}
+
+/// Tells what a file or folder is.
+///
+/// # Errors
+/// [`IoError`] where it cannot be opened or read.
+pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
+    let path = path.as_ref();
+    if path.is_dir() {
+        if path.join("map.portolan").is_file() {
+            return Ok(FileKind::PortolanFolder);
+        }
+        return Ok(FileKind::Unknown("a folder without map.portolan; name a file inside it".into()));
+    }
+    let head = open(path)?.read_up_to(HEAD)?;
+    Ok(by_content(&head).or_else(|| by_name(path, &head)).unwrap_or_else(|| unknown(&head)))
+}
+
+fn by_content(head: &[u8]) -> Option<FileKind> {
+    if head.starts_with(container::MAGIC) {
+        return Some(FileKind::Portolan);
+    }
+    if head.starts_with(esdf_bin::MAGIC) {
+        return Some(FileKind::EsdfBin);
+    }
+    if let [b'P', b'2' | b'5', next, ..] = head
+        && (next.is_ascii_whitespace() || *next == b'#')
+    {
+        return Some(FileKind::Pgm);
+    }
+    if head.starts_with(b"# Octomap OcTree binary file") {
+        return Some(FileKind::OctomapBt);
+    }
+    if head.starts_with(b"# Octomap OcTree file") {
+        return Some(FileKind::OctomapOt);
+    }
+    let text = String::from_utf8_lossy(head);
+    let start = text.trim_start_matches('\u{feff}').trim_start();
+    if start.starts_with('{') && start.contains("\"type\"") && GEOJSON_WORDS.iter().any(|w| start.contains(w))
+    {
+        return Some(FileKind::GeoJson);
+    }
+    if start.starts_with('<') && start.contains("<svg") {
+        return Some(FileKind::Svg);
+    }
+    if text.lines().any(|line| {
+        let word = line.split_ascii_whitespace().next().unwrap_or("");
+        CARMEN_WORDS.contains(&word)
+            || line.starts_with("# message_name ")
+            || line.starts_with("# message formats")
+    }) {
+        return Some(FileKind::CarmenLog);
+    }
+    let has = |key: &str| text.lines().any(|l| l.trim_start().starts_with(key));
+    (has("image:") && has("resolution:")).then_some(FileKind::MapServerYaml)
+}
+
+/// Words that only GeoJSON objects have.
+const GEOJSON_WORDS: [&str; 3] = ["\"Feature\"", "\"FeatureCollection\"", "\"coordinates\""];
+
+/// First words of lines of CARMEN logs.
+const CARMEN_WORDS: [&str; 12] = [
+    "FLASER",
+    "RLASER",
+    "ROBOTLASER1",
+    "ROBOTLASER2",
+    "RAWLASER1",
+    "RAWLASER2",
+    "ODOM",
+    "PARAM",
+    "SYNC",
+    "TRUEPOS",
+    "NEFF",
+    "OLDLASER",
+];
+
+/// For a file whose content says nothing (an empty or broken one): the reader's error tells more.
+fn by_name(path: &Path, head: &[u8]) -> Option<FileKind> {
+    let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+    let name = [".gz", ".bz2"].iter().find_map(|e| name.strip_suffix(e)).unwrap_or(&name);
+    let (_, extension) = name.rsplit_once('.')?;
+    // Text under a text format's name; noise under it is unknown.
+    let text = !head.contains(&0);
+    match extension {
+        "log" | "clf" if text => Some(FileKind::CarmenLog),
+        "yaml" | "yml" if text => Some(FileKind::MapServerYaml),
+        "geojson" if text => Some(FileKind::GeoJson),
+        "svg" if text => Some(FileKind::Svg),
+        "pgm" => Some(FileKind::Pgm),
+        "portolan" => Some(FileKind::Portolan),
+        "bt" => Some(FileKind::OctomapBt),
+        "ot" => Some(FileKind::OctomapOt),
+        _ => None,
+    }
+}
+
+fn unknown(head: &[u8]) -> FileKind {
+    let seen = match head {
+        [] => "it is empty".to_owned(),
+        [0x89, b'P', b'N', b'G', ..] => "it is a PNG picture (convert it to PGM)".to_owned(),
+        _ => format!("it starts with {}", crate::error::shown(&head[..head.len().min(16)])),
+    };
+    let known = "known are CARMEN logs, map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON";
+    FileKind::Unknown(format!("{seen}; {known}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{bad_bytes, real_data};
+
+    fn kind_of(name: &str, bytes: &[u8]) -> FileKind {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        detect(&path).unwrap()
+    }
+
+    #[test]
+    fn content_comes_before_the_name() {
+        use FileKind::*;
+        let container = crate::ContainerWriter::new().to_bytes();
+        for (bytes, kind) in [
+            (&container[..], Portolan),
+            (b"PORTESDF", EsdfBin),
+            (b"P5\n1 1\n255\n0", Pgm),
+            (b"P2#c\n1 1\n255\n0", Pgm),
+            (b"image: a.pgm\nresolution: 1\n", MapServerYaml),
+            (b" {\"type\":\"Feature\"}", GeoJson),
+            (b"<?xml version='1.0'?>\n<svg/>", Svg),
+            (b"# Octomap OcTree binary file\nid OcTree", OctomapBt),
+            (b"# Octomap OcTree file\nid OcTree", OctomapOt),
+            (b"# message_name [message contents]\n", CarmenLog),
+            (b"# hello\n\nFLASER 1 2", CarmenLog),
+        ] {
+            assert_eq!(kind_of("file.xyz", bytes), kind);
+            assert_eq!(kind_of("file.log", bytes), kind);
+        }
+        assert_eq!(kind_of("empty.gfs.log", b""), CarmenLog);
+        assert!(
+            matches!(kind_of("noise.log", b"\x00\x01\x02"), Unknown(text) if text.contains("it starts with"))
+        );
+        assert!(matches!(kind_of("a.png", b"\x89PNG"), Unknown(text) if text.contains("PNG")));
+        assert!(matches!(kind_of("none", b""), Unknown(text) if text.contains("it is empty; known are")));
+    }
+
+    #[test]
+    fn folders_are_maps_where_they_hold_one() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(matches!(detect(folder.path()).unwrap(), FileKind::Unknown(_)));
+        std::fs::write(folder.path().join("map.portolan"), b"").unwrap();
+        assert_eq!(detect(folder.path()).unwrap(), FileKind::PortolanFolder);
+        assert!(detect(folder.path().join("missing")).is_err());
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        for bytes in bad_bytes(b"P5 {\"type\":\"Feature\"} # Octomap\nFLASER", 21, 500) {
+            let _ = by_content(&bytes).unwrap_or_else(|| unknown(&bytes));
+        }
+    }
+
+    #[test]
+    fn real_files_are_recognised() {
+        use FileKind::*;
+        for (name, kind) in [
+            ("lidar2d_carmen/intel-corrected.log.gz", CarmenLog),
+            ("lidar2d_carmen/intel.clf.bz2", CarmenLog),
+            ("maps_2d/depot.yaml", MapServerYaml),
+            ("maps_2d/willow-full.pgm", Pgm),
+            ("maps_octomap/geb079.bt", OctomapBt),
+        ] {
+            let Some(path) = real_data(name) else { continue };
+            assert_eq!(detect(path).unwrap(), kind);
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! The one error of this crate.
+
+use std::path::{Path, PathBuf};
+
+/// Why a file could not be read or written. Every message is one line that names the file, the place, the
+/// field, its value and what to do about it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum IoError {
+    /// The operating system refused.
+    #[error("{}: cannot {action}: {cause}; {}", shown_path(path), advice_for(cause))]
+    Os {
+        /// The file.
+        path: PathBuf,
+        /// What was tried: a verb.
+        action: &'static str,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// A folder stands where a file was expected.
+    #[error("{}: is a folder, not a file; name a file inside it", shown_path(path))]
+    IsFolder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Compressed data ends early or is damaged.
+    #[error(
+        "{}: byte {offset} of the unpacked data: the {kind} stream {reason}; copy or download the file again",
+        shown_path(path)
+    )]
+    Compression {
+        /// The file.
+        path: PathBuf,
+        /// `gzip`, `bzip2` or `zstd`.
+        kind: &'static str,
+        /// How much could be unpacked (bytes).
+        offset: u64,
+        /// What is wrong with the stream.
+        reason: String,
+    },
+    /// A field of a text file is wrong.
+    #[error("{}: line {line}: {field} is {value}; {advice}", shown_path(path))]
+    Text {
+        /// The file.
+        path: PathBuf,
+        /// Line number, from 1.
+        line: u64,
+        /// The field.
+        field: String,
+        /// Its value, as far as it fits.
+        value: String,
+        /// What to do.
+        advice: String,
+    },
+    /// A field of a binary file is wrong.
+    #[error("{}: byte {offset}: {field} is {value}; {advice}", shown_path(path))]
+    Binary {
+        /// The file.
+        path: PathBuf,
+        /// Position of the field (bytes from the start).
+        offset: u64,
+        /// The field.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What to do.
+        advice: String,
+    },
+    /// A log without a single scan that can be used.
+    #[error(
+        "{}: no usable laser scan in {lines} lines: {found}; give a CARMEN log with FLASER or ROBOTLASER1 lines",
+        shown_path(path)
+    )]
+    NoScans {
+        /// The file.
+        path: PathBuf,
+        /// Lines read.
+        lines: u64,
+        /// What was found instead.
+        found: String,
+    },
+    /// What the caller wants to write, or to combine, cannot be held by the format.
+    #[error("{}: {field} is {value}; {advice}", shown_path(path))]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// The field.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What to do.
+        advice: String,
+    },
+}
+
+impl IoError {
+    pub(crate) fn text(
+        path: &Path,
+        line: u64,
+        field: impl Into<String>,
+        value: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        Self::Text { path: path.into(), line, field, value, advice }
+    }
+
+    pub(crate) fn binary(
+        path: &Path,
+        offset: u64,
+        field: impl Into<String>,
+        value: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        Self::Binary { path: path.into(), offset, field, value, advice }
+    }
+
+    pub(crate) fn unwritable(
+        path: &Path,
+        field: impl Into<String>,
+        value: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        Self::Unwritable { path: path.into(), field, value, advice }
+    }
+
+    pub(crate) fn os(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
+        Self::Os { path: path.into(), action, cause }
+    }
+
+    /// The file that the error is about.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Os { path, .. }
+            | Self::IsFolder { path }
+            | Self::Compression { path, .. }
+            | Self::Text { path, .. }
+            | Self::Binary { path, .. }
+            | Self::NoScans { path, .. }
+            | Self::Unwritable { path, .. } => path,
+        }
+    }
+}
+
+fn advice_for(cause: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind::*;
+    match cause.kind() {
+        NotFound => "check the path",
+        PermissionDenied | ReadOnlyFilesystem => "check the permissions",
+        StorageFull | QuotaExceeded => "free some space",
+        _ => "check the file and the disk",
+    }
+}
+
+/// A path on one line.
+fn shown_path(path: &Path) -> String {
+    path.to_string_lossy().chars().map(|c| if c.is_control() { '?' } else { c }).collect()
+}
+
+/// Bytes of a file as a short quoted word on one line.
+pub(crate) fn shown(bytes: &[u8]) -> String {
+    const LONGEST: usize = 48;
+    let head = &bytes[..bytes.len().min(LONGEST)];
+    let text: String =
+        String::from_utf8_lossy(head).chars().map(|c| if c.is_control() { '?' } else { c }).collect();
+    if bytes.is_empty() {
+        "missing".into()
+    } else if bytes.len() > LONGEST {
+        format!("\"{text}...\" ({} bytes)", bytes.len())
+    } else {
+        format!("\"{text}\"")
+    }
+}

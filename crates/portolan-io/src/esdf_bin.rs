@@ -1,0 +1,345 @@
+//! `esdf.bin`: a signed distance field that numpy reads with three lines.
+//!
+//! Little-endian:
+//!
+//! | offset | type | field |
+//! |---|---|---|
+//! | 0 | 8 bytes | `PORTESDF` |
+//! | 8 | u32 | version = 1 |
+//! | 12 | u32 | D, 2 or 3 |
+//! | 16 | u32 x 3 | shape x, y, z (unused = 1) |
+//! | 28 | u32 | flags; bit 0: a status plane follows |
+//! | 32 | f64 x 3 | origin, the corner of cell 0 (metres; unused = 0) |
+//! | 56 | f64 | resolution (metres) |
+//! | 64 | f32 x cells | signed distance (metres), x fastest, NaN where unknown |
+//! | then, with bit 0 | u8 x cells | 0 unknown, 1 known, 2 saturated |
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Write};
+use std::path::Path;
+
+use portolan::geom::Grid;
+
+use crate::IoError;
+use crate::bytes::{open_file, write_atomic};
+use crate::error::shown;
+
+/// The first eight bytes.
+pub(crate) const MAGIC: &[u8; 8] = b"PORTESDF";
+const HEADER: u64 = 64;
+/// The most cells of a field: 2 GiB of distances.
+const MOST_CELLS: u64 = 1 << 29;
+
+/// A field in `D` dimensions as the file holds it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EsdfBin<const D: usize> {
+    /// Where the cells are.
+    pub grid: Grid<D>,
+    /// Signed distance of each cell (metres, positive in free space), x fastest; NaN where unknown.
+    pub distances: Vec<f32>,
+    /// What each distance is worth: [`EsdfBin::UNKNOWN`], [`EsdfBin::KNOWN`] or [`EsdfBin::SATURATED`].
+    pub status: Option<Vec<u8>>,
+}
+
+/// A field whose dimension the file tells.
+#[derive(Clone, Debug, PartialEq)]
+pub enum EsdfFile {
+    /// A field in the plane.
+    Two(EsdfBin<2>),
+    /// A field in space.
+    Three(EsdfBin<3>),
+}
+
+impl<const D: usize> EsdfBin<D> {
+    /// Status of a cell that was not observed.
+    pub const UNKNOWN: u8 = 0;
+    /// Status of a cell with a distance.
+    pub const KNOWN: u8 = 1;
+    /// Status of a cell that is at least so far from any surface.
+    pub const SATURATED: u8 = 2;
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// [`IoError::Unwritable`] where lengths do not fit the grid or the grid does not fit the format, else as
+    /// [`write_atomic`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+        write_esdf(path, &self.grid, &self.distances, self.status.as_deref())
+    }
+}
+
+/// Writes an `esdf.bin` from slices; the layout is in the documentation of [`EsdfBin`]'s fields.
+///
+/// # Errors
+/// As [`EsdfBin::write`].
+pub fn write_esdf<const D: usize>(
+    path: impl AsRef<Path>,
+    grid: &Grid<D>,
+    distances: &[f32],
+    status: Option<&[u8]>,
+) -> Result<(), IoError> {
+    let path = path.as_ref();
+    let cells = grid.checked_len().filter(|&n| n as u64 <= MOST_CELLS);
+    let fits = cells == Some(distances.len()) && status.is_none_or(|s| s.len() == distances.len());
+    if !fits || distances.is_empty() {
+        let value = format!(
+            "{:?} for {} distances and {:?} states",
+            grid.shape,
+            distances.len(),
+            status.map(<[u8]>::len)
+        );
+        let advice = format!("give one value per cell, from 1 to {MOST_CELLS} of them");
+        return Err(IoError::unwritable(path, "the shape", value, advice));
+    }
+    let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
+    if !(resolution > 0.0 && resolution.is_finite() && origin.iter().all(|v| v.is_finite())) {
+        let value = format!("{resolution} at {origin:?}");
+        return Err(IoError::unwritable(path, "the resolution", value, "give finite values, above zero"));
+    }
+    write_atomic(path, |w| {
+        w.write_all(MAGIC)?;
+        for word in [1, D as u32] {
+            w.write_all(&word.to_le_bytes())?;
+        }
+        for k in 0..3 {
+            w.write_all(&(grid.shape.get(k).map_or(1, |&s| s as u32)).to_le_bytes())?;
+        }
+        w.write_all(&u32::from(status.is_some()).to_le_bytes())?;
+        for k in 0..3 {
+            w.write_all(&origin.get(k).copied().unwrap_or(0.0).to_le_bytes())?;
+        }
+        w.write_all(&resolution.to_le_bytes())?;
+        for chunk in distances.chunks(1 << 14) {
+            let bytes: Vec<u8> = chunk.iter().flat_map(|d| d.to_le_bytes()).collect();
+            w.write_all(&bytes)?;
+        }
+        w.write_all(status.unwrap_or(&[]))
+    })
+}
+
+impl EsdfFile {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`IoError::Binary`] where a field is wrong or the file's length is not what the header announces.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let path = path.as_ref();
+        let file = open_file(path)?;
+        let length = file.metadata().map_err(|e| IoError::os(path, "look at it", e))?.len();
+        Self::from_reader(BufReader::<File>::with_capacity(1 << 16, file), length, path)
+    }
+
+    /// Reads a file that is in memory, under the name that errors shall give.
+    ///
+    /// # Errors
+    /// As [`EsdfFile::read`].
+    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self, IoError> {
+        Self::from_reader(bytes, bytes.len() as u64, name)
+    }
+
+    fn from_reader(mut reader: impl Read, length: u64, path: &Path) -> Result<Self, IoError> {
+        let mut header = Vec::new();
+        let read = reader.by_ref().take(HEADER).read_to_end(&mut header);
+        read.map_err(|e| IoError::os(path, "read it", e))?;
+        let Ok(h) = <[u8; HEADER as usize]>::try_from(&header[..]) else {
+            let value = format!("{} bytes", header.len());
+            return Err(IoError::binary(
+                path,
+                0,
+                "the header",
+                value,
+                "give an esdf.bin: its header has 64 bytes",
+            ));
+        };
+        if &h[..8] != MAGIC {
+            let advice = "give an esdf.bin: it starts with PORTESDF";
+            return Err(IoError::binary(path, 0, "the magic", shown(&h[..8]), advice));
+        }
+        match word(&h, 12) {
+            2 => Ok(Self::Two(body(&h, reader, length, path)?)),
+            3 => Ok(Self::Three(body(&h, reader, length, path)?)),
+            d => Err(IoError::binary(path, 12, "the dimension", d.to_string(), "2 and 3 are known")),
+        }
+    }
+}
+
+fn word(h: &[u8; 64], at: usize) -> u32 {
+    u32::from_le_bytes([h[at], h[at + 1], h[at + 2], h[at + 3]])
+}
+
+fn double(h: &[u8; 64], at: usize) -> f64 {
+    f64::from_le_bytes(std::array::from_fn(|k| h[at + k]))
+}
+
+fn body<const D: usize>(
+    h: &[u8; 64],
+    mut reader: impl Read,
+    length: u64,
+    path: &Path,
+) -> Result<EsdfBin<D>, IoError> {
+    let bad = |at: u64, field: &str, value: String, advice: &str| {
+        Err(IoError::binary(path, at, field, value, advice))
+    };
+    let (version, flags) = (word(h, 8), word(h, 28));
+    if version != 1 {
+        return bad(8, "the version", version.to_string(), "this program knows version 1; use a newer one");
+    }
+    if flags > 1 {
+        return bad(28, "the flags", flags.to_string(), "only bit 0 is known; use a newer program");
+    }
+    let shape: [u32; 3] = std::array::from_fn(|k| word(h, 16 + 4 * k));
+    let cells = shape.iter().try_fold(1u64, |n, &s| n.checked_mul(u64::from(s)));
+    let cells = match cells.filter(|n| (1..=MOST_CELLS).contains(n)) {
+        Some(n) if shape[D..].iter().all(|&s| s == 1) => n,
+        _ => {
+            return bad(
+                16,
+                "the shape",
+                format!("{shape:?}"),
+                "give from 1 to 2^29 cells, 1 along an unused axis",
+            );
+        }
+    };
+    let origin: [f64; D] = std::array::from_fn(|k| double(h, 32 + 8 * k));
+    let resolution = double(h, 56);
+    if !origin.iter().all(|v| v.is_finite()) {
+        return bad(32, "the origin", format!("{origin:?}"), "give finite numbers (metres)");
+    }
+    if !(resolution > 0.0 && resolution.is_finite()) {
+        return bad(56, "the resolution", resolution.to_string(), "give metres per cell, above zero");
+    }
+    let expected = HEADER + cells * if flags == 1 { 5 } else { 4 };
+    let wrong_length = |length: u64| {
+        let advice = format!("the header announces {expected}: the file is cut off or damaged");
+        Err(IoError::binary(path, length.min(expected), "the file length", length.to_string(), advice))
+    };
+    if length != expected {
+        return wrong_length(length);
+    }
+    let failed = |e: io::Error| match e.kind() {
+        io::ErrorKind::UnexpectedEof => {
+            IoError::binary(path, expected, "the file length", "shrinking", "read it when it is written")
+        }
+        _ => IoError::os(path, "read it", e),
+    };
+    // The length was checked against the file's, so these many bytes are there.
+    let mut distances = Vec::with_capacity(cells as usize);
+    let mut buffer = vec![0u8; 1 << 16];
+    let mut left = cells as usize;
+    while left > 0 {
+        let now = left.min(buffer.len() / 4);
+        let bytes = &mut buffer[..4 * now];
+        reader.read_exact(bytes).map_err(failed)?;
+        distances.extend(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+        left -= now;
+    }
+    let mut status = None;
+    if flags == 1 {
+        let mut plane = vec![0; cells as usize];
+        reader.read_exact(&mut plane).map_err(failed)?;
+        if let Some(i) = plane.iter().position(|&s| s > 2) {
+            let at = HEADER + 4 * cells + i as u64;
+            return bad(at, "a status", plane[i].to_string(), "0 unknown, 1 known, 2 saturated");
+        }
+        status = Some(plane);
+    }
+    let grid = Grid::new(origin, resolution, std::array::from_fn(|k| shape[k] as usize));
+    Ok(EsdfBin { grid, distances, status })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Random, bad_bytes};
+
+    fn field<const D: usize>(shape: [usize; D], with_status: bool) -> EsdfBin<D> {
+        let mut random = Random(4);
+        let grid = Grid::new(std::array::from_fn(|k| 500_000.0 - 0.1 * k as f64), 0.05, shape);
+        let distances = (0..grid.len()).map(|_| random.unit() as f32 - 0.5).collect();
+        let status = with_status.then(|| (0..grid.len()).map(|_| random.below(3) as u8).collect());
+        EsdfBin { grid, distances, status }
+    }
+
+    fn bytes_of<const D: usize>(field: &EsdfBin<D>) -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("esdf.bin");
+        field.write(&path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        // As text: NaN does not equal itself.
+        let [read, parsed] = [EsdfFile::read(&path), EsdfFile::parse(&bytes, &path)].map(Result::unwrap);
+        assert_eq!(format!("{read:?}"), format!("{parsed:?}"));
+        bytes
+    }
+
+    #[test]
+    fn round_trips_in_both_dimensions() {
+        for with_status in [false, true] {
+            let two = field([7, 5], with_status);
+            assert_eq!(EsdfFile::parse(&bytes_of(&two), "e".as_ref()).unwrap(), EsdfFile::Two(two));
+            let three = field([30, 50, 30], with_status);
+            assert_eq!(EsdfFile::parse(&bytes_of(&three), "e".as_ref()).unwrap(), EsdfFile::Three(three));
+        }
+        let mut unknown = field([1, 1], false);
+        unknown.distances[0] = f32::NAN;
+        let EsdfFile::Two(read) = EsdfFile::parse(&bytes_of(&unknown), "e".as_ref()).unwrap() else {
+            panic!()
+        };
+        assert!(read.distances[0].is_nan());
+    }
+
+    #[test]
+    fn the_header_is_the_documented_one() {
+        let grid = Grid::new([-1.0, 2.0], 0.5, [2, 1]);
+        let bytes = bytes_of(&EsdfBin { grid, distances: vec![1.0, -2.0], status: Some(vec![1, 2]) });
+        let mut expected = b"PORTESDF\x01\0\0\0\x02\0\0\0\x02\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\0\0".to_vec();
+        expected.extend(b"\0\0\0\0\0\0\xf0\xbf\0\0\0\0\0\0\0\x40\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xe0\x3f");
+        assert_eq!(expected.len(), 64);
+        expected.extend(b"\0\0\x80\x3f\0\0\0\xc0\x01\x02");
+        assert_eq!(bytes, expected);
+    }
+
+    #[test]
+    fn wrong_fields_are_named() {
+        let good = bytes_of(&field([7, 5], true));
+        for (at, value, part) in [
+            (0, 0u8, "byte 0: the magic is"),
+            (8, 2, "byte 8: the version is 2"),
+            (12, 4, "byte 12: the dimension is 4"),
+            (16, 0, "the shape is [0, 5, 1]"),
+            (19, 255, "the shape is"),
+            (24, 2, "the shape is [7, 5, 2]"),
+            (28, 2, "the flags is 2"),
+            (39, 0x7f, ""),
+            (63, 0xbf, "byte 56: the resolution is -0.05"),
+            (64 + 35 * 4, 9, "a status is 9"),
+            (16, 8, "the file length is 239; the header announces 264"),
+        ] {
+            let mut bytes = good.clone();
+            bytes[at] = value;
+            match EsdfFile::parse(&bytes, "e".as_ref()) {
+                Ok(_) => assert!(part.is_empty(), "{at} {value}"),
+                Err(e) => assert!(e.to_string().contains(part), "{e}"),
+            }
+        }
+        let mut huge = good.clone();
+        huge[16..28].fill(0xff);
+        assert!(EsdfFile::parse(&huge, "e".as_ref()).unwrap_err().to_string().contains("the shape"));
+        assert!(EsdfFile::parse(&good[..80], "e".as_ref()).is_err());
+    }
+
+    #[test]
+    fn what_does_not_fit_is_not_written() {
+        let grid = Grid::new([0.0, 0.0], 0.5, [2, 1]);
+        assert!(write_esdf("never", &grid, &[1.0], None).is_err());
+        assert!(write_esdf("never", &grid, &[1.0, 2.0], Some(&[1])).is_err());
+        assert!(write_esdf("never", &Grid::new([0.0, 0.0], f64::NAN, [1, 1]), &[1.0], None).is_err());
+        assert!(write_esdf("never", &Grid::new([0.0, 0.0], 1.0, [0, 1]), &[], None).is_err());
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        for bytes in bad_bytes(&bytes_of(&field([3, 2, 2], true)), 6, 4000) {
+            let _ = EsdfFile::parse(&bytes, "e".as_ref());
+        }
+    }
+}

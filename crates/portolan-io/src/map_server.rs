@@ -1,0 +1,429 @@
+//! ROS map_server maps: a yaml file that names an image, and the image (`P5`/`P2` grey map).
+//!
+//! A pixel `v` of a map with white `w` has the occupancy `p = (w - v) / w`, or `v / w` with `negate`. Modes:
+//!
+//! | mode | occupied | free | else |
+//! |---|---|---|---|
+//! | `trinary` | `p > occupied_thresh` | `p < free_thresh` | unknown |
+//! | `scale` | the same | the same | unknown, with an occupancy that runs from 0 to 1 between the thresholds |
+//! | `raw` | the same, where `p` is `v` percent | the same | unknown, with `p` where `v` is at most 100 |
+//!
+//! The first row of the image is the top of the map; the grids here have y up.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use portolan::geom::{Grid, Pose};
+
+use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::error::shown;
+use crate::{IoError, Pgm, write_atomic};
+
+/// What a map says about a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MapCell {
+    /// Nothing stands there.
+    Free,
+    /// Something stands there.
+    Occupied,
+    /// Not known, or between the thresholds.
+    Unknown,
+}
+
+/// How pixels become cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapMode {
+    /// Free, occupied, or unknown.
+    Trinary,
+    /// What lies between the thresholds is a probability.
+    Scale,
+    /// A pixel is a percentage.
+    Raw,
+}
+
+/// The settings of a yaml file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapServerInfo {
+    /// The image, as written in the file (relative to it); empty for an image alone.
+    pub image: PathBuf,
+    /// Edge of a pixel (metres).
+    pub resolution: f64,
+    /// Pose of the lower left corner of the lower left pixel: x, y (metres), yaw (radians).
+    pub origin: [f64; 3],
+    /// Whether white means occupied.
+    pub negate: bool,
+    /// More than this is occupied.
+    pub occupied_thresh: f64,
+    /// Less than this is free.
+    pub free_thresh: f64,
+    /// How pixels become cells.
+    pub mode: MapMode,
+}
+
+impl MapServerInfo {
+    /// Settings for an image that has no yaml file: the lower left corner at zero, thresholds 0.65 and 0.15.
+    /// (The usual 0.196 would call the grey 206 free that some tools write for unknown.)
+    pub fn of_image(resolution: f64) -> Self {
+        Self {
+            image: PathBuf::new(),
+            resolution,
+            origin: [0.0; 3],
+            negate: false,
+            occupied_thresh: 0.65,
+            free_thresh: 0.15,
+            mode: MapMode::Trinary,
+        }
+    }
+
+    /// Reads the yaml file alone: `key: value` lines, of which those of map_server count.
+    ///
+    /// # Errors
+    /// [`IoError::Text`] for a value that is not allowed or a missing `image` or `resolution`.
+    pub fn parse(input: Input) -> Result<Self, IoError> {
+        yaml(Lines::of(input))
+    }
+}
+
+/// A map as map_server knows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapServerMap {
+    /// The cells in the map's own frame, whose axes are the image's, y up.
+    pub grid: Grid<2>,
+    /// How much the grid is turned about its origin corner (radians); 0 for nearly all maps.
+    pub yaw: f64,
+    /// One per cell, x fastest, y up.
+    pub cells: Vec<MapCell>,
+    /// Occupancy of each cell from 0 to 1; NaN where unknown.
+    pub occupancy: Vec<f32>,
+    /// How many cells have the grey 205 or 206 that map_saver and others write for unknown, but count as free
+    /// because the file's `free_thresh` is above 0.196 (Nav2's own `depot.yaml` is such a file). They are
+    /// free here as they are for ROS; a careful caller warns.
+    pub unknown_grey_taken_for_free: usize,
+}
+
+impl MapServerMap {
+    /// Reads a yaml file and its image.
+    ///
+    /// # Errors
+    /// [`IoError`] of the yaml file or of the image.
+    pub fn read(yaml: impl AsRef<Path>) -> Result<Self, IoError> {
+        let yaml = yaml.as_ref();
+        let info = MapServerInfo::parse(open(yaml)?)?;
+        let image = Pgm::read(yaml.with_file_name(&info.image))?;
+        Ok(Self::from_image(&image, &info))
+    }
+
+    /// The map of an image with these settings (an image alone: [`MapServerInfo::of_image`]).
+    pub fn from_image(image: &Pgm, info: &MapServerInfo) -> Self {
+        let [x, y, yaw] = info.origin;
+        let grid = Grid::new([x, y], info.resolution, [image.width, image.height]);
+        let table: Vec<_> = (0..=image.max_value).map(|v| cell(v, image.max_value, info)).collect();
+        let rows = image.pixels.chunks(image.width.max(1)).rev();
+        let (cells, occupancy) = rows.flatten().map(|&v| table[usize::from(v)]).unzip();
+        let grey = image.pixels.iter().filter(|v| image.max_value == 255 && matches!(v, 205 | 206));
+        let as_free = |v: &&u16| table[usize::from(**v)].0 == MapCell::Free && info.mode == MapMode::Trinary;
+        let unknown_grey_taken_for_free = grey.filter(as_free).count();
+        Self { grid, yaw, cells, occupancy, unknown_grey_taken_for_free }
+    }
+
+    /// The pose that turns the grid's frame into the world: the identity without yaw.
+    pub fn world_from_grid(&self) -> Pose<2> {
+        let [x, y] = self.grid.lattice.origin;
+        let turned = Pose::<2>::new(0.0, 0.0, self.yaw).rotate([x, y]);
+        Pose::<2>::new(x - turned[0], y - turned[1], self.yaw)
+    }
+}
+
+fn cell(value: u16, white: u16, info: &MapServerInfo) -> (MapCell, f32) {
+    const UNKNOWN: (MapCell, f32) = (MapCell::Unknown, f32::NAN);
+    let shade = f64::from(value) / f64::from(white);
+    let decide = |p: f64| match p {
+        _ if p > info.occupied_thresh => MapCell::Occupied,
+        _ if p < info.free_thresh => MapCell::Free,
+        _ => MapCell::Unknown,
+    };
+    if info.mode == MapMode::Raw {
+        // A percentage is the byte itself; images of other depths are scaled to bytes first.
+        let p = (shade * 255.0).round() / 100.0;
+        return if p <= 1.0 { (decide(p), p as f32) } else { UNKNOWN };
+    }
+    let p = if info.negate { shade } else { 1.0 - shade };
+    match (decide(p), info.mode) {
+        (MapCell::Unknown, MapMode::Scale) => {
+            let scaled = (p - info.free_thresh) / (info.occupied_thresh - info.free_thresh);
+            (MapCell::Unknown, scaled as f32)
+        }
+        (MapCell::Unknown, _) => UNKNOWN,
+        (decided, _) => (decided, p as f32),
+    }
+}
+
+/// Writes a trinary map: the yaml file, and beside it the image under the same name with `.pgm` (254 free,
+/// 205 unknown, 0 occupied, as map_saver writes them).
+///
+/// `cells` has one entry per cell of `grid`, x fastest, y up.
+///
+/// # Errors
+/// [`IoError::Unwritable`] where the lengths differ or the resolution is not positive, else as
+/// [`write_atomic`].
+pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell]) -> Result<(), IoError> {
+    let yaml = yaml.as_ref();
+    let [width, height] = grid.shape;
+    let [x, y] = grid.lattice.origin;
+    let resolution = grid.lattice.resolution;
+    if grid.checked_len() != Some(cells.len()) || cells.is_empty() {
+        let value = format!("{width} x {height} for {} cells", cells.len());
+        return Err(IoError::unwritable(
+            yaml,
+            "the map size",
+            value,
+            "give one value per cell, at least one",
+        ));
+    }
+    if !(resolution > 0.0 && resolution.is_finite() && x.is_finite() && y.is_finite()) {
+        let value = format!("{resolution} at {x} {y}");
+        return Err(IoError::unwritable(yaml, "the resolution", value, "give finite values, above zero"));
+    }
+    let grey = |c: &MapCell| match c {
+        MapCell::Free => 254,
+        MapCell::Unknown => 205,
+        MapCell::Occupied => 0,
+    };
+    let pixels = cells.chunks(width).rev().flatten().map(grey).collect();
+    let image_path = yaml.with_extension("pgm");
+    let name = image_path.file_name().unwrap_or_default().to_string_lossy().replace('\'', "''");
+    if name.chars().any(char::is_control) {
+        return Err(IoError::unwritable(
+            yaml,
+            "the image name",
+            shown(name.as_bytes()),
+            "choose a plain name",
+        ));
+    }
+    Pgm { width, height, max_value: 255, pixels }.write(&image_path)?;
+    write_atomic(yaml, |w| {
+        writeln!(w, "image: '{name}'\nmode: trinary\nresolution: {resolution}\norigin: [{x}, {y}, 0.0]")?;
+        writeln!(w, "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196")
+    })
+}
+
+fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo, IoError> {
+    let path = lines.path().to_owned();
+    let mut info = MapServerInfo { free_thresh: 0.196, ..MapServerInfo::of_image(f64::NAN) };
+    let mut list: Option<Vec<f64>> = None;
+    loop {
+        let number = lines.number() + 1;
+        let Some(line) = lines.next_line()? else { break };
+        let line = String::from_utf8_lossy(without_comment(line)).into_owned();
+        let bad = |field: &str, value: &str, advice: &str| {
+            Err(IoError::text(&path, number, field, shown(value.as_bytes()), advice))
+        };
+        // `origin:` may be followed by a list of `- value` lines.
+        if let (Some(list), Some(item)) = (&mut list, line.trim_start().strip_prefix("- ")) {
+            match parse_f64(item.trim().as_bytes()).filter(|v| v.is_finite()) {
+                Some(value) if list.len() < 3 => list.push(value),
+                _ => return bad("origin", item, "write three finite numbers: x, y, yaw"),
+            }
+            if let [x, y, yaw] = list[..] {
+                info.origin = [x, y, yaw];
+            }
+            continue;
+        }
+        let Some((key, raw)) = line.split_once(':').map(|(key, raw)| (key, raw.trim())) else { continue };
+        let value = unquoted(raw);
+        let number_in =
+            |low: f64, high: f64| parse_f64(value.as_bytes()).filter(|v| (low..=high).contains(v));
+        match unquoted(key.trim()) {
+            "image" if value.is_empty() => return bad("image", value, "name the image file"),
+            // In single quotes a quote is written twice.
+            "image" if raw.starts_with('\'') => info.image = PathBuf::from(value.replace("''", "'")),
+            "image" => info.image = PathBuf::from(value),
+            "resolution" => match number_in(1e-6, 1e6) {
+                Some(v) => info.resolution = v,
+                None => return bad("resolution", value, "write metres per pixel, above zero, like 0.05"),
+            },
+            "origin" if value.is_empty() => list = Some(Vec::new()),
+            "origin" => match origin(value) {
+                Some(v) => info.origin = v,
+                None => return bad("origin", value, "write [x, y, yaw], finite numbers"),
+            },
+            "negate" => match value {
+                "0" | "false" | "False" | "no" => info.negate = false,
+                "1" | "true" | "True" | "yes" => info.negate = true,
+                _ => return bad("negate", value, "write 0 or 1"),
+            },
+            "occupied_thresh" => match number_in(0.0, 1.0) {
+                Some(v) => info.occupied_thresh = v,
+                None => return bad("occupied_thresh", value, "write a number from 0 to 1"),
+            },
+            "free_thresh" => match number_in(0.0, 1.0) {
+                Some(v) => info.free_thresh = v,
+                None => return bad("free_thresh", value, "write a number from 0 to 1"),
+            },
+            "mode" => match value {
+                "trinary" => info.mode = MapMode::Trinary,
+                "scale" => info.mode = MapMode::Scale,
+                "raw" => info.mode = MapMode::Raw,
+                _ => return bad("mode", value, "write trinary, scale or raw"),
+            },
+            _ => {}
+        }
+    }
+    let last = lines.number();
+    let missing = |field, advice| Err(IoError::text(&path, last, field, "missing", advice));
+    if info.image.as_os_str().is_empty() {
+        return missing("image", "add a line `image: map.pgm`");
+    }
+    if info.resolution.is_nan() {
+        return missing("resolution", "add a line `resolution: 0.05` (metres per pixel)");
+    }
+    if list.is_some_and(|l| l.len() != 3) {
+        return missing("origin", "write three numbers: x, y, yaw");
+    }
+    if info.free_thresh > info.occupied_thresh {
+        let value = format!("{} above occupied_thresh {}", info.free_thresh, info.occupied_thresh);
+        return Err(IoError::text(&path, last, "free_thresh", value, "make it the smaller one"));
+    }
+    Ok(info)
+}
+
+/// A `#` at the start of a word starts a comment.
+fn without_comment(line: &[u8]) -> &[u8] {
+    let starts = |i: usize| line[i] == b'#' && (i == 0 || line[i - 1].is_ascii_whitespace());
+    let end = (0..line.len()).find(|&i| starts(i)).unwrap_or(line.len());
+    &line[..end]
+}
+
+fn unquoted(value: &str) -> &str {
+    let inner = |q| value.strip_prefix(q).and_then(|v: &str| v.strip_suffix(q));
+    inner('"').or_else(|| inner('\'')).unwrap_or(value)
+}
+
+fn origin(value: &str) -> Option<[f64; 3]> {
+    let inner = value.strip_prefix('[')?.strip_suffix(']')?;
+    let mut numbers = inner.split(',').map(|w| parse_f64(w.trim().as_bytes()).filter(|v| v.is_finite()));
+    let origin = [numbers.next()??, numbers.next()??, numbers.next()??];
+    numbers.next().is_none().then_some(origin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Random, bad_bytes, real_data};
+    use MapCell::*;
+
+    fn parse(text: impl Into<Vec<u8>>) -> Result<MapServerInfo, IoError> {
+        MapServerInfo::parse(Input::from_reader(std::io::Cursor::new(text.into()), "m.yaml".as_ref())?)
+    }
+
+    const GOOD: &str = "# a map\nimage: \"a b.pgm\" # here\nresolution: 0.050000\norigin: [-7.14, -7.83, 0.5]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\nmode: scale\nother: 1\n";
+
+    #[test]
+    fn yaml_is_understood() {
+        let info = parse(GOOD).unwrap();
+        let expected = MapServerInfo {
+            image: "a b.pgm".into(),
+            resolution: 0.05,
+            origin: [-7.14, -7.83, 0.5],
+            negate: false,
+            occupied_thresh: 0.65,
+            free_thresh: 0.25,
+            mode: MapMode::Scale,
+        };
+        assert_eq!(info, expected);
+        let listed = parse("image: m.pgm\norigin:\n- 1\n  - 2.5\n- -3e0\nresolution: 1\n").unwrap();
+        assert_eq!(
+            (listed.origin, listed.mode, listed.free_thresh),
+            ([1.0, 2.5, -3.0], MapMode::Trinary, 0.196)
+        );
+    }
+
+    #[test]
+    fn errors_name_the_place() {
+        for (text, part) in [
+            ("resolution: 0.05\n", "m.yaml: line 1: image is missing; add a line"),
+            ("image: a\n", "resolution is missing"),
+            ("image: a\nresolution: -1\n", "line 2: resolution is \"-1\"; write metres"),
+            ("resolution: nan\n", "line 1: resolution is \"nan\""),
+            ("origin: [1, 2]\n", "line 1: origin is \"[1, 2]\""),
+            ("negate: 2\n", "negate is \"2\""),
+            ("mode: fast\n", "mode is \"fast\""),
+            ("free_thresh: 7\n", "free_thresh is \"7\""),
+            ("image: a\nresolution: 1\nfree_thresh: 0.9\n", "free_thresh is 0.9 above"),
+            ("image: a\nresolution: 1\norigin:\n- 1\n", "origin is missing"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn pixels_become_cells_from_the_bottom_up() {
+        let image = Pgm { width: 2, height: 2, max_value: 255, pixels: vec![0, 205, 254, 128] };
+        let info = MapServerInfo { origin: [1.0, 2.0, 0.0], ..MapServerInfo::of_image(0.5) };
+        let map = MapServerMap::from_image(&image, &info);
+        assert_eq!(map.cells, [Free, Unknown, Occupied, Unknown]);
+        assert_eq!(map.grid.index_of([1.1, 2.1]), Some(0));
+        assert!(map.occupancy[1].is_nan() && map.occupancy[2] == 1.0);
+        let scale = MapServerInfo { mode: MapMode::Scale, ..info.clone() };
+        let map = MapServerMap::from_image(&image, &scale);
+        let half = ((127.0 / 255.0 - 0.15) / 0.5) as f32;
+        assert!((map.occupancy[1] - half).abs() < 1e-6 && map.cells[1] == Unknown);
+        let raw = MapServerInfo { mode: MapMode::Raw, negate: true, ..info.clone() };
+        let pixels = vec![0, 100, 50, 101];
+        let map = MapServerMap::from_image(&Pgm { pixels, ..image.clone() }, &raw);
+        assert_eq!(map.cells, [Unknown, Unknown, Free, Occupied]);
+        assert!(map.occupancy[0] == 0.5 && map.occupancy[1].is_nan());
+        let negated = MapServerInfo { negate: true, ..info };
+        assert_eq!(MapServerMap::from_image(&image, &negated).cells, [Occupied, Unknown, Free, Occupied]);
+    }
+
+    #[test]
+    fn yaw_turns_about_the_lower_left_corner() {
+        let image = Pgm { width: 1, height: 1, max_value: 1, pixels: vec![0] };
+        let info = MapServerInfo { origin: [3.0, 4.0, 1.0], ..MapServerInfo::of_image(0.5) };
+        let pose = MapServerMap::from_image(&image, &info).world_from_grid();
+        let corner = pose.transform_point([3.0, 4.0]);
+        assert!((corner[0] - 3.0).abs() < 1e-12 && (corner[1] - 4.0).abs() < 1e-12);
+        assert!((pose.theta() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn round_trips() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("it's a map.yaml");
+        let grid = Grid::new([-3.2, 1.0e6], 0.05, [5, 3]);
+        let mut random = Random(2);
+        let cells: Vec<_> = (0..15).map(|_| [Free, Occupied, Unknown][random.below(3)]).collect();
+        write_map_server(&path, &grid, &cells).unwrap();
+        let map = MapServerMap::read(&path).unwrap();
+        assert_eq!((map.grid, map.cells, map.yaw), (grid, cells, 0.0));
+        assert!(write_map_server(&path, &grid, &[]).is_err());
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        for bytes in bad_bytes(GOOD.as_bytes(), 11, 3000) {
+            let _ = parse(bytes);
+        }
+    }
+
+    #[test]
+    fn real_maps_are_read() {
+        for (name, shape, resolution) in [("depot", [604, 307], 0.05), ("map", [384, 384], 0.05)] {
+            let Some(path) = real_data(&format!("maps_2d/{name}.yaml")) else { continue };
+            let map = MapServerMap::read(path).unwrap();
+            assert_eq!((map.grid.shape, map.grid.lattice.resolution), (shape, resolution));
+            for kind in [Free, Occupied] {
+                assert!(map.cells.iter().filter(|c| **c == kind).count() > 500, "{name} {kind:?}");
+            }
+        }
+        if let Some(path) = real_data("maps_2d/depot.yaml") {
+            assert_eq!(MapServerMap::read(path).unwrap().unknown_grey_taken_for_free, 8894);
+        }
+        let Some(path) = real_data("maps_2d/willow-full.pgm") else { return };
+        let map = MapServerMap::from_image(&Pgm::read(path).unwrap(), &MapServerInfo::of_image(0.1));
+        let share = |kind| map.cells.iter().filter(|c| **c == kind).count() as f64 / map.cells.len() as f64;
+        assert!(share(Unknown) > 0.2 && share(Free) > 0.2 && share(Occupied) > 0.01);
+    }
+}

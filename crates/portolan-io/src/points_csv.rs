@@ -1,0 +1,242 @@
+//! Points to ask at, and rows of answers, as CSV.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::IoError;
+use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::error::shown;
+
+/// The most points of a file.
+const MOST_POINTS: usize = 1 << 25;
+
+/// Query points (metres); the file tells whether they lie in the plane or in space.
+#[derive(Clone, Debug, PartialEq)]
+pub enum QueryPoints {
+    /// `x,y`
+    Two(Vec<[f64; 2]>),
+    /// `x,y,z`
+    Three(Vec<[f64; 3]>),
+}
+
+impl QueryPoints {
+    /// Reads a file: `x,y` or `x,y,z` per line, in metres; `#` starts a comment, blank lines are ignored, a
+    /// first line `x,y` or `x,y,z` in letters is a header.
+    ///
+    /// # Errors
+    /// [`IoError::Text`] with line, field and value.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        Self::parse(open(path)?)
+    }
+
+    /// [`QueryPoints::read`] from any input (standard input).
+    ///
+    /// # Errors
+    /// As [`QueryPoints::read`].
+    pub fn parse(input: Input) -> Result<Self, IoError> {
+        let mut lines = Lines::of(input);
+        let path = lines.path().to_owned();
+        let (mut two, mut three) = (Vec::new(), Vec::new());
+        let mut columns = None;
+        loop {
+            let number = lines.number() + 1;
+            let Some(line) = lines.next_line()? else { break };
+            let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
+            // A byte order mark, as spreadsheets write it.
+            let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii();
+            if content.is_empty() {
+                continue;
+            }
+            let (first, words) = (columns.is_none(), content.split(|b| *b == b',').map(<[u8]>::trim_ascii));
+            let count = words.clone().take(9).count();
+            if !(2..=3).contains(&count) || columns.is_some_and(|c| c != count) {
+                let expected = columns.map_or("2 (x,y) or 3 (x,y,z)".to_owned(), |c| format!("{c} as above"));
+                let advice = format!("write {expected}, separated by commas");
+                return Err(IoError::text(&path, number, "the number of fields", count.to_string(), advice));
+            }
+            columns = Some(count);
+            let mut names = words.clone().zip([b"x", b"y", b"z"]);
+            if first && names.all(|(w, name)| w.eq_ignore_ascii_case(name)) {
+                continue;
+            }
+            let mut p = [0.0; 3];
+            for ((value, word), name) in p.iter_mut().zip(words).zip(["x", "y", "z"]) {
+                *value = parse_f64(word).filter(|v| v.is_finite()).ok_or_else(|| {
+                    IoError::text(&path, number, name, shown(word), "write a finite number (metres)")
+                })?;
+            }
+            match count {
+                2 => two.push([p[0], p[1]]),
+                _ => three.push(p),
+            }
+            if two.len().max(three.len()) > MOST_POINTS {
+                let value = format!("more than {MOST_POINTS}");
+                return Err(IoError::text(&path, number, "the number of points", value, "split the file"));
+            }
+        }
+        match (two.len(), three.len()) {
+            (0, 0) => {
+                let advice = "write one point per line: x,y";
+                Err(IoError::text(&path, lines.number(), "the number of points", "0", advice))
+            }
+            (_, 0) => Ok(Self::Two(two)),
+            _ => Ok(Self::Three(three)),
+        }
+    }
+
+    /// Number of points, at least one.
+    #[allow(clippy::len_without_is_empty)] // a file without points is an error
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Two(points) => points.len(),
+            Self::Three(points) => points.len(),
+        }
+    }
+}
+
+/// What a row says about its distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnswerStatus {
+    /// The distance is known.
+    Known,
+    /// The map does not know.
+    Unknown,
+    /// At least so far.
+    Saturated,
+    /// Outside of the map.
+    Outside,
+}
+
+impl AnswerStatus {
+    /// The word in the file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Known => "known",
+            Self::Unknown => "unknown",
+            Self::Saturated => "saturated",
+            Self::Outside => "outside",
+        }
+    }
+}
+
+/// One row of answers; `None` becomes an empty field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnswerRow<const D: usize> {
+    /// The query point (metres).
+    pub point: [f64; D],
+    /// What is known about the distance.
+    pub status: AnswerStatus,
+    /// Probability of being occupied.
+    pub occupancy: Option<f64>,
+    /// Signed distance (metres).
+    pub distance: Option<f64>,
+    /// Certified lower bound (metres).
+    pub lower: Option<f64>,
+    /// Certified upper bound (metres).
+    pub upper: Option<f64>,
+    /// Gradient of the distance.
+    pub gradient: Option<[f64; D]>,
+}
+
+/// Writes the header line of [`write_answer`]'s rows.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_answer_header<const D: usize>(w: &mut impl Write) -> io::Result<()> {
+    let (z, gz) = if D == 3 { (",z", ",gz") } else { ("", "") };
+    writeln!(w, "x,y{z},status,occupancy,distance,lower,upper,gx,gy{gz}")
+}
+
+/// Writes one row: `x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz]`. Numbers are written so that
+/// reading gives the same double.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_answer<const D: usize>(w: &mut impl Write, row: &AnswerRow<D>) -> io::Result<()> {
+    for (k, v) in row.point.iter().enumerate() {
+        write!(w, "{}{v}", if k == 0 { "" } else { "," })?;
+    }
+    write!(w, ",{}", row.status.word())?;
+    let gradient = (0..D).map(|k| row.gradient.map(|g| g[k]));
+    for field in [row.occupancy, row.distance, row.lower, row.upper].into_iter().chain(gradient) {
+        match field {
+            Some(v) => write!(w, ",{v}")?,
+            None => write!(w, ",")?,
+        }
+    }
+    writeln!(w)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::bad_bytes;
+
+    fn parse(text: impl Into<Vec<u8>>) -> Result<QueryPoints, IoError> {
+        QueryPoints::parse(Input::from_reader(io::Cursor::new(text.into()), "q.csv".as_ref())?)
+    }
+
+    #[test]
+    fn points_with_and_without_header() {
+        let two = QueryPoints::Two(vec![[1.0, -2.5], [3.0, 4e3]]);
+        assert_eq!(parse("1,-2.5\n3,4e3").unwrap(), two);
+        assert_eq!(parse("\u{feff}X, y\r\n\r\n# c\r\n 1 , -2.5 # here\r\n3,4e3\r\n").unwrap(), two);
+        assert_eq!(parse("x,y,z\n1,2,3\n").unwrap(), QueryPoints::Three(vec![[1.0, 2.0, 3.0]]));
+    }
+
+    #[test]
+    fn errors_name_line_field_and_value() {
+        for (text, part) in [
+            ("1,2\n3,abc\n", "q.csv: line 2: y is \"abc\"; write a finite number"),
+            ("1,2\n3\n", "line 2: the number of fields is 1; write 2 as above"),
+            ("1 2\n", "line 1: the number of fields is 1; write 2 (x,y) or 3"),
+            ("1,2,3,4\n", "the number of fields is 4"),
+            ("x,y\n1,2,3\n", "line 2: the number of fields is 3"),
+            ("1,\n", "line 1: y is missing"),
+            ("nan,1\n", "x is \"nan\""),
+            ("lon,lat\n1,2\n", "x is \"lon\""),
+            ("1,2\nx,y\n", "line 2: x is \"x\""),
+            ("# none\n", "the number of points is 0"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn missing_answers_are_empty_fields() {
+        let mut out = Vec::new();
+        write_answer_header::<2>(&mut out).unwrap();
+        let row = AnswerRow {
+            point: [0.1, 2.0],
+            status: AnswerStatus::Known,
+            occupancy: Some(0.25),
+            distance: Some(-1.5),
+            lower: Some(-1.6),
+            upper: None,
+            gradient: Some([0.0, 1.0]),
+        };
+        write_answer(&mut out, &row).unwrap();
+        let none = AnswerRow {
+            point: [1.0, 2.0, 3.0],
+            status: AnswerStatus::Outside,
+            occupancy: None,
+            distance: None,
+            lower: None,
+            upper: None,
+            gradient: None,
+        };
+        write_answer_header::<3>(&mut out).unwrap();
+        write_answer(&mut out, &none).unwrap();
+        let expected = "x,y,status,occupancy,distance,lower,upper,gx,gy\n0.1,2,known,0.25,-1.5,-1.6,,0,1\n\
+                        x,y,z,status,occupancy,distance,lower,upper,gx,gy,gz\n1,2,3,outside,,,,,,,\n";
+        assert_eq!(String::from_utf8(out).unwrap(), expected);
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        for bytes in bad_bytes(b"x,y\n1,2\n# c\n3.5,-4e1\n", 13, 3000) {
+            let _ = parse(bytes);
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Pose files beside a log: one pose per scan, in order.
+//!
+//! | columns | meaning |
+//! |---|---|
+//! | 3 | `x y theta` |
+//! | 4 | `t x y theta` |
+//! | 8 | `t tx ty tz qx qy qz qw` (TUM); must lie in the plane, `tz` is ignored |
+//!
+//! Separated by spaces, tabs or commas; `#` starts a comment; a comma at the end of a line is tolerated.
+
+use std::path::Path;
+
+use portolan::geom::Pose;
+
+use crate::IoError;
+use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::error::shown;
+
+/// The most poses of a file.
+const MOST_POSES: usize = 1 << 23;
+
+/// How far a rotation of a planar robot may tilt (sine of the angle).
+const MOST_TILT: f64 = 0.1;
+
+/// A pose of a pose file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedPose<const D: usize> {
+    /// The stamp (seconds of the file's clock), if the file has stamps.
+    pub time: Option<f64>,
+    /// The pose, `world_from_sensor`.
+    pub pose: Pose<D>,
+}
+
+/// Reads the poses of a planar sensor.
+///
+/// # Errors
+/// [`IoError::Text`] for a line that is no pose, for lines with different numbers of columns, for poses that
+/// are not finite or not planar, and for a file without poses.
+pub fn read_poses_2d(path: impl AsRef<Path>) -> Result<Vec<TimedPose<2>>, IoError> {
+    parse_poses_2d(open(path)?)
+}
+
+/// [`read_poses_2d`] from any input.
+///
+/// # Errors
+/// As [`read_poses_2d`].
+pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>, IoError> {
+    let mut lines = Lines::of(input);
+    let path = lines.path().to_owned();
+    let mut poses = Vec::new();
+    let mut columns = None;
+    loop {
+        let number = lines.number() + 1;
+        let Some(line) = lines.next_line()? else { break };
+        let (values, count) = numbers(line, number, &path)?;
+        let values = &values[..count];
+        if values.is_empty() {
+            continue;
+        }
+        if *columns.get_or_insert(count) != count {
+            let advice = "give every line the same columns";
+            return Err(IoError::text(&path, number, "the number of columns", count.to_string(), advice));
+        }
+        let pose = match *values {
+            [x, y, theta] => TimedPose { time: None, pose: Pose::<2>::new(x, y, theta) },
+            [t, x, y, theta] => TimedPose { time: Some(t), pose: Pose::<2>::new(x, y, theta) },
+            [t, x, y, _, qx, qy, qz, qw] => {
+                let pose = planar(x, y, [qx, qy, qz, qw]).map_err(|advice| {
+                    IoError::text(&path, number, "the quaternion", format!("{qx} {qy} {qz} {qw}"), advice)
+                })?;
+                TimedPose { time: Some(t), pose }
+            }
+            _ => {
+                let advice = "write 3 (x y theta), 4 (t x y theta) or 8 (t tx ty tz qx qy qz qw)";
+                return Err(IoError::text(&path, number, "the number of columns", count.to_string(), advice));
+            }
+        };
+        if poses.len() == MOST_POSES {
+            let value = format!("more than {MOST_POSES}");
+            return Err(IoError::text(&path, number, "the number of poses", value, "split the file"));
+        }
+        poses.push(pose);
+    }
+    if poses.is_empty() {
+        let advice = "write one pose per line: x y theta";
+        return Err(IoError::text(&path, lines.number(), "the number of poses", "0", advice));
+    }
+    Ok(poses)
+}
+
+/// The finite numbers of a line, at most nine of them.
+fn numbers(line: &[u8], number: u64, path: &Path) -> Result<([f64; 9], usize), IoError> {
+    let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
+    let words = content.split(|b| b.is_ascii_whitespace() || *b == b',').filter(|w| !w.is_empty());
+    let (mut values, mut count) = ([0.0; 9], 0);
+    for word in words.take(9) {
+        values[count] = parse_f64(word).filter(|v| v.is_finite()).ok_or_else(|| {
+            let field = format!("column {}", count + 1);
+            IoError::text(path, number, field, shown(word), "write a finite number")
+        })?;
+        count += 1;
+    }
+    Ok((values, count))
+}
+
+fn planar(x: f64, y: f64, xyzw: [f64; 4]) -> Result<Pose<2>, &'static str> {
+    let pose = Pose::<3>::from_quaternion([x, y, 0.0], xyzw).ok_or("write a quaternion that is not zero")?;
+    let r = pose.rotation;
+    let tilt = r[2][0].hypot(r[2][1]);
+    if tilt > MOST_TILT || r[2][2] < 0.0 {
+        return Err("a planar log needs poses that turn about z only");
+    }
+    let theta = (r[1][0] - r[0][1]).atan2(r[0][0] + r[1][1]);
+    Ok(Pose::<2>::new(x, y, theta))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::bad_bytes;
+
+    fn parse(text: impl Into<Vec<u8>>) -> Result<Vec<TimedPose<2>>, IoError> {
+        parse_poses_2d(Input::from_reader(std::io::Cursor::new(text.into()), "p.txt".as_ref())?)
+    }
+
+    #[test]
+    fn the_three_layouts() {
+        let expected = Pose::<2>::new(1.0, -2.0, 0.5);
+        let three = parse("# x y theta\n1 -2 0.5\n\n1,-2,0.5,\n").unwrap();
+        assert_eq!(three, [TimedPose { time: None, pose: expected }; 2]);
+        assert_eq!(parse("7.5, 1, -2, 0.5 # here").unwrap(), [TimedPose { time: Some(7.5), pose: expected }]);
+        let tum = parse(format!("3 1 -2 9 0 0 {} {}", 0.25f64.sin(), 0.25f64.cos())).unwrap();
+        assert!((tum[0].pose.theta() - 0.5).abs() < 1e-12 && tum[0].time == Some(3.0));
+    }
+
+    #[test]
+    fn errors_name_the_place() {
+        for (text, part) in [
+            ("1 2 3\n1 2\n", "p.txt: line 2: the number of columns is 2; give every line"),
+            ("1 2\n", "line 1: the number of columns is 2; write 3"),
+            ("1 2 nan\n", "line 1: column 3 is \"nan\"; write a finite number"),
+            ("1 2 3 4 5 6 7 8 9 10\n", "line 1: the number of columns is 9"),
+            ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion is 0 0 0 0; write"),
+            ("0 0 0 0 0.5 0.5 0.5 0.5\n", "turn about z only"),
+            ("# nothing\n", "the number of poses is 0"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        for bytes in bad_bytes(b"1 2 3 # c\n4 5 6\n7,8,9,\n", 5, 3000) {
+            let _ = parse(bytes);
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Helpers of the tests: random numbers, bad bytes, the folder of real data.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// SplitMix64 *(Steele, Lea, Flood 2014)*.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number below `n`.
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        (self.next() % n.max(1) as u64) as usize
+    }
+
+    /// Uniform in `[0, 1)`.
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Variants of a good file that no reader may panic on or hang at: cut, with flipped, inserted and removed
+/// bytes, with large lengths, and plain noise.
+pub(crate) fn bad_bytes(good: &[u8], seed: u64, count: usize) -> Vec<Vec<u8>> {
+    let mut random = Random(seed);
+    let mut all = vec![Vec::new(), vec![0; 300], vec![0xff; 300]];
+    for cut in 0..good.len().min(200) {
+        all.push(good[..cut].to_vec());
+    }
+    for k in 0..count {
+        let mut bytes = good.to_vec();
+        for _ in 0..1 + random.below(4) {
+            let at = random.below(bytes.len());
+            match k % 6 {
+                _ if bytes.is_empty() => {}
+                0 => bytes.truncate(at),
+                1 => bytes[at] ^= 1 << random.below(8),
+                2 => bytes.insert(at, random.next() as u8),
+                3 => drop(bytes.remove(at)),
+                4 => {
+                    let end = (at + 8).min(bytes.len());
+                    bytes[at..end].fill([0xff, 0x7f, 0x00, b'9'][random.below(4)]);
+                }
+                _ => bytes = (0..random.below(400)).map(|_| random.next() as u8).collect(),
+            }
+        }
+        all.push(bytes);
+    }
+    all
+}
+
+/// A file of the real data, or `None` with a loud line where it is not there.
+pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("PORTOLAN_DATA").map(PathBuf::from);
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let path = folder.unwrap_or_else(beside).join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    // Not `eprintln!`, which the test harness swallows: a skipped test must be seen.
+    let shown = path.display();
+    writeln!(
+        std::io::stderr(),
+        "SKIPPED: {shown} is not there (set PORTOLAN_DATA to the folder of real data)"
+    )
+    .unwrap();
+    None
+}
