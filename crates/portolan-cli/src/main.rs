@@ -1,2 +1,33 @@
-//! The `portolan` command line.
-fn main() {}
+//! The portolan command line.
+//!
+//! Exit status: 0 done; 1 the input was bad (one line on stderr says where and what to do); 2 the call was bad.
+
+mod arguments;
+mod commands;
+mod error;
+mod json;
+mod log;
+mod mapping;
+mod output;
+mod picture;
+mod progress;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Maps from range scans with known poses: occupancy grid, quadtree, signed distance fields, contour.
+#[derive(Parser)]
+#[command(name = "portolan", version, propagate_version = true, max_term_width = 100)]
+#[command(after_help = "Example:\n  portolan map intel.log.gz --resolution 0.05 --out intel")]
+struct Cli {
+    #[command(subcommand)]
+    command: commands::Command,
+}
+
+fn main() -> ExitCode {
+    match Cli::parse().command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => error::report(&error),
+    }
+}
