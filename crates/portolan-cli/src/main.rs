@@ -1,25 +1,34 @@
 //! The portolan command line.
+//!
+//! Exit status: 0 done; 1 the input was bad (one line on stderr says where and what to do); 2 the call was bad.
 
-use clap::{Parser, Subcommand};
-
+mod arguments;
 mod commands;
+mod error;
+mod json;
+mod log;
+mod mapping;
+mod output;
+mod picture;
+mod pictures;
+mod progress;
 
-/// Fuses range scans into maps and asks them questions.
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Maps from range scans with known poses: occupancy grid, quadtree, signed distance fields, contour.
 #[derive(Parser)]
-#[command(version)]
+#[command(name = "portolan", version, propagate_version = true, max_term_width = 100)]
+#[command(after_help = "Example:\n  portolan map intel.log.gz --resolution 0.05 --out intel")]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: commands::Command,
 }
 
-#[derive(Subcommand)]
-enum Command {
-    /// The differentiable renderer on a line: rays, a fit, and how it goes wrong.
-    Radiance(commands::radiance::Args),
-}
-
-fn main() -> anyhow::Result<()> {
-    match Cli::parse().command {
-        Command::Radiance(args) => commands::radiance::run(&args),
+fn main() -> ExitCode {
+    match Cli::parse().command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => error::report(&error),
     }
 }

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | CARMEN log (plain, gzip, bzip2) | [`CarmenLog`], [`detect_no_return`] | |
 //! | pose files (`x y theta`, `t x y theta`, TUM) | [`read_poses_2d`] | |
-//! | `map.portolan` | [`Container`] | [`ContainerWriter`] |
+//! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
@@ -26,6 +26,7 @@ mod detect;
 mod error;
 mod esdf_bin;
 mod geojson;
+mod map_file;
 mod map_server;
 mod pgm;
 mod points_csv;
@@ -44,6 +45,7 @@ pub use detect::{FileKind, detect};
 pub use error::IoError;
 pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
 pub use geojson::{parse_geojson, read_geojson, write_geojson};
+pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use pgm::Pgm;
 pub use points_csv::{AnswerRow, AnswerStatus, QueryPoints, write_answer, write_answer_header};

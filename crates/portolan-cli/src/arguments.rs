@@ -1,0 +1,114 @@
+//! Values on the command line: read, checked, refused with a reason (clap then exits with status 2).
+
+use portolan::geom::Aabb;
+
+fn number(text: &str) -> Result<f64, String> {
+    text.trim().parse::<f64>().map_err(|_| "not a number".to_owned())
+}
+
+/// A length above zero.
+pub(crate) fn length(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        v if v > 0.0 && v.is_finite() => Ok(v),
+        _ => Err("must be a positive, finite length in metres, like 0.05".to_owned()),
+    }
+}
+
+/// A length of zero or more.
+pub(crate) fn length_or_zero(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        v if v >= 0.0 && v.is_finite() => Ok(v),
+        _ => Err("must be a finite length in metres, not negative".to_owned()),
+    }
+}
+
+/// A weight above zero; `inf` is one.
+pub(crate) fn weight(text: &str) -> Result<f32, String> {
+    match number(text)? as f32 {
+        v if v > 0.0 => Ok(v),
+        _ => Err("must be a positive number, or inf to never forget".to_owned()),
+    }
+}
+
+/// A weight of zero or more.
+pub(crate) fn weight_or_zero(text: &str) -> Result<f32, String> {
+    match number(text)? as f32 {
+        v if v >= 0.0 && v.is_finite() => Ok(v),
+        _ => Err("must be a finite number, not negative".to_owned()),
+    }
+}
+
+/// `x0,y0,x1,y1` in metres.
+pub(crate) fn bounds(text: &str) -> Result<Aabb<2>, String> {
+    let values = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    let [x0, y0, x1, y1] = values[..] else {
+        return Err("must be four numbers x0,y0,x1,y1 in metres".to_owned());
+    };
+    if !(values.iter().all(|v| v.is_finite()) && x0 < x1 && y0 < y1) {
+        return Err("must have finite corners with x0 < x1 and y0 < y1".to_owned());
+    }
+    Ok(Aabb::new([x0, y0], [x1, y1]))
+}
+
+/// Bytes, with an optional suffix K, M, G or T (powers of 1024).
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let split = text.len() - text.chars().last().map_or(0, |c| if c.is_ascii_alphabetic() { 1 } else { 0 });
+    let (digits, suffix) = text.split_at(split);
+    let factor = match suffix.to_ascii_uppercase().as_str() {
+        "" => 1.0,
+        "K" => 1024f64,
+        "M" => 1024f64.powi(2),
+        "G" => 1024f64.powi(3),
+        "T" => 1024f64.powi(4),
+        _ => return Err("must be a number of bytes, like 512M or 4G".to_owned()),
+    };
+    match number(digits).map(|v| v * factor) {
+        Ok(v) if v >= 1.0 && v < 1e18 => Ok(v as u64),
+        _ => Err("must be a number of bytes, like 512M or 4G".to_owned()),
+    }
+}
+
+/// Bytes for people.
+pub(crate) fn shown_bytes(bytes: f64) -> String {
+    const UNITS: [&str; 6] = ["B", "kB", "MB", "GB", "TB", "PB"];
+    let (mut value, mut unit) = (bytes, 0);
+    while value >= 1000.0 && unit + 1 < UNITS.len() {
+        value /= 1000.0;
+        unit += 1;
+    }
+    let digits = if unit == 0 || value >= 100.0 { 0 } else if value >= 10.0 { 1 } else { 2 };
+    format!("{value:.digits$} {}", UNITS[unit])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        for bad in ["-1", "0", "nan", "inf", "five", ""] {
+            assert!(length(bad).is_err(), "{bad}");
+        }
+        assert_eq!(length("0.05"), Ok(0.05));
+        assert!(length_or_zero("0").is_ok() && length_or_zero("-0.1").is_err());
+        assert!(weight("inf").is_ok() && weight("nan").is_err() && weight("0").is_err());
+    }
+
+    #[test]
+    fn boxes_and_bytes() {
+        assert_eq!(bounds("-1,-2,3,4.5"), Ok(Aabb::new([-1.0, -2.0], [3.0, 4.5])));
+        for bad in ["1,2,3", "1,2,1,3", "1,2,nan,3", "a,b,c,d"] {
+            assert!(bounds(bad).is_err(), "{bad}");
+        }
+        assert_eq!(bytes("4G"), Ok(4 << 30));
+        assert_eq!(bytes("1.5k"), Ok(1536));
+        assert_eq!(bytes("1000"), Ok(1000));
+        for bad in ["", "G", "-1", "4X", "nanM", "1e40"] {
+            assert!(bytes(bad).is_err(), "{bad}");
+        }
+        assert_eq!(shown_bytes(999.0), "999 B");
+        assert_eq!(shown_bytes(4_650_000.0), "4.65 MB");
+        assert_eq!(shown_bytes(173_000.0), "173 kB");
+    }
+}

@@ -1,0 +1,77 @@
+//! Library values as JSON.
+
+use portolan::geom::{Aabb, Grid};
+use portolan::scan::ScanStats;
+use portolan_io::CarmenStats;
+use serde_json::{Map, Value, json};
+
+/// An object of these fields.
+pub(crate) fn object(value: Value) -> Map<String, Value> {
+    match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+/// What became of scans and beams.
+pub(crate) fn stats(stats: &ScanStats) -> Value {
+    let (b, r) = (&stats.beams, &stats.refused);
+    json!({
+        "scans": stats.scans,
+        "refused_poses": stats.refused_poses,
+        "beams": {
+            "total": b.total(), "hit": b.hit, "max_range": b.max_range, "no_return": b.no_return,
+            "dropped": b.dropped, "self_hit": b.self_hit, "hits_outside": stats.hits_outside,
+        },
+        "refused_beams": {
+            "total": r.total(), "not_finite": r.not_finite, "negative": r.negative, "too_near": r.too_near,
+        },
+    })
+}
+
+/// Adds the numbers of `other` to those of `sum`, field by field.
+pub(crate) fn add_counts(sum: &mut Map<String, Value>, other: &Map<String, Value>) {
+    for (key, value) in other {
+        match (sum.get_mut(key), value) {
+            (Some(Value::Object(a)), Value::Object(b)) => add_counts(a, b),
+            (Some(a), b) if a.is_u64() && b.is_u64() => {
+                *a = json!(a.as_u64().unwrap_or(0).saturating_add(b.as_u64().unwrap_or(0)));
+            }
+            _ => {
+                sum.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+/// What else was found in a log.
+pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
+    let by_cause: Map<_, _> =
+        stats.refused.by_fault.iter().map(|(fault, n)| (fault.to_string(), json!(n))).collect();
+    json!({
+        "lines": stats.lines,
+        "message": stats.message.word(),
+        "skipped_scans": stats.skipped_scans,
+        "refused_scans": {
+            "total": stats.refused.total(),
+            "by_cause": by_cause,
+            "first": stats.refused.first.as_ref().map(ToString::to_string),
+        },
+        "other_messages": stats.other_messages,
+        "declared_max_range": stats.declared_max_range,
+        "times": format!("{:?}", stats.times).to_lowercase(),
+    })
+}
+
+/// A box in metres.
+pub(crate) fn aabb<const D: usize>(b: &Aabb<D>) -> Value {
+    json!({ "min": b.min.to_vec(), "max": b.max.to_vec(), "size": b.extent().to_vec() })
+}
+
+/// A grid: its box, shape and resolution.
+pub(crate) fn grid<const D: usize>(g: &Grid<D>) -> Value {
+    let mut value = aabb(&g.aabb());
+    value["cells"] = json!(g.shape.to_vec());
+    value["resolution"] = json!(g.lattice.resolution);
+    value
+}

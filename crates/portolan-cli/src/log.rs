@@ -1,0 +1,151 @@
+//! A log as the command line sees it: read, given other poses, its readings made beams.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use portolan::geom::Pose;
+use portolan::geom::vector::distance;
+use portolan::scan::{RangeLimits, Scan};
+use portolan_io::{CarmenLog, FileKind, detect, detect_no_return, read_poses_2d};
+
+use crate::arguments::{length, length_or_zero};
+
+/// Kinds of logs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum LogFormat {
+    /// CARMEN text logs (.log, .clf; plain, gzip, bzip2)
+    Carmen,
+}
+
+/// Which log, with which poses.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct LogArgs {
+    /// Poses of the sensor, one per scan, instead of the log's own: x y theta, t x y theta, or TUM
+    #[arg(long, value_name = "FILE")]
+    pub(crate) poses: Option<PathBuf>,
+    /// Kind of LOG, where it is not recognised
+    #[arg(long)]
+    pub(crate) format: Option<LogFormat>,
+}
+
+/// How readings become beams.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub(crate) struct LimitArgs {
+    /// Readings up to this are refused (metres)
+    #[arg(long, value_name = "M", value_parser = length_or_zero)]
+    pub(crate) min_range: Option<f64>,
+    /// Returns beyond this are not surfaces; space up to here is free (metres)
+    #[arg(long, value_name = "M", value_parser = length)]
+    pub(crate) max_range: Option<f64>,
+    /// Readings from this on mean "no echo" (metres); default: what the log's readings tell
+    #[arg(long, value_name = "M", value_parser = length)]
+    pub(crate) no_return: Option<f64>,
+    /// What is known to be free along a beam without echo (metres); default 0: nothing
+    #[arg(long, value_name = "M", value_parser = length_or_zero)]
+    pub(crate) no_return_free: Option<f64>,
+}
+
+impl LimitArgs {
+    /// The limits for a log; what was not given is found out or left open.
+    pub(crate) fn limits(&self, log: &CarmenLog) -> RangeLimits {
+        let open = RangeLimits::default();
+        RangeLimits {
+            min: self.min_range.unwrap_or(open.min),
+            max: self.max_range.unwrap_or(open.max),
+            no_return: self.no_return.or_else(|| detect_no_return(log)).unwrap_or(open.no_return),
+            no_return_free: self.no_return_free.unwrap_or(open.no_return_free),
+        }
+    }
+}
+
+/// Reads a log.
+pub(crate) fn read(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> {
+    if args.format.is_none() {
+        match detect(path)? {
+            FileKind::CarmenLog => {}
+            // The reader's own error says what a folder is.
+            FileKind::Unknown(_) | FileKind::PortolanFolder if path.is_dir() => {}
+            FileKind::Unknown(what) => {
+                bail!("{}: not a log: {what}; or force it with --format carmen", path.display())
+            }
+            kind => bail!("{}: is {}, not a log; give a CARMEN log", path.display(), describe(&kind)),
+        }
+    }
+    let log = CarmenLog::read(path)?;
+    let Some(file) = &args.poses else { return Ok(log) };
+    let poses: Vec<_> = read_poses_2d(file)?.iter().map(|p| p.pose).collect();
+    if poses.len() != log.len() {
+        let (poses, scans) = (poses.len(), log.len());
+        bail!(
+            "{}: the number of poses is {poses}; give one for each of the {scans} scans of {}",
+            file.display(),
+            path.display()
+        );
+    }
+    Ok(log.with_poses(&poses)?)
+}
+
+/// What a file is, in words.
+pub(crate) fn describe(kind: &FileKind) -> String {
+    match kind {
+        FileKind::CarmenLog => "a CARMEN log".into(),
+        FileKind::Portolan => "a portolan map".into(),
+        FileKind::PortolanFolder => "a folder with a portolan map".into(),
+        FileKind::EsdfBin => "a distance field (esdf.bin)".into(),
+        FileKind::Pgm => "a PGM image".into(),
+        FileKind::MapServerYaml => "a map_server map".into(),
+        FileKind::GeoJson => "GeoJSON".into(),
+        FileKind::Svg => "an SVG picture".into(),
+        FileKind::OctomapBt | FileKind::OctomapOt => "an OctoMap tree".into(),
+        FileKind::Unknown(what) => what.clone(),
+        _ => "a file of another kind".into(),
+    }
+}
+
+/// Scans of a log: which are fused and which are left out for evaluation.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Selection {
+    /// Only every so many-th scan of the log.
+    pub(crate) every: Option<u64>,
+    /// Of these, every so many-th is left out.
+    pub(crate) hold_out: Option<u64>,
+}
+
+impl Selection {
+    /// Indices of the scans to fuse and of those held out.
+    pub(crate) fn split(&self, scans: usize) -> (Vec<usize>, Vec<usize>) {
+        let every = self.every.unwrap_or(1).max(1) as usize;
+        let taken = (0..scans).step_by(every).enumerate();
+        let (mut fused, mut held_out) = (Vec::new(), Vec::new());
+        for (nth, i) in taken {
+            // The last of each group, so that the first scan of a log is always fused.
+            let out = self.hold_out.is_some_and(|n| (nth as u64 + 1).is_multiple_of(n.max(1)));
+            if out { held_out.push(i) } else { fused.push(i) }
+        }
+        (fused, held_out)
+    }
+}
+
+/// These scans of the log, with their poses.
+pub(crate) fn scans(log: &CarmenLog, indices: &[usize], limits: &RangeLimits) -> Vec<(Pose<2>, Scan<2>)> {
+    indices.iter().map(|&i| (log.raw(i).world_from_laser, log.raw(i).to_scan(limits))).collect()
+}
+
+/// Length of the sensor's way over all scans (metres).
+pub(crate) fn path_length(log: &CarmenLog) -> f64 {
+    let at = |i: usize| log.raw(i).world_from_laser.translation;
+    (1..log.len()).map(|i| distance(at(i - 1), at(i))).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_tenth_is_held_out() {
+        let all = Selection::default();
+        assert_eq!(all.split(3), (vec![0, 1, 2], vec![]));
+        let some = Selection { every: Some(2), hold_out: Some(3) };
+        assert_eq!(some.split(12), (vec![0, 2, 6, 8], vec![4, 10]));
+    }
+}

@@ -1,0 +1,143 @@
+//! How large a map must be, and whether there is memory for it.
+
+use anyhow::bail;
+use portolan::geom::vector::{along, distance};
+use portolan::geom::{Aabb, Grid, Pose};
+use portolan::scan::Scan;
+
+use super::{MapKind, Settings};
+use crate::arguments::shown_bytes;
+
+/// Cells around everything that was seen, besides the truncation.
+const MARGIN_CELLS: f64 = 4.0;
+/// The largest cell index that is computed with (of 2^53 that an f64 tells apart).
+const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
+
+/// Box of everything that the scans saw, free ends of beams and the sensor included.
+pub(crate) fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
+    let mut bounds = Aabb::EMPTY;
+    for (world_from_sensor, scan) in scans {
+        bounds.include(world_from_sensor.translation);
+        for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
+            let direction = world_from_sensor.rotate(beam.direction);
+            bounds.include(along(world_from_sensor.translation, direction, beam.free_range()));
+        }
+    }
+    bounds
+}
+
+/// The grid for what was seen or, where the user said so, for his bounds; joined with the grid of a map that is
+/// to grow.
+pub(crate) fn grid_over(
+    seen: Aabb<2>,
+    settings: &Settings,
+    before: Option<Grid<2>>,
+    log: &str,
+) -> anyhow::Result<Grid<2>> {
+    let r = settings.resolution;
+    let bounds = settings.bounds.unwrap_or_else(|| seen.grown(settings.truncation + MARGIN_CELLS * r));
+    let held = bounds.min.iter().chain(&bounds.max).all(|v| (v / r).abs() < LARGEST_INDEX);
+    let grid = if held { Grid::covering(bounds, r) } else { None };
+    let Some(grid) = grid else {
+        let [w, h] = bounds.extent();
+        bail!(
+            "{log}: the extent is {w:.3e} x {h:.3e} m around ({:.3e}, {:.3e}), too much for cells of {r} m; \
+             give --bounds x0,y0,x1,y1 or a coarser --resolution",
+            0.5 * (bounds.min[0] + bounds.max[0]),
+            0.5 * (bounds.min[1] + bounds.max[1]),
+        );
+    };
+    Ok(before.map_or(grid, |before| joined(&before, &grid)))
+}
+
+/// The smallest grid of the lattice that holds both. In whole cells, so that nothing is rounded.
+fn joined(a: &Grid<2>, b: &Grid<2>) -> Grid<2> {
+    let r = a.lattice.resolution;
+    let first = |g: &Grid<2>, k: usize| (g.lattice.origin[k] / r).round();
+    let low = [0, 1].map(|k| first(a, k).min(first(b, k)));
+    let end = [0, 1].map(|k| (first(a, k) + a.shape[k] as f64).max(first(b, k) + b.shape[k] as f64));
+    // An axis that does not grow keeps its origin to the last bit.
+    let origin = [0, 1].map(|k| if low[k] == first(a, k) { a.lattice.origin[k] } else { low[k] * r });
+    Grid::new(origin, r, [0, 1].map(|k| (end[k] - low[k]) as usize))
+}
+
+/// Refuses what needs more memory than allowed, before any of it is taken.
+pub(crate) fn check_memory(
+    grid: &Grid<2>,
+    settings: &Settings,
+    scans: &[(Pose<2>, Scan<2>)],
+    limit: u64,
+    log: &str,
+) -> anyhow::Result<()> {
+    // Per cell: what the maps keep, and what deriving and writing takes on top (measured, rounded up).
+    let per_cell = |kind: &MapKind| match kind {
+        MapKind::Grid => 3.0,
+        MapKind::Tree => 3.0,
+        MapKind::Tsdf => 16.0,
+        MapKind::Esdf => 24.0,
+        MapKind::Contour => 1.0,
+    };
+    let cells: f64 = grid.shape.iter().map(|&s| s as f64).product();
+    let beams: usize = scans.iter().map(|(_, s)| s.len()).sum();
+    let needed = cells * settings.maps.iter().map(per_cell).sum::<f64>() + 40.0 * beams as f64;
+    if needed <= limit as f64 {
+        return Ok(());
+    }
+    let r = settings.resolution;
+    let [w, h] = grid.aabb().extent();
+    let coarser = two_digits_up(r * (needed / limit as f64).sqrt());
+    bail!(
+        "{log}: a map of {w:.1} x {h:.1} m with --resolution {r} needs about {} and --memory allows {}; \
+         {}give --bounds x0,y0,x1,y1, --resolution {coarser} or coarser, or more --memory",
+        shown_bytes(needed),
+        shown_bytes(limit as f64),
+        outlier(scans, w.max(h)),
+    );
+}
+
+/// Names the scan that makes the extent so large, if a single one does.
+fn outlier(scans: &[(Pose<2>, Scan<2>)], size: f64) -> String {
+    let mut xs: Vec<_> = scans.iter().map(|(p, _)| p.translation).collect();
+    let mut median = [0.0; 2];
+    for (k, m) in median.iter_mut().enumerate() {
+        xs.sort_unstable_by(|a, b| a[k].total_cmp(&b[k]));
+        *m = xs.get(xs.len() / 2).map_or(0.0, |p| p[k]);
+    }
+    let from_median = |i: usize| distance(scans[i].0.translation, median);
+    match (0..scans.len()).max_by(|&a, &b| from_median(a).total_cmp(&from_median(b))) {
+        Some(i) if from_median(i) > 0.4 * size && size > 1e4 => {
+            let [x, y] = scans[i].0.translation;
+            format!("scan {i} alone lies at ({x:.6e}, {y:.6e}), {:.3e} m off; ", from_median(i))
+        }
+        _ => String::new(),
+    }
+}
+
+/// A round number not below `v`.
+fn two_digits_up(v: f64) -> f64 {
+    let unit = 10f64.powf(v.log10().floor() - 1.0);
+    let text = format!("{:.1e}", (v / unit).ceil() * unit);
+    text.parse().unwrap_or(v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn joining_grids_keeps_the_lattice() {
+        let a = Grid::new([-3.0 * 0.05, 0.05 * 7.0], 0.05, [10, 10]);
+        assert_eq!(joined(&a, &a), a);
+        let b = Grid::new([5.0 * 0.05, 0.05 * -2.0], 0.05, [10, 4]);
+        let both = joined(&a, &b);
+        assert_eq!((both.shape, both.lattice.origin[0]), ([18, 19], a.lattice.origin[0]));
+        assert!((both.lattice.origin[1] + 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn suggestions_are_round() {
+        assert_eq!(two_digits_up(0.0512), 0.052);
+        assert_eq!(two_digits_up(3.0), 3.0);
+        assert_eq!(two_digits_up(123.0), 130.0);
+    }
+}

@@ -1,0 +1,15 @@
+//! From scans to files: what `map` is made of.
+
+mod artefacts;
+mod extent;
+mod fuse;
+mod grow;
+mod settings;
+mod words;
+
+pub(crate) use artefacts::{Artefacts, Derived, cells_for_map_server, polylines, write_contour};
+pub(crate) use extent::{check_memory, grid_over, seen};
+pub(crate) use fuse::{FusionReport, Maps, fuse};
+pub(crate) use grow::grown;
+pub(crate) use settings::{MapKind, Settings};
+pub(crate) use words::{Summary, report};

@@ -1,0 +1,128 @@
+//! What the maps of a run are made with.
+
+use anyhow::bail;
+use portolan::cell::OccupancyModel;
+use portolan::geom::{Aabb, Grid};
+use portolan::map::{OccupancyGrid, Quadtree, SweepKind, Tsdf, TsdfConfig};
+use portolan::scan::RangeLimits;
+use portolan::sweep::WeightModel;
+use portolan_io::{MapFile, sweep_word, weights_word};
+use serde_json::{Map, Value, json};
+
+use super::Maps;
+use crate::json::object;
+
+/// Maps that can be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub(crate) enum MapKind {
+    /// Occupancy grid
+    Grid,
+    /// Occupancy quadtree
+    Tree,
+    /// Truncated signed distance field
+    Tsdf,
+    /// Euclidean signed distance field, derived from the tsdf
+    Esdf,
+    /// Contour, derived from the tsdf
+    Contour,
+}
+
+/// All that decides what the maps will hold.
+#[derive(Clone, Debug)]
+pub(crate) struct Settings {
+    pub(crate) resolution: f64,
+    pub(crate) truncation: f64,
+    pub(crate) w_max: f32,
+    pub(crate) weights: WeightModel,
+    pub(crate) sweep: SweepKind,
+    pub(crate) carve: bool,
+    pub(crate) limits: RangeLimits,
+    pub(crate) every: Option<u64>,
+    pub(crate) hold_out: Option<u64>,
+    pub(crate) bounds: Option<Aabb<2>>,
+    pub(crate) maps: Vec<MapKind>,
+}
+
+impl Settings {
+    /// Whether a map is wanted.
+    pub(crate) fn wants(&self, kind: MapKind) -> bool {
+        self.maps.contains(&kind)
+    }
+
+    /// Empty maps over a grid.
+    pub(crate) fn empty_maps(&self, grid: &Grid<2>) -> anyhow::Result<Maps> {
+        let model = OccupancyModel::default();
+        let config = TsdfConfig {
+            truncation: self.truncation,
+            w_max: self.w_max,
+            sweep: self.sweep,
+            weights: self.weights,
+            ..TsdfConfig::default()
+        };
+        let made = |kind| self.wants(kind);
+        Ok(Maps {
+            grid: made(MapKind::Grid).then(|| OccupancyGrid::new(*grid, model)).transpose()?,
+            tree: made(MapKind::Tree).then(|| Quadtree::covering(grid, model)).transpose()?,
+            tsdf: made(MapKind::Tsdf).then(|| Tsdf::new(config.with_grid(grid))).transpose()?,
+        })
+    }
+
+    /// The settings as they are written into files.
+    pub(crate) fn to_json(&self) -> Map<String, Value> {
+        let finite = |v: f64| v.is_finite().then_some(v);
+        object(json!({
+            "resolution": self.resolution,
+            "truncation": self.truncation,
+            "w_max": finite(f64::from(self.w_max)),
+            "weights": weights_word(self.weights),
+            "sweep": sweep_word(self.sweep),
+            "carve": self.carve,
+            "min_range": self.limits.min,
+            "max_range": finite(self.limits.max),
+            "no_return": finite(self.limits.no_return),
+            "no_return_free": self.limits.no_return_free,
+            "every": self.every.unwrap_or(1),
+            "hold_out": self.hold_out,
+            "bounds": self.bounds.map(|b| [b.min[0], b.min[1], b.max[0], b.max[1]]),
+            "maps": self.maps.iter().map(|&m| map_word(m)).collect::<Vec<_>>(),
+        }))
+    }
+
+    /// Refuses to go on with a map that was made with other settings.
+    pub(crate) fn check_agree(&self, file: &MapFile, name: &str) -> anyhow::Result<()> {
+        let (ours, theirs) = (self.to_json(), &file.header.settings);
+        const SHAPING: [&str; 9] = [
+            "resolution",
+            "truncation",
+            "w_max",
+            "weights",
+            "sweep",
+            "carve",
+            "min_range",
+            "max_range",
+            "hold_out",
+        ];
+        for key in SHAPING {
+            let (new, old) = (&ours[key], theirs.get(key).unwrap_or(&Value::Null));
+            if new != old {
+                let option = key.replace('_', "-");
+                bail!(
+                    "{name}: {key} is {old} in the map and {new} in this call; leave --{option} out to go on \
+                     with the map's, or write to another folder"
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The word for a map on the command line.
+fn map_word(kind: MapKind) -> &'static str {
+    match kind {
+        MapKind::Grid => "grid",
+        MapKind::Tree => "tree",
+        MapKind::Tsdf => "tsdf",
+        MapKind::Esdf => "esdf",
+        MapKind::Contour => "contour",
+    }
+}
