@@ -11,6 +11,7 @@ mod mapping;
 mod output;
 mod picture;
 mod progress;
+mod source;
 
 use std::process::ExitCode;
 

@@ -45,7 +45,7 @@ enum WeightsArg {
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan map intel-corrected.log.gz --resolution 0.05 --out intel")]
-pub struct Args {
+pub(crate) struct Args {
     /// Log of range scans with poses; its kind is recognised
     log: PathBuf,
     /// Folder for the results; made if it is not there
@@ -101,7 +101,7 @@ pub struct Args {
 }
 
 /// Fuses the log.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Instant::now();
     let mut seconds = BTreeMap::new();
     let mut stage = |name: &'static str, since: Instant| {
@@ -218,7 +218,7 @@ impl Args {
         maps.dedup();
         Settings {
             resolution,
-            truncation: self.truncation.or(saved.number("truncation")).unwrap_or(3.0 * resolution),
+            truncation: self.truncation.or(saved.number("truncation")).unwrap_or(three_cells(resolution)),
             w_max: self.w_max.or(saved_w_max).unwrap_or(64.0),
             weights: match self.weights {
                 Some(WeightsArg::Constant) => WeightModel::Constant,
@@ -277,6 +277,12 @@ impl Saved<'_> {
     fn flag(&self, key: &str) -> Option<bool> {
         self.0?.get(key)?.as_bool()
     }
+}
+
+/// Three times the resolution, without the rounding error that would show in every file (0.15000000000000002).
+fn three_cells(resolution: f64) -> f64 {
+    let exact = 3.0 * resolution;
+    format!("{exact:.9e}").parse().unwrap_or(exact)
 }
 
 /// The grid of a saved map.

@@ -1,17 +1,37 @@
 //! The commands, one file each.
 
+mod convert;
+mod eval;
+mod info;
 mod map;
+mod mesh;
+mod query;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
     /// Fuse a log into maps and write them into a folder
-    Map(map::Args),
+    Map(Box<map::Args>),
+    /// Ask a map at points: occupancy, distance, gradient
+    Query(query::Args),
+    /// Say what a file is and what it holds
+    Info(info::Args),
+    /// Turn one format into another
+    Convert(convert::Args),
+    /// Extract the contour of a map again, with other settings
+    Mesh(mesh::Args),
+    /// Measure a map against scans that were not fused, or against a reference contour
+    Eval(eval::Args),
 }
 
 impl Command {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         match self {
             Self::Map(args) => map::run(args),
+            Self::Query(args) => query::run(args),
+            Self::Info(args) => info::run(args),
+            Self::Convert(args) => convert::run(args),
+            Self::Mesh(args) => mesh::run(args),
+            Self::Eval(args) => eval::run(args),
         }
     }
 }

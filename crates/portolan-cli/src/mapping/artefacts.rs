@@ -57,10 +57,8 @@ impl Derived {
 
     /// Bytes of each derived field, measured.
     pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
-        let mut bytes = BTreeMap::new();
-        self.contour.iter().for_each(|c| drop(bytes.insert("contour", c.memory_bytes())));
-        self.esdf.iter().for_each(|e| drop(bytes.insert("esdf", e.memory_bytes())));
-        bytes
+        let contour = self.contour.iter().map(|c| ("contour", c.memory_bytes()));
+        contour.chain(self.esdf.iter().map(|e| ("esdf", e.memory_bytes()))).collect()
     }
 }
 

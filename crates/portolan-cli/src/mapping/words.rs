@@ -56,7 +56,7 @@ impl Summary<'_> {
         let thin = &self.derived.thin;
         if thin.thin > 0.0 {
             warnings.push(format!(
-                "{:.1} m of contour ({:.1} %) belong to walls thinner than twice the truncation ({} m), seen from \
+                "{:.1} m of contour ({:.1} %) belong to walls thinner than twice the truncation ({:.3} m), seen from \
                  both sides: they are eroded; a smaller --truncation helps",
                 thin.thin,
                 100.0 * thin.thin / thin.total,
