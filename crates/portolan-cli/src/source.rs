@@ -47,11 +47,9 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
 pub(crate) fn open_map(path: &Path, what: &str) -> anyhow::Result<MapFile> {
     match open(path)? {
         Source::Map(file) => Ok(*file),
-        other => bail!(
-            "{}: is {}; to {what}, give a map.portolan or its folder",
-            path.display(),
-            other.describe()
-        ),
+        other => {
+            bail!("{}: is {}; to {what}, give a map.portolan or its folder", path.display(), other.describe())
+        }
     }
 }
 

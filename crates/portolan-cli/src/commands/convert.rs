@@ -20,7 +20,9 @@ use crate::output::Output;
 use crate::source::{Source, open};
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  portolan convert intel intel.yaml")]
+#[command(
+    after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  portolan convert intel intel.yaml"
+)]
 pub(crate) struct Args {
     /// map.portolan or its folder, map_server yaml, esdf.bin, or GeoJSON contour
     input: PathBuf,

@@ -23,8 +23,10 @@ use nearest::SegmentIndex;
 use spread::Spread;
 
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  portolan map intel.log.gz --resolution 0.05 --hold-out 10 --out intel\n  \
-                  portolan eval intel --scans intel.log.gz")]
+#[command(
+    after_help = "Example:\n  portolan map intel.log.gz --resolution 0.05 --hold-out 10 --out intel\n  \
+                  portolan eval intel --scans intel.log.gz"
+)]
 pub(crate) struct Args {
     /// map.portolan or its folder
     map: PathBuf,
@@ -39,10 +41,10 @@ pub(crate) struct Args {
     #[command(flatten)]
     limits: LimitArgs,
     /// Use every N-th scan of the log only; default: as the map did
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     every: Option<u64>,
     /// Predict every N-th scan; default: those that the map held out, else all
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     hold_out: Option<u64>,
     #[command(flatten)]
     output: Output,
@@ -114,7 +116,8 @@ fn predict(args: &Args, file: &MapFile, path: &Path) -> anyhow::Result<Value> {
         for beam in scan.beams().filter(|b| b.is_hit()) {
             hits += 1;
             let direction = world_from_sensor.rotate(beam.direction);
-            let settings = RayCastSettings { unknown_tolerance: 2.0 * resolution, ..RayCastSettings::default() };
+            let settings =
+                RayCastSettings { unknown_tolerance: 2.0 * resolution, ..RayCastSettings::default() };
             match cast_ray(tsdf, world_from_sensor.translation, direction, &settings) {
                 RayCast::Hit(range) => errors.push(range - beam.range),
                 RayCast::Unknown(_) => unknown += 1,

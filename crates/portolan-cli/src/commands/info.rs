@@ -145,7 +145,9 @@ fn of_server(map: &MapServerMap) -> Value {
     let grid: &Grid<2> = &map.grid;
     let grey = map.unknown_grey_taken_for_free;
     let hint = (grey > 0).then(|| {
-        format!("{grey} cells have the grey of unknown (205, 206) but count as free: free_thresh is above 0.196")
+        format!(
+            "{grey} cells have the grey of unknown (205, 206) but count as free: free_thresh is above 0.196"
+        )
     });
     json!({
         "extent": json::grid(grid),

@@ -42,7 +42,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     if !write_contour(&args.out, &lines)? {
         return Err(bad_call(format!("{}: give OUT the name .geojson or .svg", args.out.display())));
     }
-    let (segments, length) = (contour.segments.len(), contour.length());
+    let (segments, length) = (contour.segments.len(), contour.length() + 0.0); // the sum of nothing is -0.0
     let document = json!({
         "map": args.map.display().to_string(),
         "out": args.out.display().to_string(),
@@ -52,5 +52,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         "length": length,
     });
     let shown = args.out.display();
-    args.output.print(&document, format!("{segments} segments in {} lines, {length:.1} m, to {shown}\n", lines.len()))
+    args.output.print(
+        &document,
+        format!("{segments} segments in {} lines, {length:.1} m, to {shown}\n", lines.len()),
+    )
 }

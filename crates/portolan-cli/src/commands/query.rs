@@ -40,8 +40,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     match (field, points) {
         (Fields::Two(field), QueryPoints::Two(points)) => write_answers(&field, &points, args.output),
         (Fields::Three(field), QueryPoints::Three(points)) => write_answers(&field, &points, args.output),
-        (Fields::Two(_), _) => bail!("{}: the points are x,y,z; the map is in the plane: write x,y", shown(args)),
-        (Fields::Three(_), _) => bail!("{}: the points are x,y; the map is in space: write x,y,z", shown(args)),
+        (Fields::Two(_), _) => {
+            bail!("{}: the points are x,y,z; the map is in the plane: write x,y", shown(args))
+        }
+        (Fields::Three(_), _) => {
+            bail!("{}: the points are x,y; the map is in space: write x,y,z", shown(args))
+        }
     }
 }
 
@@ -49,7 +53,11 @@ fn shown(args: &Args) -> String {
     args.points.display().to_string()
 }
 
-fn write_answers<const D: usize>(field: &Field<D>, points: &[[f64; D]], output: Output) -> anyhow::Result<()> {
+fn write_answers<const D: usize>(
+    field: &Field<D>,
+    points: &[[f64; D]],
+    output: Output,
+) -> anyhow::Result<()> {
     let rows = points.iter().map(|&p| field.answer(p));
     let mut out = BufWriter::new(io::stdout().lock());
     if output.json {

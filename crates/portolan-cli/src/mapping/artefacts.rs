@@ -85,7 +85,10 @@ const NAMES: [&str; 8] = [
 impl Artefacts<'_> {
     /// Writes all files but `summary.json` and gives their names and the seconds that they took. What an
     /// earlier run left in the folder and this one does not make is removed: it would belong to another map.
-    pub(crate) fn write(&self, folder: &Path) -> anyhow::Result<(Vec<&'static str>, BTreeMap<&'static str, f64>)> {
+    pub(crate) fn write(
+        &self,
+        folder: &Path,
+    ) -> anyhow::Result<(Vec<&'static str>, BTreeMap<&'static str, f64>)> {
         let mut written = Vec::new();
         let mut seconds = BTreeMap::new();
         let start = Instant::now();
@@ -116,7 +119,10 @@ impl Artefacts<'_> {
         for stale in NAMES.iter().filter(|n| !written.contains(n) && **n != "summary.json") {
             match std::fs::remove_file(folder.join(stale)) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                    bail!("{}: cannot remove what an earlier run left: {e}; remove it", folder.join(stale).display())
+                    bail!(
+                        "{}: cannot remove what an earlier run left: {e}; remove it",
+                        folder.join(stale).display()
+                    )
                 }
                 _ => {}
             }

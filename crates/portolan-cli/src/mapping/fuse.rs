@@ -21,9 +21,7 @@ pub(crate) struct Maps {
 impl Maps {
     /// Number of maps.
     pub(crate) fn count(&self) -> usize {
-        usize::from(self.grid.is_some())
-            + usize::from(self.tree.is_some())
-            + usize::from(self.tsdf.is_some())
+        usize::from(self.grid.is_some()) + usize::from(self.tree.is_some()) + usize::from(self.tsdf.is_some())
     }
 
     /// Bytes of each map, measured.
