@@ -32,16 +32,16 @@ pub(crate) struct LogArgs {
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub(crate) struct LimitArgs {
     /// Readings up to this are refused (metres)
-    #[arg(long, value_name = "M", value_parser = length_or_zero)]
+    #[arg(long, value_name = "M", value_parser = length_or_zero, allow_negative_numbers = true)]
     pub(crate) min_range: Option<f64>,
     /// Returns beyond this are not surfaces; space up to here is free (metres)
-    #[arg(long, value_name = "M", value_parser = length)]
+    #[arg(long, value_name = "M", value_parser = length, allow_negative_numbers = true)]
     pub(crate) max_range: Option<f64>,
     /// Readings from this on mean "no echo" (metres); default: what the log's readings tell
-    #[arg(long, value_name = "M", value_parser = length)]
+    #[arg(long, value_name = "M", value_parser = length, allow_negative_numbers = true)]
     pub(crate) no_return: Option<f64>,
     /// What is known to be free along a beam without echo (metres); default 0: nothing
-    #[arg(long, value_name = "M", value_parser = length_or_zero)]
+    #[arg(long, value_name = "M", value_parser = length_or_zero, allow_negative_numbers = true)]
     pub(crate) no_return_free: Option<f64>,
 }
 

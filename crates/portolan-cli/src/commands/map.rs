@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use portolan::geom::{Aabb, Grid};
+use portolan::geom::{Aabb, Grid, Pose};
 use portolan::map::SweepKind;
 use portolan::scan::RangeLimits;
 use portolan::sweep::WeightModel;
@@ -13,13 +13,13 @@ use portolan_io::{CarmenLog, MapFile, sweep_of, weights_of, write_atomic};
 use serde_json::{Map, Value};
 
 use crate::arguments::{bounds, bytes, length, weight};
+use crate::json;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::{
-    Artefacts, Derived, MapKind, Maps, Settings, Summary, check_memory, fuse, grid_over, grown, report, seen,
+    Artefacts, Derived, MapKind, Maps, Settings, Summary, check_memory, fuse, grid_over, grown, report,
 };
 use crate::output::Output;
 use crate::progress::Progress;
-use crate::json;
 
 /// Sweeps for distances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -45,7 +45,7 @@ enum WeightsArg {
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan map intel-corrected.log.gz --resolution 0.05 --out intel")]
-pub struct Args {
+pub(crate) struct Args {
     /// Log of range scans with poses; its kind is recognised
     log: PathBuf,
     /// Folder for the results; made if it is not there
@@ -82,16 +82,16 @@ pub struct Args {
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     bounds: Option<Aabb<2>>,
     /// Use every N-th scan of the log only
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     every: Option<u64>,
     /// Leave every N-th scan out of fusion, for `eval --scans`
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..), allow_negative_numbers = true)]
     hold_out: Option<u64>,
     /// Go on with the map in DIR; settings not given are the map's
     #[arg(long)]
     append: bool,
     /// Threads; default: one per core. The result does not depend on it
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
     threads: Option<u16>,
     /// Memory that may be used, with suffix K, M or G
     #[arg(long, value_name = "BYTES", value_parser = bytes, default_value = "4G")]
@@ -101,7 +101,7 @@ pub struct Args {
 }
 
 /// Fuses the log.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let start = Instant::now();
     let mut seconds = BTreeMap::new();
     let mut stage = |name: &'static str, since: Instant| {
@@ -121,7 +121,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let (fused, held_out) = selection.split(log.len());
     let scans = log::scans(&log, &fused, &settings.limits);
     let name = args.log.display().to_string();
-    let grid = grid_over(seen(&scans), &settings, before.as_ref().and_then(grid_of), &name)?;
+    let grid = grid_over(&settings, before.as_ref().and_then(grid_of), &scans, &name)?;
     check_memory(&grid, &settings, &scans, args.memory, &name)?;
     let now = stage("prepare", now);
 
@@ -136,7 +136,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Maps { grid: file.grid, tree: file.tree, tsdf: file.tsdf } = maps;
     let now = stage("fuse", now_fuse);
 
-    file.poses.extend(scans.iter().map(|(pose, _)| *pose));
+    // The others were refused: the maps have no index for them.
+    let held = |pose: &Pose<2>| pose.is_rigid() && grid.lattice.cell_of(pose.translation).is_some();
+    file.poses.extend(scans.iter().map(|(pose, _)| *pose).filter(held));
     drop(scans);
     describe(&mut file, &settings, &log, &fusion.stats);
     let derived = Derived::of(&file, &settings);
@@ -168,7 +170,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         files,
     };
     let document = summary.to_json();
-    write_atomic(args.out.join("summary.json"), |w| std::io::Write::write_fmt(w, format_args!("{document:#}\n")))?;
+    write_atomic(args.out.join("summary.json"), |w| {
+        std::io::Write::write_fmt(w, format_args!("{document:#}\n"))
+    })?;
     args.output.print(&document, report(&summary, &args.out.display().to_string()))
 }
 
@@ -218,7 +222,7 @@ impl Args {
         maps.dedup();
         Settings {
             resolution,
-            truncation: self.truncation.or(saved.number("truncation")).unwrap_or(3.0 * resolution),
+            truncation: self.truncation.or(saved.number("truncation")).unwrap_or(three_cells(resolution)),
             w_max: self.w_max.or(saved_w_max).unwrap_or(64.0),
             weights: match self.weights {
                 Some(WeightsArg::Constant) => WeightModel::Constant,
@@ -242,7 +246,12 @@ impl Args {
     }
 
     /// Empty maps, or the saved ones in their new grid. They are taken out of `file`.
-    fn maps_to_fuse_into(&self, file: &mut MapFile, settings: &Settings, grid: &Grid<2>) -> anyhow::Result<Maps> {
+    fn maps_to_fuse_into(
+        &self,
+        file: &mut MapFile,
+        settings: &Settings,
+        grid: &Grid<2>,
+    ) -> anyhow::Result<Maps> {
         if !self.append {
             return settings.empty_maps(grid);
         }
@@ -252,7 +261,8 @@ impl Args {
             (MapKind::Tree, saved.tree.is_none(), "tree"),
             (MapKind::Tsdf, saved.tsdf.is_none(), "tsdf"),
         ];
-        if let Some((.., name)) = missing.iter().find(|(kind, missing, _)| settings.wants(*kind) && *missing) {
+        if let Some((.., name)) = missing.iter().find(|(kind, missing, _)| settings.wants(*kind) && *missing)
+        {
             bail!(
                 "{}: the {name} is missing in the map; leave it out of --maps, or write to another folder",
                 self.map_path().display()
@@ -277,6 +287,12 @@ impl Saved<'_> {
     fn flag(&self, key: &str) -> Option<bool> {
         self.0?.get(key)?.as_bool()
     }
+}
+
+/// Three times the resolution, without the rounding error that would show in every file (0.15000000000000002).
+fn three_cells(resolution: f64) -> f64 {
+    let exact = 3.0 * resolution;
+    format!("{exact:.9e}").parse().unwrap_or(exact)
 }
 
 /// The grid of a saved map.

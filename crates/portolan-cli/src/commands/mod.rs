@@ -1,8 +1,13 @@
 //! The commands, one file each.
 
+mod convert;
 mod demo;
+mod eval;
 mod gallery;
+mod info;
 mod map;
+mod mesh;
+mod query;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
@@ -11,7 +16,17 @@ pub(crate) enum Command {
     /// One log in every representation: what each costs and how true its answers are
     Gallery(gallery::Args),
     /// Fuse a log into maps and write them into a folder
-    Map(map::Args),
+    Map(Box<map::Args>),
+    /// Ask a map at points: occupancy, distance, gradient
+    Query(query::Args),
+    /// Say what a file is and what it holds
+    Info(info::Args),
+    /// Turn one format into another
+    Convert(convert::Args),
+    /// Extract the contour of a map again, with other settings
+    Mesh(mesh::Args),
+    /// Measure a map against scans that were not fused, or against a reference contour
+    Eval(eval::Args),
 }
 
 impl Command {
@@ -20,6 +35,11 @@ impl Command {
             Self::Demo(args) => demo::run(args),
             Self::Gallery(args) => gallery::run(args),
             Self::Map(args) => map::run(args),
+            Self::Query(args) => query::run(args),
+            Self::Info(args) => info::run(args),
+            Self::Convert(args) => convert::run(args),
+            Self::Mesh(args) => mesh::run(args),
+            Self::Eval(args) => eval::run(args),
         }
     }
 }

@@ -57,10 +57,8 @@ impl Derived {
 
     /// Bytes of each derived field, measured.
     pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
-        let mut bytes = BTreeMap::new();
-        self.contour.iter().for_each(|c| drop(bytes.insert("contour", c.memory_bytes())));
-        self.esdf.iter().for_each(|e| drop(bytes.insert("esdf", e.memory_bytes())));
-        bytes
+        let contour = self.contour.iter().map(|c| ("contour", c.memory_bytes()));
+        contour.chain(self.esdf.iter().map(|e| ("esdf", e.memory_bytes()))).collect()
     }
 }
 
@@ -87,7 +85,10 @@ const NAMES: [&str; 8] = [
 impl Artefacts<'_> {
     /// Writes all files but `summary.json` and gives their names and the seconds that they took. What an
     /// earlier run left in the folder and this one does not make is removed: it would belong to another map.
-    pub(crate) fn write(&self, folder: &Path) -> anyhow::Result<(Vec<&'static str>, BTreeMap<&'static str, f64>)> {
+    pub(crate) fn write(
+        &self,
+        folder: &Path,
+    ) -> anyhow::Result<(Vec<&'static str>, BTreeMap<&'static str, f64>)> {
         let mut written = Vec::new();
         let mut seconds = BTreeMap::new();
         let start = Instant::now();
@@ -118,7 +119,10 @@ impl Artefacts<'_> {
         for stale in NAMES.iter().filter(|n| !written.contains(n) && **n != "summary.json") {
             match std::fs::remove_file(folder.join(stale)) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                    bail!("{}: cannot remove what an earlier run left: {e}; remove it", folder.join(stale).display())
+                    bail!(
+                        "{}: cannot remove what an earlier run left: {e}; remove it",
+                        folder.join(stale).display()
+                    )
                 }
                 _ => {}
             }

@@ -21,18 +21,15 @@ pub(crate) struct Maps {
 impl Maps {
     /// Number of maps.
     pub(crate) fn count(&self) -> usize {
-        usize::from(self.grid.is_some())
-            + usize::from(self.tree.is_some())
-            + usize::from(self.tsdf.is_some())
+        usize::from(self.grid.is_some()) + usize::from(self.tree.is_some()) + usize::from(self.tsdf.is_some())
     }
 
     /// Bytes of each map, measured.
     pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
-        let mut bytes = BTreeMap::new();
-        self.grid.iter().for_each(|m| drop(bytes.insert("grid", m.memory_bytes())));
-        self.tree.iter().for_each(|m| drop(bytes.insert("tree", m.memory_bytes())));
-        self.tsdf.iter().for_each(|m| drop(bytes.insert("tsdf", m.memory_bytes())));
-        bytes
+        let grid = self.grid.iter().map(|m| ("grid", m.memory_bytes()));
+        let tree = self.tree.iter().map(|m| ("tree", m.memory_bytes()));
+        let tsdf = self.tsdf.iter().map(|m| ("tsdf", m.memory_bytes()));
+        grid.chain(tree).chain(tsdf).collect()
     }
 }
 

@@ -84,7 +84,9 @@ mod tests {
         let bearings: Vec<f64> = (0..90).map(|i| f64::from(i) * 0.0698).collect();
         let scan = Scan::from_laser(&bearings, &vec![0.8; 90], &RangeLimits::default());
         tree.integrate(&Pose::<2>::IDENTITY, &scan);
-        for (origin, shape) in [([-30.0, -2.0], [400, 30]), ([-1.0, -1.0], [500, 20]), ([-1.0, -9.0], [20, 900])] {
+        for (origin, shape) in
+            [([-30.0, -2.0], [400, 30]), ([-1.0, -1.0], [500, 20]), ([-1.0, -9.0], [20, 900])]
+        {
             let large = Grid::new(origin, 0.1, shape);
             let grown = grown_tree(tree.clone(), &large).unwrap();
             grown.tree().check_invariants();

@@ -38,7 +38,10 @@ impl Summary<'_> {
             warnings.push(format!("{n} ROBOTLASER1 scans were left out: the log has FLASER scans"));
         }
         if stats.refused_poses > 0 {
-            warnings.push(format!("{} scans have a pose that cannot be used", stats.refused_poses));
+            warnings.push(format!(
+                "{} scans have a pose that cannot be used (not rigid, or too far from the map)",
+                stats.refused_poses
+            ));
         }
         if stats.refused.total() > 0 {
             let r = &stats.refused;
@@ -56,7 +59,7 @@ impl Summary<'_> {
         let thin = &self.derived.thin;
         if thin.thin > 0.0 {
             warnings.push(format!(
-                "{:.1} m of contour ({:.1} %) belong to walls thinner than twice the truncation ({} m), seen from \
+                "{:.1} m of contour ({:.1} %) belong to walls thinner than twice the truncation ({:.3} m), seen from \
                  both sides: they are eroded; a smaller --truncation helps",
                 thin.thin,
                 100.0 * thin.thin / thin.total,
@@ -88,7 +91,7 @@ impl Summary<'_> {
         let contour = self.derived.contour.as_ref().map(|c| {
             json!({
                 "segments": c.segments.len(),
-                "length": c.length(),
+                "length": c.length() + 0.0, // the sum of nothing is -0.0
                 "doubled_length": self.derived.doubled.doubled,
                 "doubled_share": self.derived.doubled.share(),
                 "thin_length": thin.thin,
@@ -149,7 +152,7 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     let _ = writeln!(text, "{}", sizes.join(", "));
     if let Some(contour) = &summary.derived.contour {
         let doubled = 100.0 * summary.derived.doubled.share();
-        let (n, length) = (contour.segments.len(), contour.length());
+        let (n, length) = (contour.segments.len(), contour.length() + 0.0);
         let _ = writeln!(text, "contour of {n} segments, {length:.1} m, {doubled:.2} % doubled");
     }
     let _ = writeln!(

@@ -1,0 +1,196 @@
+//! `info`: what a file is.
+
+use std::path::{Path, PathBuf};
+
+use portolan::geom::{Aabb, Grid};
+use portolan::map::MapRepr;
+use portolan_io::{CarmenLog, EsdfBin, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
+use portolan_io::{Polyline, detect_no_return};
+use serde_json::{Value, json};
+
+use crate::arguments::shown_bytes;
+use crate::json;
+use crate::log::{describe, path_length};
+use crate::output::Output;
+use crate::source::{Source, open};
+
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  portolan info intel.log.gz")]
+pub(crate) struct Args {
+    /// A log, a map, a picture of one, or a folder that `map` wrote
+    file: PathBuf,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Says what the file is.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let kind = detect(&args.file)?;
+    let mut document = match kind {
+        FileKind::Svg | FileKind::OctomapBt | FileKind::OctomapOt => json!({ "kind": describe(&kind) }),
+        _ => {
+            let source = open(&args.file)?;
+            let mut document = about(&source);
+            document["kind"] = json!(source.describe());
+            document
+        }
+    };
+    document["file"] = json!(args.file.display().to_string());
+    document["bytes"] = json!(size(&args.file));
+    let mut text = format!("{}: {}\n", args.file.display(), document["kind"].as_str().unwrap_or_default());
+    lines(&document, "  ", &mut text);
+    args.output.print(&document, text)
+}
+
+fn size(path: &Path) -> Option<u64> {
+    let file = if path.is_dir() { path.join("map.portolan") } else { path.to_owned() };
+    std::fs::metadata(file).ok().map(|m| m.len())
+}
+
+/// The fields of a document for people: one a line.
+fn lines(value: &Value, indent: &str, text: &mut String) {
+    let Value::Object(fields) = value else { return };
+    for (key, value) in fields {
+        let name = key.replace('_', " ");
+        match value {
+            _ if indent == "  " && ["file", "kind"].contains(&key.as_str()) => {}
+            Value::Null => {}
+            Value::Object(inner) if inner.is_empty() => {}
+            Value::Object(_) => {
+                text.push_str(&format!("{indent}{name}:\n"));
+                lines(value, &format!("{indent}  "), text);
+            }
+            Value::String(s) => text.push_str(&format!("{indent}{name}: {s}\n")),
+            Value::Number(n) if key == "bytes" => {
+                text.push_str(&format!("{indent}{name}: {}\n", shown_bytes(n.as_f64().unwrap_or(0.0))));
+            }
+            other => text.push_str(&format!("{indent}{name}: {other}\n")),
+        }
+    }
+}
+
+fn about(source: &Source) -> Value {
+    match source {
+        Source::Map(file) => of_map(file),
+        Source::Esdf(EsdfFile::Two(field)) => of_esdf(field),
+        Source::Esdf(EsdfFile::Three(field)) => of_esdf(field),
+        Source::Server(map) => of_server(map),
+        Source::Image(image) => json!({
+            "pixels": [image.width, image.height],
+            "white": image.max_value,
+            "hint": "resolution and origin are in a yaml file, which is not beside it",
+        }),
+        Source::Contour(contour) => of_contour(contour),
+        Source::Log(log) => of_log(log),
+    }
+}
+
+fn of_map(file: &MapFile) -> Value {
+    let header = &file.header;
+    let mut maps = json!({});
+    if let Some(map) = &file.grid {
+        maps["grid"] = json!({
+            "cell": "log odds, one byte",
+            "extent": json::grid(map.store().grid()),
+            "observed": map.observed_cells(),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    if let Some(map) = &file.tree {
+        maps["tree"] = json!({
+            "cell": "log odds, one byte",
+            "extent": json::aabb(&map.tree().grid().aabb()),
+            "depth": map.tree().depth(),
+            "nodes": map.tree().nodes(),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    if let Some(map) = &file.tsdf {
+        maps["tsdf"] = json!({
+            "cell": "signed distance and weight, f32",
+            "extent": json::grid(map.grid()),
+            "truncation": map.config().truncation,
+            "w_max": map.config().w_max.is_finite().then_some(map.config().w_max),
+            "observed": map.observed_cells(0.0),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    json!({
+        "logs": header.logs,
+        "scans": header.scans,
+        "hold_out": header.hold_out,
+        "every": header.every,
+        "settings": header.settings,
+        "statistics": header.statistics,
+        "poses": file.poses.len(),
+        "maps": maps,
+    })
+}
+
+fn of_esdf<const D: usize>(field: &EsdfBin<D>) -> Value {
+    let known = || field.distances.iter().copied().filter(|d| !d.is_nan());
+    let count = |status: u8| field.status.as_ref().map(|s| s.iter().filter(|&&v| v == status).count());
+    json!({
+        "dimension": D,
+        "extent": json::grid::<D>(&field.grid),
+        "known": known().count(),
+        "saturated": count(EsdfBin::<D>::SATURATED),
+        "smallest": known().min_by(f32::total_cmp),
+        "largest": known().max_by(f32::total_cmp),
+    })
+}
+
+fn of_server(map: &MapServerMap) -> Value {
+    let count = |cell: MapCell| map.cells.iter().filter(|&&c| c == cell).count();
+    let grid: &Grid<2> = &map.grid;
+    let grey = map.unknown_grey_taken_for_free;
+    let hint = (grey > 0).then(|| {
+        format!(
+            "{grey} cells have the grey of unknown (205, 206) but count as free: free_thresh is above 0.196"
+        )
+    });
+    json!({
+        "extent": json::grid(grid),
+        "yaw": map.yaw,
+        "free": count(MapCell::Free),
+        "occupied": count(MapCell::Occupied),
+        "unknown": count(MapCell::Unknown),
+        "warning": hint,
+    })
+}
+
+fn of_contour(lines: &[Polyline]) -> Value {
+    let mut extent = Aabb::EMPTY;
+    lines.iter().flatten().for_each(|&p| extent.include(p));
+    let steps = lines.iter().flat_map(|l| l.windows(2));
+    let length: f64 = steps.clone().map(|w| portolan::geom::vector::distance(w[0], w[1])).sum();
+    json!({
+        "lines": lines.len(),
+        "segments": steps.count(),
+        "length": length,
+        "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
+    })
+}
+
+fn of_log(log: &CarmenLog) -> Value {
+    let mut poses = Aabb::EMPTY;
+    let mut beams = Vec::new();
+    for scan in log.raw_scans() {
+        poses.include(scan.world_from_laser.translation);
+        beams.push(scan.readings.len());
+    }
+    let no_return = detect_no_return(log);
+    let silent = |r: &&f64| no_return.is_some_and(|n| **r >= n);
+    let readings: usize = beams.iter().sum();
+    json!({
+        "scans": log.len(),
+        "beams_per_scan": [beams.iter().min(), beams.iter().max()],
+        "readings": readings,
+        "readings_not_finite": log.raw_scans().flat_map(|s| s.readings).filter(|r| !r.is_finite()).count(),
+        "no_return": no_return,
+        "readings_without_echo": log.raw_scans().flat_map(|s| s.readings).filter(silent).count(),
+        "path_length": path_length(log),
+        "extent_of_poses": json::aabb(&poses),
+        "log": json::log_stats(log.stats()),
+    })
+}

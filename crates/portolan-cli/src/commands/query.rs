@@ -1,0 +1,222 @@
+//! `query`: points in, answers out.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use portolan::Answer;
+use portolan::field::{Esdf, EsdfSettings, esdf_from_tsdf};
+use portolan::geom::Pose;
+use portolan::map::MapRepr;
+use portolan_io::{
+    AnswerRow, AnswerStatus, EsdfBin, EsdfFile, Input, MapCell, MapFile, MapServerMap, QueryPoints,
+    write_answer, write_answer_header,
+};
+use serde_json::{Value, json};
+
+use crate::output::Output;
+use crate::source::{Source, open};
+
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  echo 1.5,2.0 | portolan query intel --points -")]
+pub(crate) struct Args {
+    /// A folder that `map` wrote, a map.portolan, an esdf.bin, or a map_server yaml
+    map: PathBuf,
+    /// CSV of x,y[,z] in metres; - reads standard input
+    #[arg(long, value_name = "FILE")]
+    points: PathBuf,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Answers at all points.
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
+    let field = Fields::open(&args.map)?;
+    let points = if args.points == Path::new("-") {
+        QueryPoints::parse(Input::from_reader(io::stdin(), "standard input".as_ref())?)?
+    } else {
+        QueryPoints::read(&args.points)?
+    };
+    match (field, points) {
+        (Fields::Two(field), QueryPoints::Two(points)) => write_answers(&field, &points, args.output),
+        (Fields::Three(field), QueryPoints::Three(points)) => write_answers(&field, &points, args.output),
+        (Fields::Two(_), _) => {
+            bail!("{}: the points are x,y,z; the map is in the plane: write x,y", shown(args))
+        }
+        (Fields::Three(_), _) => {
+            bail!("{}: the points are x,y; the map is in space: write x,y,z", shown(args))
+        }
+    }
+}
+
+fn shown(args: &Args) -> String {
+    args.points.display().to_string()
+}
+
+fn write_answers<const D: usize>(
+    field: &Field<D>,
+    points: &[[f64; D]],
+    output: Output,
+) -> anyhow::Result<()> {
+    let rows = points.iter().map(|&p| field.answer(p));
+    let mut out = BufWriter::new(io::stdout().lock());
+    if output.json {
+        writeln!(out, "{:#}", json!({ "answers": rows.map(|r| row_json(&r)).collect::<Vec<_>>() }))?;
+    } else {
+        write_answer_header::<D>(&mut out)?;
+        for row in rows {
+            write_answer(&mut out, &row)?;
+        }
+    }
+    out.flush()?;
+    Ok(())
+}
+
+fn row_json<const D: usize>(row: &AnswerRow<D>) -> Value {
+    json!({
+        "point": row.point.to_vec(),
+        "status": row.status.word(),
+        "occupancy": row.occupancy,
+        "distance": row.distance,
+        "lower": row.lower,
+        "upper": row.upper,
+        "gradient": row.gradient.map(|g| g.to_vec()),
+    })
+}
+
+/// What can be asked, in the plane or in space.
+enum Fields {
+    Two(Field<2>),
+    Three(Field<3>),
+}
+
+/// Answers to occupancy and distance of one map.
+struct Field<const D: usize> {
+    distance: Option<Esdf<D>>,
+    /// Per cell of the distance field, if it tells.
+    status: Option<Vec<u8>>,
+    occupancy: Occupancy<D>,
+    /// For maps that are turned against the world.
+    world_from_field: Pose<D>,
+}
+
+type Occupancy<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<f64>>;
+
+impl Fields {
+    fn open(path: &Path) -> anyhow::Result<Self> {
+        Ok(match open(path)? {
+            Source::Map(file) => Self::Two(of_map(*file)),
+            Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
+            Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
+            Source::Server(map) => Self::Two(of_server(map)),
+            other => bail!(
+                "{}: is {}; give a map.portolan or its folder, an esdf.bin, or a map_server yaml",
+                path.display(),
+                other.describe()
+            ),
+        })
+    }
+}
+
+fn of_map(file: MapFile) -> Field<2> {
+    let EsdfSettings { min_weight, band_cells } = EsdfSettings::default();
+    let of_tsdf = file.tsdf.as_ref().map(|t| esdf_from_tsdf(t, min_weight, band_cells));
+    let of_grid = || {
+        let map = file.grid.as_ref()?;
+        let occupied = |i: usize| map.store().at(i).map(|v| v.0 > 0);
+        Some(Esdf::from_mask(*map.store().grid(), occupied))
+    };
+    let distance = of_tsdf.or_else(of_grid);
+    let occupancy: Occupancy<2> = match (file.grid, file.tree, file.tsdf) {
+        (Some(map), ..) => Box::new(move |p| map.probability(p)),
+        (_, Some(map), _) => Box::new(move |p| map.probability(p)),
+        (.., Some(map)) => Box::new(move |p| map.occupancy(p).map_or(Answer::Unknown, Answer::Known)),
+        _ => Box::new(|_| Answer::Outside),
+    };
+    Field { distance, status: None, occupancy, world_from_field: Pose::IDENTITY }
+}
+
+fn of_esdf<const D: usize>(file: EsdfBin<D>) -> anyhow::Result<Field<D>> {
+    let mut samples = file.distances;
+    if let Some(status) = &file.status {
+        let unknown = samples.iter_mut().zip(status).filter(|(_, s)| **s == EsdfBin::<D>::UNKNOWN);
+        unknown.for_each(|(d, _)| *d = f32::NAN);
+    }
+    let esdf = Esdf::from_samples(file.grid, samples)?;
+    let occupancy: Occupancy<D> = Box::new(|_| Answer::Unknown);
+    Ok(Field { distance: Some(esdf), status: file.status, occupancy, world_from_field: Pose::IDENTITY })
+}
+
+fn of_server(map: MapServerMap) -> Field<2> {
+    let world_from_field = map.world_from_grid();
+    let distance = Some(esdf_of_server(&map));
+    let occupancy: Occupancy<2> = Box::new(move |p| match map.grid.index_of(p) {
+        None => Answer::Outside,
+        Some(i) if map.occupancy[i].is_nan() => Answer::Unknown,
+        Some(i) => Answer::Known(f64::from(map.occupancy[i])),
+    });
+    Field { distance, status: None, occupancy, world_from_field }
+}
+
+/// The distance field of a map_server map, in its own frame.
+pub(super) fn esdf_of_server(map: &MapServerMap) -> Esdf<2> {
+    Esdf::from_mask(map.grid, |i| match map.cells[i] {
+        MapCell::Occupied => Some(true),
+        MapCell::Free => Some(false),
+        MapCell::Unknown => None,
+    })
+}
+
+impl<const D: usize> Field<D> {
+    fn answer(&self, point: [f64; D]) -> AnswerRow<D> {
+        let p = self.world_from_field.inverse().transform_point(point);
+        let occupancy = (self.occupancy)(p);
+        let mut row = AnswerRow {
+            point,
+            status: AnswerStatus::Unknown,
+            occupancy: occupancy.known(),
+            distance: None,
+            lower: None,
+            upper: None,
+            gradient: None,
+        };
+        let Some(esdf) = &self.distance else {
+            if occupancy == Answer::Outside {
+                row.status = AnswerStatus::Outside;
+            }
+            return row;
+        };
+        match esdf.distance_and_gradient(p) {
+            Answer::Known((d, _)) if self.is_saturated(esdf, p) => {
+                row.status = AnswerStatus::Saturated;
+                row.distance = Some(d);
+                // Bounds are about the magnitude; the side is the distance's sign.
+                row.lower = Some(d.abs());
+            }
+            Answer::Known((d, gradient)) => {
+                row.status = AnswerStatus::Known;
+                row.distance = Some(d);
+                row.gradient = Some(self.world_from_field.rotate(gradient));
+            }
+            Answer::Saturated((d, _)) => {
+                row.status = AnswerStatus::Saturated;
+                row.distance = Some(d);
+                row.lower = Some(d.abs());
+            }
+            Answer::Unknown => {}
+            Answer::Outside => row.status = AnswerStatus::Outside,
+        }
+        row
+    }
+
+    /// Whether one of the cells that a point is interpolated from is.
+    fn is_saturated(&self, esdf: &Esdf<D>, p: [f64; D]) -> bool {
+        let Some(status) = &self.status else { return false };
+        let grid = esdf.grid();
+        let Some((base, _)) = grid.interpolation(p) else { return false };
+        (0..1usize << D).any(|c| {
+            let cell = std::array::from_fn(|k| base[k] + ((c >> k) & 1) as i32);
+            grid.index(cell).is_some_and(|i| status[i] == EsdfBin::<D>::SATURATED)
+        })
+    }
+}

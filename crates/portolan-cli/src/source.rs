@@ -1,0 +1,73 @@
+//! Any file that holds a map or something made of one, opened by what it is.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use portolan_io::{
+    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, Pgm, Polyline, detect, read_geojson,
+};
+
+use crate::log::describe;
+
+/// What a file holds.
+pub(crate) enum Source {
+    /// `map.portolan`
+    Map(Box<MapFile>),
+    /// `esdf.bin`
+    Esdf(EsdfFile),
+    /// A map_server map
+    Server(MapServerMap),
+    /// An image without a yaml file
+    Image(Pgm),
+    /// A contour
+    Contour(Vec<Polyline>),
+    /// A log
+    Log(Box<CarmenLog>),
+}
+
+/// Opens a file or a folder.
+pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
+    Ok(match detect(path)? {
+        FileKind::Portolan => Source::Map(Box::new(MapFile::read(path)?)),
+        FileKind::PortolanFolder => Source::Map(Box::new(MapFile::read(path.join("map.portolan"))?)),
+        FileKind::EsdfBin => Source::Esdf(EsdfFile::read(path)?),
+        FileKind::MapServerYaml => Source::Server(MapServerMap::read(path)?),
+        FileKind::Pgm => match yaml_beside(path) {
+            Some(yaml) => Source::Server(MapServerMap::read(yaml)?),
+            None => Source::Image(Pgm::read(path)?),
+        },
+        FileKind::GeoJson => Source::Contour(read_geojson(path)?),
+        FileKind::CarmenLog => Source::Log(Box::new(CarmenLog::read(path)?)),
+        FileKind::Unknown(what) => bail!("{}: not recognised: {what}", path.display()),
+        kind => bail!("{}: is {}, which is not read yet", path.display(), describe(&kind)),
+    })
+}
+
+/// Opens a map made by `map`; `what` is to be done with it.
+pub(crate) fn open_map(path: &Path, what: &str) -> anyhow::Result<MapFile> {
+    match open(path)? {
+        Source::Map(file) => Ok(*file),
+        other => {
+            bail!("{}: is {}; to {what}, give a map.portolan or its folder", path.display(), other.describe())
+        }
+    }
+}
+
+/// The yaml file that belongs to an image.
+fn yaml_beside(path: &Path) -> Option<PathBuf> {
+    Some(path.with_extension("yaml")).filter(|p| p.is_file())
+}
+
+impl Source {
+    /// What it is, in words.
+    pub(crate) fn describe(&self) -> &'static str {
+        match self {
+            Self::Map(_) => "a portolan map",
+            Self::Esdf(_) => "a distance field (esdf.bin)",
+            Self::Server(_) => "a map_server map",
+            Self::Image(_) => "a PGM image without its yaml file",
+            Self::Contour(_) => "a contour (GeoJSON)",
+            Self::Log(_) => "a CARMEN log",
+        }
+    }
+}

@@ -1,0 +1,323 @@
+//! Every command once, on a small log that the test writes itself.
+
+mod support;
+
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+use support::{arg, json, log_lines, map, portolan, range, room, succeed};
+
+const FILES: [&str; 8] = [
+    "contour.geojson",
+    "contour.svg",
+    "esdf.bin",
+    "map.pgm",
+    "map.png",
+    "map.portolan",
+    "map.yaml",
+    "summary.json",
+];
+
+fn files_in(folder: &std::path::Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn map_writes_everything_and_nothing_else() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    let text = map(&log, &out, &[]);
+    assert!(text.contains("60 of 60 scans fused") && text.contains("540 beams without echo"), "{text}");
+    assert_eq!(files_in(&out), FILES);
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["scans"]["fused"], 60);
+    assert_eq!(summary["beams"]["hit"], 60 * 171);
+    assert_eq!(summary["settings"]["truncation"], 0.15);
+    // The room's walls are 20 m long, the pillar's sides 4 m.
+    let length = summary["contour"]["length"].as_f64().unwrap();
+    assert!((length - 24.0).abs() < 1.0, "{length}");
+    assert!(summary["contour"]["doubled_share"].as_f64().unwrap() < 0.01);
+    assert!(std::fs::read(out.join("map.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn fewer_maps_leave_fewer_files_and_no_stale_ones() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &[]);
+    map(&log, &out, &["--maps", "tree"]);
+    assert_eq!(files_in(&out), ["map.pgm", "map.png", "map.portolan", "map.yaml", "summary.json"]);
+    map(&log, &out, &["--maps", "esdf"]);
+    assert!(files_in(&out).contains(&"esdf.bin".to_owned()));
+    assert!(!files_in(&out).contains(&"contour.svg".to_owned()));
+}
+
+#[test]
+fn json_is_one_document_and_quiet_is_nothing() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    let common = ["map", arg(&log), "--resolution", "0.1", "--out", arg(&out)];
+    let summary = json(common.iter().chain(&["--json"]));
+    assert_eq!(summary["extent"]["resolution"], 0.1);
+    assert_eq!(succeed(common.iter().chain(&["-q"])), "");
+    let points = folder.path().join("p.csv");
+    std::fs::write(&points, "1,1\n").unwrap();
+    let (svg, out) = (folder.path().join("c.svg"), arg(&out));
+    for arguments in [
+        vec!["query", out, "--points", arg(&points), "--json"],
+        vec!["info", out, "--json"],
+        vec!["info", arg(&log), "--json"],
+        vec!["mesh", out, arg(&svg), "--json"],
+        vec!["convert", out, arg(&svg), "--json"],
+        vec!["eval", out, "--scans", arg(&log), "--json"],
+    ] {
+        assert!(json(arguments).is_object());
+    }
+}
+
+#[test]
+fn queries_answer_with_distance_and_gradient() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &[]);
+    let points = folder.path().join("points.csv");
+    // Free near the left wall, inside a wall, in the never observed pillar, outside.
+    std::fs::write(&points, "x,y\n0.5,2.0 # left wall\n-0.06,2\n3,2\n100,100\n").unwrap();
+    let text = succeed(["query", arg(&out), "--points", arg(&points)]);
+    let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows[0].join(","), "x,y,status,occupancy,distance,lower,upper,gx,gy");
+    let number = |row: usize, column: usize| rows[row][column].parse::<f64>().unwrap();
+    assert_eq!(rows[1][2], "known");
+    assert!(number(1, 3) < 0.2 && (number(1, 4) - 0.5).abs() < 0.06 && (number(1, 7) - 1.0).abs() < 0.1);
+    assert!(number(2, 4) < 0.0 && rows[2][2] == "known");
+    assert_eq!(rows[3][2..], ["unknown", "", "", "", "", "", ""]);
+    assert_eq!(rows[4][2..], ["outside", "", "", "", "", "", ""]);
+    assert_eq!(rows.len(), 5);
+
+    let mut child = Command::new(env!("CARGO_BIN_EXE_portolan"))
+        .args(["query", arg(&out.join("map.yaml")), "--points", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(b"0.5,2.0\n").unwrap();
+    let text = String::from_utf8(child.wait_with_output().unwrap().stdout).unwrap();
+    assert!(text.contains("\n0.5,2,known,"), "{text}");
+    let text = succeed(["query", arg(&out.join("esdf.bin")), "--points", arg(&points)]);
+    assert!(text.lines().nth(1).unwrap().starts_with("0.5,2,known,,0."), "{text}");
+}
+
+#[test]
+fn saturated_cells_answer_at_least_so_far() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.esdf.bin");
+    let mut bytes = b"PORTESDF".to_vec();
+    for word in [1u32, 2, 3, 3, 1, 1] {
+        bytes.extend(word.to_le_bytes());
+    }
+    for number in [0.0f64, 0.0, 0.0, 1.0] {
+        bytes.extend(number.to_le_bytes());
+    }
+    bytes.extend((0..9).flat_map(|i| (if i % 3 == 2 { -2.0f32 } else { 1.0 }).to_le_bytes()));
+    bytes.extend([1, 1, 2, 1, 1, 2, 1, 1, 2]);
+    std::fs::write(&path, bytes).unwrap();
+    let points = folder.path().join("p.csv");
+    std::fs::write(&points, "1,1\n2.5,1\n").unwrap();
+    let text = succeed(["query", arg(&path), "--points", arg(&points)]);
+    let rows: Vec<_> = text.lines().skip(1).collect();
+    assert_eq!(rows, ["1,1,known,,1,,,0,0", "2.5,1,saturated,,-2,2,,,"]);
+}
+
+#[test]
+fn conversions_agree_with_what_map_wrote() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &[]);
+    let to = |name: &str| folder.path().join(name);
+    let read = |path: &std::path::Path| std::fs::read(path).unwrap();
+    for (name, original) in [
+        ("a.bin", "esdf.bin"),
+        ("a.geojson", "contour.geojson"),
+        ("a.svg", "contour.svg"),
+        ("a.portolan", "map.portolan"),
+    ] {
+        succeed(["convert", arg(&out), arg(&to(name))]);
+        assert_eq!(read(&to(name)), read(&out.join(original)), "{name}");
+    }
+    succeed(["convert", arg(&out.join("map.portolan")), arg(&to("b.yaml"))]);
+    assert_eq!(read(&to("b.pgm")), read(&out.join("map.pgm")));
+    succeed(["mesh", arg(&out), arg(&to("m.geojson"))]);
+    assert_eq!(read(&to("m.geojson")), read(&out.join("contour.geojson")));
+    succeed(["convert", arg(&out.join("contour.geojson")), arg(&to("c.svg"))]);
+    assert_eq!(read(&to("c.svg")), read(&out.join("contour.svg")));
+
+    // A map_server map gets a distance field, a contour, and a map of its own.
+    let yaml = out.join("map.yaml");
+    for name in ["d.esdf.bin", "d.geojson", "d.portolan", "d.yaml"] {
+        succeed(["convert", arg(&yaml), arg(&to(name))]);
+        assert!(json(["info", arg(&to(name)), "--json"]).is_object());
+    }
+    assert_eq!(read(&to("d.pgm")), read(&out.join("map.pgm")));
+    succeed(["convert", arg(&to("d.portolan")), arg(&to("e.yaml"))]);
+    assert_eq!(read(&to("e.pgm")), read(&out.join("map.pgm")));
+    for name in ["f.yaml", "f.svg", "f.bin"] {
+        succeed(["convert", arg(&out.join("esdf.bin")), arg(&to(name))]);
+    }
+    assert_eq!(read(&to("f.bin")), read(&out.join("esdf.bin")));
+
+    let output = portolan(["convert", arg(&out.join("contour.geojson")), arg(&to("x.bin"))]);
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && err.contains("it can become .geojson or .svg"), "{err}");
+}
+
+#[test]
+fn info_tells_what_files_are() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--hold-out", "10"]);
+    let about = json(["info", arg(&log), "--json"]);
+    assert_eq!(about["scans"], 60);
+    assert_eq!(about["readings_without_echo"], 540);
+    let threshold = about["no_return"].as_f64().unwrap();
+    assert!(threshold > 80.0 && threshold < 81.83);
+    let about = json(["info", arg(&out), "--json"]);
+    assert_eq!((&about["scans"], &about["hold_out"]), (&54.into(), &10.into()));
+    assert!(about["maps"]["tsdf"]["observed"].as_u64().unwrap() > 1000);
+    for name in ["esdf.bin", "map.yaml", "map.pgm", "contour.geojson", "contour.svg", "map.portolan"] {
+        let text = succeed(["info", arg(&out.join(name))]);
+        assert!(text.lines().count() >= 2, "{text}");
+    }
+}
+
+#[test]
+fn held_out_scans_are_predicted() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--hold-out", "10"]);
+    let score = json(["eval", arg(&out), "--scans", arg(&log), "--json"]);
+    let scans = &score["scans"];
+    assert_eq!(
+        (&scans["scans"], &scans["held_out"], &scans["beams"]),
+        (&6.into(), &true.into(), &1026.into())
+    );
+    assert!(scans["median_error"].as_f64().unwrap() < 0.02, "{scans}");
+    assert!(scans["within_two_cells_of_all"].as_f64().unwrap() > 0.95, "{scans}");
+
+    // Against the walls themselves.
+    let walls = folder.path().join("walls.geojson");
+    let room = "[[0,0],[6,0],[6,4],[0,4],[0,0]],[[2.5,1.5],[3.5,1.5],[3.5,2.5],[2.5,2.5],[2.5,1.5]]";
+    let text = format!("{{\"type\":\"MultiLineString\",\"coordinates\":[{room}]}}");
+    std::fs::write(&walls, text).unwrap();
+    let both = json(["eval", arg(&out), "--reference", arg(&walls), "--json"]);
+    for way in ["from_map", "to_map"] {
+        assert!(both["reference"][way]["median"].as_f64().unwrap() < 0.015, "{both}");
+    }
+    let own = out.join("contour.geojson");
+    let same = json(["eval", arg(&out), "--reference", arg(&own), "--json"]);
+    assert_eq!(same["reference"]["from_map"]["p95"].as_f64().map(|v| v < 1e-12), Some(true));
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let (folder, log) = room();
+    let run = |threads: &str| {
+        let out = folder.path().join(threads);
+        map(&log, &out, &["--threads", threads]);
+        FILES
+            .iter()
+            .filter(|n| **n != "summary.json")
+            .map(|n| std::fs::read(out.join(n)).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let one = run("1");
+    assert!(one == run("2") && one == run("8"));
+}
+
+#[test]
+fn appending_equals_one_go_on_the_same_bounds() {
+    let (folder, log) = room();
+    let half = folder.path().join("half.log");
+    // The same readings whatever the file says first; no-return is given, because a part might not show it.
+    std::fs::write(&half, log_lines(0, 30)).unwrap();
+    let rest = folder.path().join("rest.log");
+    std::fs::write(&rest, log_lines(30, 60)).unwrap();
+    let (once, twice) = (folder.path().join("once"), folder.path().join("twice"));
+    let bounds = ["--bounds", "-1,-1,7,5"];
+    map(&log, &once, &bounds);
+    map(&half, &twice, &bounds);
+    let rest_arguments =
+        ["map", arg(&rest), "--append", "--out", arg(&twice), "--bounds", "-1,-1,7,5", "--json"];
+    let summary = json(rest_arguments);
+    assert_eq!((&summary["scans"]["fused"], &summary["scans"]["in_map"]), (&30.into(), &60.into()));
+    for name in ["esdf.bin", "contour.geojson", "map.pgm", "map.yaml"] {
+        assert!(
+            std::fs::read(once.join(name)).unwrap() == std::fs::read(twice.join(name)).unwrap(),
+            "{name}"
+        );
+    }
+    let about = |folder: &std::path::Path| json(["info", arg(folder), "--json"]);
+    let (a, b) = (about(&once), about(&twice));
+    assert_eq!((&a["maps"], &a["statistics"]), (&b["maps"], &b["statistics"]));
+    assert_eq!(b["logs"], serde_json::json!(["half.log", "rest.log"]));
+}
+
+#[test]
+fn appending_grows_the_map() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--bounds", "1,1,3,3"]);
+    let summary = json(["map", arg(&log), "--append", "--out", arg(&out), "--json"]);
+    let size = |k: usize| summary["extent"]["size"][k].as_f64().unwrap();
+    assert!(size(0) > 6.0 && size(1) > 4.0);
+    // What has two laps in it is the pillar's left side, what has one is the rest.
+    assert!((summary["contour"]["length"].as_f64().unwrap() - 24.0).abs() < 1.5);
+
+    for (option, value, name) in [
+        ("--resolution", "0.1", "resolution"),
+        ("--truncation", "0.3", "truncation"),
+        ("--weights", "range", "weights"),
+        ("--sweep", "march", "sweep"),
+        ("--w-max", "8", "w_max"),
+    ] {
+        let err = support::fail(1, ["map", arg(&log), "--append", "--out", arg(&out), option, value]);
+        assert!(err.contains(&format!("{name} is")) && err.contains("in this call"), "{err}");
+    }
+}
+
+#[test]
+fn other_poses_and_every_second_scan() {
+    let (folder, log) = room();
+    let poses = folder.path().join("poses.txt");
+    let shifted: String = (0..60)
+        .map(|i| {
+            let [x, y, theta] = support::pose(i);
+            format!("{} {} {theta}\n", x + 500_000.0, y + 4_000_000.0)
+        })
+        .collect();
+    std::fs::write(&poses, shifted).unwrap();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--poses", arg(&poses), "--every", "2"]);
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["scans"]["fused"], 30);
+    assert!(summary["extent"]["min"][1].as_f64().unwrap() > 3_999_998.0);
+    assert!((summary["contour"]["length"].as_f64().unwrap() - 24.0).abs() < 1.0);
+    std::fs::write(&poses, "0 0 0\n").unwrap();
+    let arguments = ["map", arg(&log), "--resolution", "0.05", "--out", arg(&out), "--poses", arg(&poses)];
+    let err = support::fail(1, arguments);
+    assert!(err.contains("the number of poses is 1; give one for each of the 60 scans"), "{err}");
+}
+
+#[test]
+fn every_help_ends_with_an_example() {
+    for command in ["map", "query", "info", "convert", "mesh", "eval"] {
+        let help = succeed([command, "--help"]);
+        let last = help.trim_end().lines().last().unwrap();
+        assert!(last.contains(&format!("portolan {command}")), "{help}");
+    }
+    assert_eq!(range([1.0, 1.0], 0.0), 5.0);
+}
