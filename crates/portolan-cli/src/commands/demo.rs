@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::bail;
-use portolan::gallery::Gallery;
+use portolan::gallery::{ErrorSummary, Gallery};
 use portolan::geom::{Grid, Pose};
 use portolan::map::SweepKind;
 use portolan::scan::{RangeLimits, Scan, ScanStats};
@@ -22,6 +22,7 @@ use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, 
 use crate::output::Output;
 use crate::pictures::Scene;
 use crate::progress::Progress;
+use crate::report::{self, Facts};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan demo --out out")]
@@ -82,13 +83,35 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let artefacts = Artefacts { file: &file, derived: &derived, title };
     let (written, _) = run.timed("map_files", || artefacts.write(&args.out))?;
     run.files.extend(written);
-    run.files.push("summary.json");
+    run.files.extend(["report.html", "summary.json"]);
 
     let found = Found { config, settings, grid, world: &world, fusion, bytes, file, derived, gallery: &gallery };
+    let facts = Facts {
+        scene,
+        esdf_against_contour: against_contour(&gallery),
+        seconds: run.total(),
+        warnings: found.warnings(),
+    };
+    let page = run.timed("report", || report::html(&facts));
+    write_atomic(args.out.join("report.html"), |w| w.write_all(page.as_bytes()))?;
     let mut summary = found.to_json(&run);
     write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{summary:#}"))?;
     summary["gallery"] = table;
     args.output.print(&summary, found.report(&run, &args.out.display().to_string()))
+}
+
+/// The ESDF against the contour: distances at free points beside every eighth cell centre, off it so that the
+/// interpolation is measured too.
+fn against_contour(gallery: &Gallery) -> Option<ErrorSummary> {
+    let (field, contour) = (&gallery.distance, &gallery.contour);
+    let grid = field.grid();
+    let errors = (0..grid.len()).step_by(8).filter(|&i| field.samples()[i] > 0.0).filter_map(|i| {
+        let [x, y] = grid.lattice.center(grid.cell(i));
+        let p = [x + 0.3 * grid.lattice.resolution, y - 0.2 * grid.lattice.resolution];
+        let d = field.distance(p).known().filter(|d| *d > 0.0)?;
+        Some(d - contour.nearest_distance(p)?)
+    });
+    ErrorSummary::of(errors.collect())
 }
 
 /// Files written and seconds spent.
@@ -264,7 +287,7 @@ impl Found<'_> {
             s("simulate"),
             s("fuse") + s("derive"),
             s("gallery"),
-            s("gallery_files") + s("map_files")
+            s("gallery_files") + s("map_files") + s("report")
         );
         let _ = writeln!(text, "wrote {} to {folder}", run.files.join(", "));
         text

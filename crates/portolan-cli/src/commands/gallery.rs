@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use crate::arguments::{bounds, bytes, length};
 use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
-use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen};
+use crate::mapping::{MapKind, Settings, check_memory, grid_over};
 use crate::output::Output;
 use crate::pictures::{Scene, sheet};
 
@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let (fused, _) = Selection { every: args.every, hold_out: None }.split(log.len());
         let scans = log::scans(&log, &fused, &limits);
         let name = args.log.display().to_string();
-        let grid = grid_over(seen(&scans), &settings, None, &name)?;
+        let grid = grid_over(&settings, None, &scans, &name)?;
         (None, scans, grid, name)
     };
     check_memory(&grid, &settings, &scans, args.memory, &name)?;
