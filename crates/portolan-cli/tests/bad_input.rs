@@ -115,7 +115,7 @@ fn settings_that_cannot_be() {
         ("--hold-out", &["0", "1"]),
         ("--memory", &["0", "x", "4Q"]),
         ("--threads", &["0"]),
-        ("--maps", &["grid,cloud"]),
+        ("--maps", &["cloud"]),
         ("--weights", &["heavy"]),
     ] {
         for value in values {
