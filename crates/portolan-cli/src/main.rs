@@ -10,6 +10,7 @@ mod log;
 mod mapping;
 mod output;
 mod picture;
+mod pictures;
 mod progress;
 mod source;
 

@@ -102,7 +102,8 @@ fn cell_colors(file: &MapFile, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<C
         for (c, (&d, _)) in colors.iter_mut().zip(observed).filter(|(_, (_, w))| **w >= 0.5) {
             *c = distance_color(f64::from(d), truncation).over(*c);
         }
-        legend.push(Entry::new(Swatch::Area(distance_color(-0.7, 1.0).over(color::PAPER)), "behind a surface"));
+        legend
+            .push(Entry::new(Swatch::Area(distance_color(-0.7, 1.0).over(color::PAPER)), "behind a surface"));
         legend.push(Entry::new(Swatch::Area(distance_color(0.5, 1.0).over(color::PAPER)), "in front of it"));
     }
     colors

@@ -29,6 +29,7 @@ pub struct Panels {
     columns: usize,
     panels: Vec<Panel>,
     legend: Vec<Entry>,
+    large: bool,
 }
 
 const MARGIN: f64 = 24.0;
@@ -49,6 +50,12 @@ impl Panels {
     /// Number of panels in a row; without it the sheet is about as wide as high.
     pub fn columns(mut self, columns: usize) -> Self {
         self.columns = columns;
+        self
+    }
+
+    /// Larger letters, for wide panels that are looked at reduced.
+    pub fn large(mut self) -> Self {
+        self.large = true;
         self
     }
 
@@ -78,13 +85,15 @@ impl Panels {
         (canvas, views)
     }
 
-    /// The same with bare rectangles of `width × height` pixels instead of views: for charts or mixed content.
+    /// The same with bare rectangles of `width × height` pixels instead of views: for charts or mixed
+    /// content.
     pub fn layout_rects(&self, width: f64, height: f64) -> (Canvas, Vec<PixelRect>) {
         let count = self.panels.len().max(1);
         let columns =
             if self.columns > 0 { self.columns.min(count) } else { square_columns(count, width, height) };
         let rows = count.div_ceil(columns);
-        let (heading, detail, small) = (Font::new(24).bold(), Font::new(20).bold(), Font::new(16));
+        let [detail, small] = if self.large { [24, 20] } else { [20, 16] };
+        let (heading, detail, small) = (Font::new(24).bold(), Font::new(detail).bold(), Font::new(small));
         let inner = columns as f64 * width + (columns - 1) as f64 * GAP;
 
         let subtitle = small.wrap(&self.subtitle, inner);

@@ -1,1 +1,29 @@
 //! Worlds, robots and sensors, deterministic from a seed.
+//!
+//! Every transcendental function comes from `libm` and every random number from one small generator, so that a
+//! seed gives the same bytes on every platform and for any number of threads.
+//!
+//! ```
+//! use portolan_sim::{LapConfig, apartment, lap};
+//!
+//! let world = apartment().world;
+//! let lap = lap(&world, &LapConfig { scans: 4, ..Default::default() });
+//! assert_eq!(lap.len(), 4);
+//! let (world_from_sensor, scan) = &lap[0];
+//! assert!(world.signed_distance(world_from_sensor.translation) > 0.25);
+//! assert_eq!(scan.len(), 360);
+//! ```
+
+mod apartment;
+mod drive;
+mod lidar;
+mod random;
+mod solid;
+mod world;
+
+pub use apartment::{Apartment, CHAIR_MOVE, apartment};
+pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
+pub use lidar::{Lidar, scan_at};
+pub use random::Random;
+pub use solid::{Solid, SolidKind};
+pub use world::{BoundarySegment, RayHit, World};

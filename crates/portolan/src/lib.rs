@@ -8,8 +8,10 @@
 mod answer;
 pub mod cell;
 pub mod field;
+pub mod gallery;
 pub mod geom;
 pub mod map;
+pub mod radiance;
 pub mod scan;
 pub mod store;
 pub mod surface;

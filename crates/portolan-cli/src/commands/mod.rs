@@ -1,14 +1,23 @@
 //! The commands, one file each.
 
 mod convert;
+mod demo;
 mod eval;
+mod gallery;
 mod info;
 mod map;
 mod mesh;
 mod query;
+mod radiance;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
+    /// The chapter's experiment: a simulated lap, every representation, the gallery
+    Demo(demo::Args),
+    /// One log in every representation: what each costs and how true its answers are
+    Gallery(gallery::Args),
+    /// The differentiable renderer on a line: density, transmittance, rays, residuals and bias
+    Radiance(radiance::Args),
     /// Fuse a log into maps and write them into a folder
     Map(Box<map::Args>),
     /// Ask a map at points: occupancy, distance, gradient
@@ -26,6 +35,9 @@ pub(crate) enum Command {
 impl Command {
     pub(crate) fn run(&self) -> anyhow::Result<()> {
         match self {
+            Self::Demo(args) => demo::run(args),
+            Self::Gallery(args) => gallery::run(args),
+            Self::Radiance(args) => radiance::run(args),
             Self::Map(args) => map::run(args),
             Self::Query(args) => query::run(args),
             Self::Info(args) => info::run(args),

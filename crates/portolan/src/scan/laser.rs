@@ -75,10 +75,16 @@ impl Scan<2> {
         let mut refused = RefusedBeams::default();
         let beams: Vec<_> =
             directions.iter().zip(readings).map(|(&d, &z)| limits.beam(d, z, &mut refused)).collect();
-        let order = fan_order(&bearings[..beams.len().min(bearings.len())]);
-        let mut scan = Self::from_beams(beams).with_order(order);
+        let mut scan = Self::from_fan(bearings, beams);
         scan.refuse(refused);
         scan
+    }
+
+    /// A planar scan of beams whose kinds are known, with their bearings (radians), one per beam. Bearings that
+    /// ascend within one turn make the beams neighbours.
+    pub fn from_fan(bearings: &[f64], beams: Vec<Beam<2>>) -> Self {
+        let order = fan_order(&bearings[..beams.len().min(bearings.len())]);
+        Self::from_beams(beams).with_order(order)
     }
 }
 

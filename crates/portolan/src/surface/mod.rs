@@ -10,4 +10,4 @@ pub use contour::Contour;
 pub use measures::{DoubledLength, ThinWalls, doubled_length, thin_walls};
 pub use polyline::Polyline;
 pub use ray_cast::{RayCast, RayCastSettings, cast_ray};
-pub use squares::{Ambiguity, ContourSettings, marching_squares};
+pub use squares::{Ambiguity, ContourSettings, level_set, marching_squares};

@@ -1,6 +1,7 @@
 //! Marching squares over cell centres.
 
 use super::Contour;
+use crate::geom::Grid;
 use crate::map::Tsdf;
 
 /// What to do with a square whose diagonal corners agree and whose neighbours differ.
@@ -41,16 +42,27 @@ struct RowEdges {
     side: Vec<u32>,
 }
 
-/// The zero level set of a field as oriented segments, free space on the left.
+/// The zero level set of a TSDF as oriented segments, free space on the left.
 ///
 /// Squares join the centres of four neighbouring cells; a crossing is placed on an edge by linear
 /// interpolation, `t = D_a / (D_a - D_b)`, which is exact for the piecewise-linear field of the samples.
 /// Negative is inside, zero is free. O(cells).
 pub fn marching_squares(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Contour {
-    let grid = tsdf.grid();
-    let [width, height] = grid.shape;
     let planes = tsdf.store().planes();
-    let (distance, weight) = (planes.distances(), planes.weights());
+    let weight = planes.weights();
+    let observed = |i: usize| weight[i] > 0.0 && weight[i] >= settings.min_weight;
+    level_set(tsdf.grid(), planes.distances(), observed, settings.ambiguity)
+}
+
+/// [`marching_squares`] over any samples at cell centres, x fastest; squares with a corner that is not
+/// `observed` have no sign and get no segment.
+pub fn level_set(
+    grid: &Grid<2>,
+    samples: &[f32],
+    observed: impl Fn(usize) -> bool,
+    ambiguity: Ambiguity,
+) -> Contour {
+    let [width, height] = grid.shape;
     let mut contour = Contour::default();
     if width < 2 || height < 2 {
         return contour;
@@ -60,8 +72,7 @@ pub fn marching_squares(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Contour {
         std::mem::swap(&mut edges.below, &mut edges.above);
         edges.above.fill(NONE);
         edges.side.fill(NONE);
-        let (lower, upper) = (&distance[y * width..][..width], &distance[(y + 1) * width..][..width]);
-        let (lower_w, upper_w) = (&weight[y * width..][..width], &weight[(y + 1) * width..][..width]);
+        let (lower, upper) = (&samples[y * width..][..width], &samples[(y + 1) * width..][..width]);
         for x in 0..width - 1 {
             // Corners counter-clockwise from the lower left.
             let d = [lower[x], lower[x + 1], upper[x + 1], upper[x]];
@@ -69,16 +80,18 @@ pub fn marching_squares(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Contour {
             if code == 0 || code == 15 {
                 continue;
             }
-            let w = [lower_w[x], lower_w[x + 1], upper_w[x + 1], upper_w[x]];
-            if w.iter().any(|&w| w < settings.min_weight || w == 0.0) {
+            let low = y * width + x;
+            if ![low, low + 1, low + width + 1, low + width].into_iter().all(&observed) {
                 continue;
             }
-            for &[from, to] in segments(code, &d, settings.ambiguity) {
-                let ends = [from, to].map(|edge| vertex(&mut contour, &mut edges, tsdf, [x, y], &d, edge));
+            for &[from, to] in segments(code, &d, ambiguity) {
+                let ends = [from, to].map(|edge| vertex(&mut contour, &mut edges, grid, [x, y], &d, edge));
                 contour.segments.push(ends);
             }
         }
     }
+    contour.vertices.shrink_to_fit();
+    contour.segments.shrink_to_fit();
     contour
 }
 
@@ -116,7 +129,7 @@ fn segments(code: usize, d: &[f32; 4], ambiguity: Ambiguity) -> &'static [[u8; 2
 fn vertex(
     contour: &mut Contour,
     edges: &mut RowEdges,
-    tsdf: &Tsdf<2>,
+    grid: &Grid<2>,
     [x, y]: [usize; 2],
     d: &[f32; 4],
     edge: u8,
@@ -130,7 +143,7 @@ fn vertex(
     };
     if *slot == NONE {
         let (da, db) = (f64::from(da), f64::from(db));
-        let lattice = &tsdf.grid().lattice;
+        let lattice = &grid.lattice;
         let mut p = lattice.center(low.map(|v| v as i32));
         p[axis] += da / (da - db) * lattice.resolution;
         *slot = contour.vertices.len() as u32;

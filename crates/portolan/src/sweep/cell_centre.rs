@@ -1,11 +1,11 @@
 //! The default sweep for distances: at cell centres, with the range interpolated between beams.
 
 use super::fan::{Fan, Spoke};
-use super::fan_plan::{BlockBitmap, Stretch, mark_between};
+use super::fan_plan::{BlockBitmap, Outline, Stretch};
 use super::nearest_ray::NearestRay;
 use super::{Sweep, WeightModel};
-use crate::cell::{DistanceObservation, Distances};
-use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
+use crate::cell::Distances;
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
 use crate::scan::{BeamOrder, Scan};
 
 /// Gives every cell the distance at its **centre**.
@@ -16,7 +16,7 @@ use crate::scan::{BeamOrder, Scan};
 /// the shorter one, less the truncation. The cost is that of the cells, not of the beams: no cell is looked at
 /// twice. Scans without neighbourhood give each cell the beam that passes nearest to its centre.
 ///
-/// Against [`super::March`] this removes an outward bias of about a quarter of a cell.
+/// Against [`super::March`] this removes a bias of about a quarter of a cell away from the sensor.
 #[derive(Clone, Debug)]
 pub struct CellCentre<const D: usize> {
     truncation: f64,
@@ -27,6 +27,7 @@ pub struct CellCentre<const D: usize> {
     spokes: Vec<Spoke>,
     fan: Fan,
     bitmap: BlockBitmap,
+    outline: Outline,
     keys: Vec<BlockKey<D>>,
     /// Centre of the first cell of the lattice, relative to the sensor.
     first_centre: [f64; D],
@@ -48,6 +49,7 @@ impl<const D: usize> CellCentre<D> {
             spokes: Vec::new(),
             fan: Fan::default(),
             bitmap: BlockBitmap::default(),
+            outline: Outline::default(),
             keys: Vec::new(),
             first_centre: [0.0; D],
             resolution: 1.0,
@@ -76,31 +78,60 @@ impl<const D: usize> CellCentre<D> {
             window.max[k] = window.max[k].min(origin[k] + reach);
         }
         self.bitmap.reset(lattice, &window);
-        let margin = lattice.resolution;
-        let zero = [origin[0], origin[1]];
-        for i in 0..self.spokes.len() {
-            let a = self.spokes[i];
-            let of_a = Stretch::of(&a, self.truncation, self.carve);
-            let mut mark = |b: [f32; 2], stretch| {
-                mark_between(&mut self.bitmap, lattice, zero, (a.direction, b), stretch, margin);
-            };
-            let neighbour = scan.next(i).map(|j| self.spokes[j]);
-            let of_b = neighbour.and_then(|b| Stretch::of(&b, self.truncation, self.carve));
-            match (of_a, of_b, neighbour) {
-                (Some(p), Some(q), Some(b)) => {
-                    // The arc between the beams bulges over the chord by less than 1 % up to the opening at which
-                    // beams stop to be neighbours; wider wedges say nothing between the beams.
-                    let hull = Stretch { from: p.from.min(q.from), to: 1.01 * p.to.max(q.to) };
-                    mark(b.direction, hull);
-                }
-                (Some(p), ..) => mark(a.direction, p),
-                (None, Some(q), Some(b)) => {
-                    mark_between(&mut self.bitmap, lattice, zero, (b.direction, b.direction), q, margin)
-                }
-                _ => {}
-            }
-        }
+        self.outline_beams(scan, lattice, origin);
         self.bitmap.collect(&mut self.keys);
+    }
+}
+
+impl<const D: usize> CellCentre<D> {
+    /// Marks the blocks between neighbouring beams, a few beams at a time.
+    fn outline_beams(&mut self, scan: &Scan<D>, lattice: &Lattice<D>, origin: [f64; D]) {
+        /// Beams in one outline: more are cheaper to mark, but cover more blocks that no beam sees.
+        const TOGETHER: usize = 6;
+        let inverse = 1.0 / (lattice.resolution * BLOCK_EDGE as f64);
+        let zero: [f64; 2] = [0, 1].map(|k| (origin[k] - lattice.origin[k]) * inverse);
+        // A cell around every beam: centres are seen, not corners, and torn beams speak half a cell aside.
+        self.outline.reset(&self.bitmap, lattice.resolution * inverse);
+        let mut last: Option<(Stretch, [[f64; 2]; 2])> = None;
+        let mut together = 0;
+        let n = self.spokes.len();
+        let closing = usize::from(scan.next(n - 1).is_some());
+        for i in (0..n).chain(0..closing) {
+            let spoke = &self.spokes[i];
+            let stretch = Stretch::of(spoke, self.truncation, self.carve);
+            let ends = stretch.map(|s| {
+                [s.from, s.to].map(|s| [0, 1].map(|k| zero[k] + f64::from(spoke.direction[k]) * s * inverse))
+            });
+            // Without carving there is nothing between two bands that do not overlap.
+            let continues = match (&last, &stretch) {
+                (Some((before, _)), Some(now)) => {
+                    self.carve || (before.from <= now.to && now.from <= before.to)
+                }
+                _ => false,
+            };
+            if let (Some((_, before)), Some(now), true) = (&last, &ends, continues) {
+                self.outline.edge(before[1], now[1]);
+                if !self.carve {
+                    self.outline.edge(before[0], now[0]);
+                }
+                together += 1;
+            }
+            if !continues || together == TOGETHER {
+                if let Some((_, [from, to])) = last {
+                    self.outline.edge(from, to);
+                }
+                self.outline.mark(&mut self.bitmap);
+                together = 0;
+                if let Some([from, to]) = ends {
+                    self.outline.edge(from, to);
+                }
+            }
+            last = stretch.zip(ends);
+        }
+        if let Some((_, [from, to])) = last {
+            self.outline.edge(from, to);
+        }
+        self.outline.mark(&mut self.bitmap);
     }
 }
 
@@ -109,7 +140,7 @@ impl<const D: usize> Sweep<D> for CellCentre<D> {
 
     fn plan(&mut self, scan: &Scan<D>, world_from_sensor: &Pose<D>, lattice: &Lattice<D>, bounds: &Aabb<D>) {
         self.model.weigh(scan, &mut self.cosines, &mut self.weights);
-        self.ordered = matches!(scan.order(), BeamOrder::Fan { .. }) && scan.len() >= 2;
+        self.ordered = matches!(scan.order(), BeamOrder::Fan { .. }) && Fan::can_hold(scan.len());
         if self.ordered {
             self.plan_fan(scan, world_from_sensor, lattice, bounds);
         } else {
@@ -132,11 +163,9 @@ impl<const D: usize> Sweep<D> for CellCentre<D> {
             std::array::from_fn(|k| (self.first_centre[k] + f64::from(cell[k]) * self.resolution) as f32);
         let step = self.resolution as f32;
         let (distance, weight) = scratch.planes_mut();
-        for i in 0..block_cells::<D>() {
-            let x = corner[0] + (i % BLOCK_EDGE) as f32 * step;
-            let y = corner[1] + (i / BLOCK_EDGE) as f32 * step;
-            let said = self.fan.observe(x, y).unwrap_or(DistanceObservation { distance: 0.0, weight: 0.0 });
-            (distance[i], weight[i]) = (said.distance, said.weight);
+        // Fans exist in the plane only, where a block has exactly so many cells.
+        if let (Ok(distance), Ok(weight)) = (distance.try_into(), weight.try_into()) {
+            self.fan.observe_block([corner[0], corner[1]], step, distance, weight);
         }
         scratch
     }
@@ -145,7 +174,8 @@ impl<const D: usize> Sweep<D> for CellCentre<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::Evidence;
+    use crate::cell::{DistanceObservation, Evidence};
+    use crate::geom::block_cells;
     use crate::scan::RangeLimits;
     use proptest::prelude::*;
     use std::collections::HashMap;

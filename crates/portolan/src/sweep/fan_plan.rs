@@ -82,47 +82,73 @@ impl Stretch {
     }
 }
 
-/// Marks all blocks with a cell centre in the quadrilateral that two neighbouring beams span, widened by
-/// `margin` metres. Too many are harmless: their evidence is empty; too few are not.
-pub(super) fn mark_between<const D: usize>(
-    bitmap: &mut BlockBitmap,
-    lattice: &Lattice<D>,
-    origin: [f64; 2],
-    (a, b): ([f32; 2], [f32; 2]),
-    stretch: Stretch,
+/// `f64::floor` for indices; on baseline x86-64 the method is a call.
+#[inline(always)]
+fn floor(v: f64) -> i64 {
+    let toward_zero = v as i64;
+    toward_zero - i64::from(v < toward_zero as f64)
+}
+
+/// Collects the outline of what a few neighbouring beams observe, and marks the blocks in it row by row. More
+/// blocks than necessary are harmless, their evidence is empty; fewer are not.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Outline {
+    /// Leftmost and rightmost place in each row of blocks, in blocks.
+    rows: Vec<[f64; 2]>,
+    /// Rows in use.
+    used: Option<[i64; 2]>,
+    /// Rows of the bitmap.
+    limits: [i64; 2],
     margin: f64,
-) {
-    let block = lattice.resolution * BLOCK_EDGE as f64;
-    let inverse = 1.0 / block;
-    // Everything in units of blocks.
-    let zero = [(origin[0] - lattice.origin[0]) * inverse, (origin[1] - lattice.origin[1]) * inverse];
-    let margin = margin * inverse;
-    let point = |d: [f32; 2], s: f64| {
-        [zero[0] + f64::from(d[0]) * s * inverse, zero[1] + f64::from(d[1]) * s * inverse]
-    };
-    let corners =
-        [point(a, stretch.from), point(a, stretch.to), point(b, stretch.to), point(b, stretch.from)];
-    let low = corners.iter().map(|c| c[1]).fold(f64::INFINITY, f64::min) - margin;
-    let high = corners.iter().map(|c| c[1]).fold(f64::NEG_INFINITY, f64::max) + margin;
-    let rows = (bitmap.first[1], bitmap.first[1] + bitmap.size[1] - 1);
-    let (y0, y1) = ((low.floor() as i64).max(rows.0), (high.floor() as i64).min(rows.1));
-    for y in y0..=y1 {
-        let (bottom, top) = (y as f64 - margin, (y + 1) as f64 + margin);
-        let (mut x0, mut x1) = (f64::INFINITY, f64::NEG_INFINITY);
-        for k in 0..4 {
-            let (p, q) = (corners[k], corners[(k + 1) % 4]);
-            let (p, q) = if p[1] <= q[1] { (p, q) } else { (q, p) };
-            if q[1] < bottom || p[1] > top {
-                continue;
-            }
-            let slope = if q[1] > p[1] { (q[0] - p[0]) / (q[1] - p[1]) } else { 0.0 };
+}
+
+impl Outline {
+    /// Starts over for a bitmap; outlines are widened by `margin` blocks.
+    pub(super) fn reset(&mut self, bitmap: &BlockBitmap, margin: f64) {
+        self.limits = [bitmap.first[1], bitmap.first[1] + bitmap.size[1] - 1];
+        self.margin = margin;
+        self.rows.clear();
+        self.rows.resize(bitmap.size[1].max(0) as usize, [f64::INFINITY, f64::NEG_INFINITY]);
+        self.used = None;
+    }
+
+    /// Adds an edge between two points, in blocks.
+    #[inline]
+    pub(super) fn edge(&mut self, p: [f64; 2], q: [f64; 2]) {
+        let (p, q) = if p[1] <= q[1] { (p, q) } else { (q, p) };
+        let y0 = floor(p[1] - self.margin).max(self.limits[0]);
+        let y1 = floor(q[1] + self.margin).min(self.limits[1]);
+        if y0 > y1 {
+            return;
+        }
+        self.used = Some(self.used.map_or([y0, y1], |u| [u[0].min(y0), u[1].max(y1)]));
+        if y0 == y1 {
+            // Most edges are short.
+            let row = &mut self.rows[(y0 - self.limits[0]) as usize];
+            row[0] = row[0].min(p[0].min(q[0]));
+            row[1] = row[1].max(p[0].max(q[0]));
+            return;
+        }
+        let slope = if q[1] > p[1] { (q[0] - p[0]) / (q[1] - p[1]) } else { 0.0 };
+        for y in y0..=y1 {
+            let (bottom, top) = (y as f64 - self.margin, (y + 1) as f64 + self.margin);
             let enter = if p[1] >= bottom { p[0] } else { p[0] + (bottom - p[1]) * slope };
             let leave = if q[1] <= top { q[0] } else { p[0] + (top - p[1]) * slope };
-            x0 = x0.min(enter).min(leave);
-            x1 = x1.max(enter).max(leave);
+            let row = &mut self.rows[(y - self.limits[0]) as usize];
+            row[0] = row[0].min(enter.min(leave));
+            row[1] = row[1].max(enter.max(leave));
         }
-        if x0 <= x1 {
-            bitmap.mark(y, (x0 - margin).floor() as i64, (x1 + margin).floor() as i64);
+    }
+
+    /// Marks what is inside and forgets the outline.
+    pub(super) fn mark(&mut self, bitmap: &mut BlockBitmap) {
+        let Some([y0, y1]) = self.used.take() else { return };
+        for y in y0..=y1 {
+            let row = &mut self.rows[(y - self.limits[0]) as usize];
+            let [x0, x1] = std::mem::replace(row, [f64::INFINITY, f64::NEG_INFINITY]);
+            if x0 <= x1 {
+                bitmap.mark(y, floor(x0 - self.margin), floor(x1 + self.margin));
+            }
         }
     }
 }

@@ -1,0 +1,237 @@
+//! `gallery`: one log, every representation, what each costs and how true its answers are.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context;
+use portolan::cell::OccupancyModel;
+use portolan::field::EsdfSettings;
+use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
+use portolan::geom::{Aabb, Grid, Pose};
+use portolan::map::{Tsdf2Config, SweepKind};
+use portolan::scan::Scan;
+use portolan::surface::ContourSettings;
+use portolan::sweep::WeightModel;
+use portolan_io::write_atomic;
+use portolan_sim::{LapConfig, World};
+use serde_json::{Value, json};
+
+use crate::arguments::{bounds, bytes, length};
+use crate::error::bad_call;
+use crate::log::{self, LimitArgs, LogArgs, Selection};
+use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen};
+use crate::output::Output;
+use crate::pictures::{Scene, sheet};
+
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  portolan gallery demo\n  portolan gallery intel-corrected.log.gz --out intel")]
+pub struct Args {
+    /// Log of range scans with poses, or the word demo for the simulated Apartment
+    #[arg(value_name = "LOG|demo")]
+    log: PathBuf,
+    /// Edge of a cell (metres)
+    #[arg(long, value_name = "R", value_parser = length, default_value = "0.05")]
+    resolution: f64,
+    /// Distances are kept within this of a surface (metres); default three cells
+    #[arg(long, value_name = "T", value_parser = length)]
+    truncation: Option<f64>,
+    /// Probes per question that is answered directly; searches get a fiftieth
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
+    #[arg(default_value = "100000")]
+    probes: u32,
+    /// Folder for gallery.png, gallery.json and gallery.txt; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Use every N-th scan of the log only
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    every: Option<u64>,
+    /// Map this box only: x0,y0,x1,y1 (metres)
+    #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
+    bounds: Option<Aabb<2>>,
+    /// Memory that may be used, with suffix K, M or G
+    #[arg(long, value_name = "BYTES", value_parser = bytes, default_value = "4G")]
+    memory: u64,
+    #[command(flatten)]
+    source: LogArgs,
+    #[command(flatten)]
+    limits: LimitArgs,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Builds and measures all of them.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let simulated = args.log.as_os_str() == "demo";
+    let settings = args.settings();
+    let (world, scans, grid, name) = if simulated {
+        let given = |it: bool, option: &str| match it {
+            true => Err(bad_call(format!("{option} is for logs; leave it out with demo"))),
+            false => Ok(()),
+        };
+        given(args.source.poses.is_some(), "--poses")?;
+        given(args.source.format.is_some(), "--format")?;
+        let world = portolan_sim::apartment().world;
+        let scans = every(portolan_sim::lap(&world, &LapConfig::default()), args.every);
+        let grid = apartment_grid(args.resolution);
+        (Some(world), scans, grid, "the simulated Apartment".to_owned())
+    } else {
+        let log = log::read(&args.log, &args.source)?;
+        let limits = args.limits.limits(&log);
+        let (fused, _) = Selection { every: args.every, hold_out: None }.split(log.len());
+        let scans = log::scans(&log, &fused, &limits);
+        let name = args.log.display().to_string();
+        let grid = grid_over(seen(&scans), &settings, None, &name)?;
+        (None, scans, grid, name)
+    };
+    check_memory(&grid, &settings, &scans, args.memory, &name)?;
+    let gallery = measure(&scans, &grid, settings.truncation, args.probes as usize, world.as_ref())?;
+    let document = document(&gallery, &name, scans.len());
+    if let Some(folder) = &args.out {
+        make_folder(folder)?;
+        let scene = Scene { gallery: &gallery, log: &scans, world: world.as_ref() };
+        write_files(folder, &scene, &document, &title(&name, args.resolution, scans.len()))?;
+    }
+    args.output.print(&document, &gallery)
+}
+
+impl Args {
+    /// As `map` would have them.
+    fn settings(&self) -> Settings {
+        Settings {
+            resolution: self.resolution,
+            truncation: self.truncation.unwrap_or(3.0 * self.resolution),
+            w_max: 64.0,
+            weights: WeightModel::default(),
+            sweep: SweepKind::default(),
+            carve: true,
+            limits: Default::default(),
+            every: self.every,
+            hold_out: None,
+            bounds: self.bounds,
+            maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
+        }
+    }
+}
+
+fn every<T>(items: Vec<T>, n: Option<u64>) -> Vec<T> {
+    items.into_iter().step_by(n.unwrap_or(1) as usize).collect()
+}
+
+/// The box of the Apartment, 12 m x 9 m from zero: at 5 cm the chapter's 240 x 180 cells.
+pub(crate) fn apartment_grid(resolution: f64) -> Grid<2> {
+    // The small number keeps a rounded-up quotient from making one more column.
+    let cells = |metres: f64| (metres / resolution - 1e-9).ceil().max(1.0) as usize;
+    Grid::new([0.0; 2], resolution, [cells(12.0), cells(9.0)])
+}
+
+/// Runs the comparison with the wall clock.
+pub(crate) fn measure(
+    scans: &[(Pose<2>, Scan<2>)],
+    grid: &Grid<2>,
+    truncation: f64,
+    probes: usize,
+    world: Option<&World>,
+) -> anyhow::Result<Gallery> {
+    let settings = GallerySettings {
+        grid: *grid,
+        tsdf: Tsdf2Config { truncation, ..Default::default() },
+        model: OccupancyModel::default(),
+        contour: ContourSettings::default(),
+        esdf: EsdfSettings::default(),
+        probes,
+        surface_length: world.map(World::wall_length),
+    };
+    let start = Instant::now();
+    let mut clock = || start.elapsed().as_secs_f64();
+    let truth = world.map(|w| w as &dyn portolan::gallery::Truth<2>);
+    Ok(portolan::gallery::run(scans, &settings, truth, &mut clock)?)
+}
+
+/// What heads the picture.
+pub(crate) fn title(name: &str, resolution: f64, scans: usize) -> String {
+    let name = Path::new(name).file_name().map_or(name.into(), |n| n.to_string_lossy());
+    let cells = (resolution * 1000.0).round() / 10.0;
+    format!("One log, nine views: {name}, {scans} scans, cells of {cells} cm")
+}
+
+/// Makes the folder for results.
+pub(crate) fn make_folder(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| {
+        format!("{}: cannot make the folder; name one that can be written to", folder.display())
+    })
+}
+
+/// Writes the picture, the document and the table; gives their names.
+pub(crate) fn write_files(
+    folder: &Path,
+    scene: &Scene,
+    document: &Value,
+    title: &str,
+) -> anyhow::Result<[&'static str; 3]> {
+    const SUBTITLE: &str = "The same scans at the same poses in every representation. Each panel names its memory, \
+        what a scan (or a rebuild, for what is derived from the TSDF) costs, and what an answer costs or how true it is.";
+    let png = sheet(scene, title, SUBTITLE);
+    write_atomic(folder.join("gallery.png"), |w| w.write_all(&png))?;
+    write_atomic(folder.join("gallery.json"), |w| writeln!(w, "{document:#}"))?;
+    write_atomic(folder.join("gallery.txt"), |w| write!(w, "{}", scene.gallery))?;
+    Ok(["gallery.png", "gallery.json", "gallery.txt"])
+}
+
+/// The gallery for machines: metres, seconds, bytes; `null` where a map cannot answer.
+pub(crate) fn document(gallery: &Gallery, log: &str, scans: usize) -> Value {
+    let name = |i: usize| gallery.rows[i].name.as_str();
+    let winners: Vec<_> = gallery
+        .winners
+        .iter()
+        .map(|w| json!({ "workload": w.workload.name(), "row": name(w.row), "ahead": w.ahead }))
+        .collect();
+    let never: Vec<_> = gallery.never_win.iter().map(|&i| name(i)).collect();
+    let trees: Vec<_> = gallery
+        .trees
+        .iter()
+        .map(|t| {
+            json!({
+                "name": t.name, "node_bytes": t.node_bytes, "resolution": t.resolution,
+                "predicted_resolution": t.predicted_resolution, "predicted_ratio": t.predicted_ratio,
+                "measured_ratio": t.measured_ratio,
+            })
+        })
+        .collect();
+    let cloud = &gallery.cloud_crossover;
+    let measured: Vec<_> =
+        cloud.measured.iter().map(|&(n, s)| json!({ "points": n, "seconds": s })).collect();
+    let finite = |v: f64| v.is_finite().then_some(v);
+    json!({
+        "log": log,
+        "scans": scans,
+        "resolution": gallery.tsdf.config().resolution,
+        "cells": gallery.tsdf.grid().shape,
+        "truncation": gallery.tsdf.config().truncation,
+        "rows": gallery.rows.iter().map(row).collect::<Vec<_>>(),
+        "winners": winners,
+        "never_win": never,
+        "tree_crossovers": trees,
+        "cloud_crossover": { "points": cloud.points, "measured": measured },
+        "gradient_norm": { "tsdf": finite(gallery.tsdf_gradient), "esdf": finite(gallery.esdf_gradient) },
+    })
+}
+
+fn row(row: &Row) -> Value {
+    let cost = |cost: Option<Cost>| cost.map(|c| json!({ "seconds": c.seconds, "by": c.by }));
+    let error = |error: Option<ErrorSummary>| {
+        error.map(|e| {
+            json!({
+                "count": e.count, "median": e.median, "p95": e.p95, "p99": e.p99, "bias": e.bias,
+                "worst_over": e.worst_over, "worst_under": e.worst_under,
+            })
+        })
+    };
+    json!({
+        "name": row.name, "memory_bytes": row.memory_bytes, "derived": row.derived,
+        "update": cost(row.update), "occupancy": cost(row.occupancy), "distance": cost(row.distance),
+        "surface": cost(row.surface), "occupancy_wrong": row.occupancy_wrong,
+        "distance_error": error(row.distance_error), "surface_error": error(row.surface_error),
+        "note": row.note,
+    })
+}

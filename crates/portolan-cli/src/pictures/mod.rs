@@ -1,0 +1,9 @@
+//! Pictures of a run: every representation of one log, side by side or one by one, in the chapter's colours.
+
+mod layers;
+mod scene;
+mod sheet;
+
+pub(crate) use layers::Layer;
+pub(crate) use scene::Scene;
+pub(crate) use sheet::{figure, sheet};

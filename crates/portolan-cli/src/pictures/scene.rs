@@ -1,0 +1,67 @@
+//! What a picture is made of: the log, the maps made of it and, where it is known, the truth.
+
+use portolan::gallery::{Gallery, Row};
+use portolan::geom::{Aabb, Pose};
+use portolan::scan::Scan;
+use portolan_sim::World;
+
+/// One log and everything that was built from it.
+pub(crate) struct Scene<'a> {
+    pub(crate) gallery: &'a Gallery,
+    pub(crate) log: &'a [(Pose<2>, Scan<2>)],
+    /// The true world; only the simulator has one.
+    pub(crate) world: Option<&'a World>,
+}
+
+/// Cells shown around everything that was observed.
+const MARGIN_CELLS: f64 = 4.0;
+/// The close-up shows this many cells across.
+const CLOSE_UP_CELLS: [f64; 2] = [31.0, 23.5];
+
+impl Scene<'_> {
+    /// The box of the pictures: whatever was observed, and the world, and a margin. On the lattice of the maps, so
+    /// that cells are drawn in whole pixels.
+    pub(crate) fn shown(&self) -> Aabb<2> {
+        let grid = self.gallery.tsdf.grid();
+        let (r, origin) = (grid.lattice.resolution, grid.lattice.origin);
+        let mut seen = Aabb::EMPTY;
+        for i in (0..grid.len()).filter(|&i| self.gallery.tsdf.store().at(i).is_some()) {
+            seen.include(grid.lattice.center(grid.cell(i)));
+        }
+        if let Some(world) = self.world {
+            seen = seen.union(world.aabb());
+        }
+        if seen.is_empty() {
+            seen = grid.aabb();
+        }
+        let cell = |p: f64, k: usize| (p - origin[k]) / r;
+        let low = [0, 1].map(|k| ((cell(seen.min[k], k) + 1e-6).floor() - MARGIN_CELLS) * r + origin[k]);
+        let high = [0, 1].map(|k| ((cell(seen.max[k], k) - 1e-6).ceil() + MARGIN_CELLS) * r + origin[k]);
+        Aabb::new(low, high)
+    }
+
+    /// A small box with something in it: the chair, or the surface nearest to the sensor in the middle of the log.
+    pub(crate) fn close_up(&self) -> Aabb<2> {
+        let chair = self.world.and_then(|w| w.solids().iter().find(|s| s.name == "chair")).map(|s| s.aabb());
+        let middle = chair.map(|b| [0, 1].map(|k| 0.5 * (b.min[k] + b.max[k])));
+        let [x, y] = middle.or_else(|| self.nearest_hit()).unwrap_or([0.0; 2]);
+        let half = CLOSE_UP_CELLS.map(|n| 0.5 * n * self.gallery.tsdf.config().resolution);
+        Aabb::new([x - half[0], y - half[1]], [x + half[0], y + half[1]])
+    }
+
+    fn nearest_hit(&self) -> Option<[f64; 2]> {
+        let (pose, scan) = self.log.get(self.log.len() / 2)?;
+        let nearest = scan.beams().filter(|b| b.is_hit()).min_by(|a, b| a.range.total_cmp(&b.range))?;
+        Some(pose.transform_point(nearest.direction.map(|d| d * nearest.range)))
+    }
+
+    /// The scan whose beams are shown.
+    pub(crate) fn shown_scan(&self) -> Option<&(Pose<2>, Scan<2>)> {
+        self.log.get(self.log.len() * 9 / 100)
+    }
+
+    /// The row of the table whose name begins so.
+    pub(crate) fn row(&self, name: &str) -> Option<&Row> {
+        self.gallery.rows.iter().find(|row| row.name.starts_with(name))
+    }
+}

@@ -1,0 +1,149 @@
+//! From edges to the linear system of a step: `H = sum J^T w Omega J`, `g = -sum J^T w Omega r`.
+
+use portolan::geom::Pose;
+
+use crate::graph::{EdgeKind, PoseGraph, quadratic};
+use crate::kernel::Kernel;
+use crate::sparse::{Block, Pattern, SymmetricBlocks};
+use crate::tangent::{error_pose, linearise, residual};
+
+/// The edges of a graph prepared for many linearisations, and the numbering of its free vertices.
+pub(crate) struct System<const D: usize, const B: usize> {
+    pub(crate) pattern: Pattern,
+    /// Vertex of each variable.
+    pub(crate) free: Vec<usize>,
+    /// Variable of each vertex; `None` where it is held.
+    variable: Vec<Option<usize>>,
+    terms: Vec<Term<D, B>>,
+}
+
+struct Term<const D: usize, const B: usize> {
+    ends: [usize; 2],
+    j_from_i: Pose<D>,
+    omega: Block<B>,
+    robust: bool,
+    /// Number of the pair of variables in the pattern, where both ends are free.
+    pair: usize,
+}
+
+/// What a set of poses costs.
+#[derive(Clone, Copy)]
+pub(crate) struct Cost {
+    /// `sum r^T Omega r`.
+    pub(crate) chi_square: f64,
+    /// The same under the kernel: what is minimised.
+    pub(crate) robust: f64,
+}
+
+impl<const D: usize, const B: usize> System<D, B> {
+    pub(crate) fn new(graph: &PoseGraph<D>, held: &[bool]) -> Self {
+        let mut variable = vec![None; held.len()];
+        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
+        for (number, &vertex) in free.iter().enumerate() {
+            variable[vertex] = Some(number);
+        }
+        let mut pairs = Vec::new();
+        let mut terms = Vec::with_capacity(graph.edges.len());
+        for (edge, &ends) in graph.edges.iter().zip(&graph.ends) {
+            terms.push(Term {
+                ends,
+                j_from_i: edge.i_from_j.inverse(),
+                omega: edge.information.block(),
+                robust: edge.kind == EdgeKind::Closure,
+                pair: pairs.len(),
+            });
+            if let (Some(a), Some(b)) = (variable[ends[0]], variable[ends[1]]) {
+                pairs.push([a, b]);
+            }
+        }
+        Self { pattern: Pattern::new(free.len(), &pairs), free, variable, terms }
+    }
+
+    pub(crate) fn cost(&self, poses: &[Pose<D>], kernel: Kernel) -> Cost {
+        let mut cost = Cost { chi_square: 0.0, robust: 0.0 };
+        for term in &self.terms {
+            let [i, j] = term.ends;
+            let s =
+                quadratic(&residual::<D, B>(&error_pose(&term.j_from_i, &poses[i], &poses[j])), &term.omega);
+            cost.chi_square += s;
+            cost.robust += term.kernel(kernel).cost_and_weight(s).0;
+        }
+        cost
+    }
+
+    /// The largest chi-square of an edge that kernels apply to.
+    pub(crate) fn worst(&self, poses: &[Pose<D>]) -> f64 {
+        let robust = self.terms.iter().filter(|term| term.robust);
+        robust.fold(0.0, |worst: f64, term| {
+            let [i, j] = term.ends;
+            let r = residual::<D, B>(&error_pose(&term.j_from_i, &poses[i], &poses[j]));
+            worst.max(quadratic(&r, &term.omega))
+        })
+    }
+
+    /// Fills `h` and `g` (both overwritten) at `poses`.
+    pub(crate) fn linearise(
+        &self,
+        poses: &[Pose<D>],
+        kernel: Kernel,
+        h: &mut SymmetricBlocks<B>,
+        g: &mut [[f64; B]],
+    ) {
+        h.clear();
+        g.fill([0.0; B]);
+        for term in &self.terms {
+            let [i, j] = term.ends;
+            let linear = linearise::<D, B>(&term.j_from_i, &poses[i], &poses[j]);
+            let s = quadratic(&linear.residual, &term.omega);
+            let weight = term.kernel(kernel).cost_and_weight(s).1;
+            let omega = term.omega.map(|row| row.map(|v| weight * v));
+            let sides = [(self.variable[i], &linear.by_i), (self.variable[j], &linear.by_j)];
+            for (side, jacobian) in sides {
+                let Some(variable) = side else { continue };
+                let pulled = left_product(jacobian, &omega);
+                let target = &mut g[variable];
+                for r in 0..B {
+                    for k in 0..B {
+                        target[r] -= pulled[r][k] * linear.residual[k];
+                    }
+                }
+                add_product(h.diagonal_mut(&self.pattern, variable), &pulled, jacobian);
+            }
+            if let (Some(a), Some(b)) = (self.variable[i], self.variable[j]) {
+                let mut block = [[0.0; B]; B];
+                add_product(&mut block, &left_product(&linear.by_i, &omega), &linear.by_j);
+                h.add_pair(&self.pattern, term.pair, [a, b], &block);
+            }
+        }
+    }
+}
+
+impl<const D: usize, const B: usize> Term<D, B> {
+    fn kernel(&self, kernel: Kernel) -> Kernel {
+        if self.robust { kernel } else { Kernel::None }
+    }
+}
+
+/// `a^T b`.
+fn left_product<const B: usize>(a: &Block<B>, b: &Block<B>) -> Block<B> {
+    let mut out = [[0.0; B]; B];
+    for k in 0..B {
+        for r in 0..B {
+            for c in 0..B {
+                out[r][c] += a[k][r] * b[k][c];
+            }
+        }
+    }
+    out
+}
+
+/// `x += a b`.
+fn add_product<const B: usize>(x: &mut Block<B>, a: &Block<B>, b: &Block<B>) {
+    for r in 0..B {
+        for k in 0..B {
+            for c in 0..B {
+                x[r][c] += a[r][k] * b[k][c];
+            }
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! One log, the same poses, every representation: what each costs, and how true its answers are.
+//!
+//! The library reads no clock: the caller passes one. Accuracy needs a [`Truth`], which the simulator has.
+
+mod accuracy;
+mod crossover;
+mod probes;
+mod row;
+mod run;
+mod table;
+
+pub use accuracy::{ErrorSummary, Truth};
+pub use crossover::{CloudCrossover, TreeCrossover};
+pub use probes::Clock;
+pub use row::{Cost, Row, Winner, Workload};
+pub use run::{Gallery, GallerySettings, run};
