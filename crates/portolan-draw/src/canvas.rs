@@ -85,11 +85,11 @@ impl Canvas {
         data[..3].copy_from_slice(&[mixed.r, mixed.g, mixed.b]);
     }
 
-    /// A raster of `shape[0] × shape[1]` cells of `resolution` metres whose cell (0, 0) has its lower left corner at
-    /// `origin`; `color` is asked for the cells by index and its answer laid over the picture.
+    /// A raster of `shape[0] × shape[1]` cells of `resolution` metres whose cell (0, 0) has its lower left
+    /// corner at `origin`; `color` is asked for the cells by index and its answer laid over the picture.
     ///
-    /// Every pixel looks up the cell under it, so any scale works: enlarged cells are crisp squares, and where cells are smaller than
-    /// pixels up to 4 × 4 of them are averaged. O(pixels of the view).
+    /// Every pixel looks up the cell under it, so any scale works: enlarged cells are crisp squares, and
+    /// where cells are smaller than pixels up to 4 × 4 of them are averaged. O(pixels of the view).
     pub fn raster(
         &mut self,
         view: &View,
@@ -242,8 +242,11 @@ impl Canvas {
         }
     }
 
-    /// The outline of a rectangle of pixels.
+    /// The outline of a rectangle, moved to the nearest middles of pixels, where thin lines are crisp.
     pub fn stroke_rect(&mut self, rect: PixelRect, pen: Pen) {
+        let snap = |v: f64| v.round() + 0.5;
+        let (x, y) = (snap(rect.x - 0.5), snap(rect.y - 0.5));
+        let rect = PixelRect::new(x, y, snap(rect.right() - 0.5) - x, snap(rect.bottom() - 0.5) - y);
         let mut path = PathBuilder::new();
         path.move_to(rect.x as f32, rect.y as f32);
         path.line_to(rect.right() as f32, rect.y as f32);

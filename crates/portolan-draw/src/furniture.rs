@@ -33,7 +33,8 @@ const SWATCH: f64 = 26.0;
 const GAP: f64 = 22.0;
 
 impl Canvas {
-    /// Entries in rows from the top left of `rect`, wrapped at its right edge; returns the height that was used.
+    /// Entries in rows from the top left of `rect`, wrapped at its right edge; returns the height that was
+    /// used.
     pub fn legend(&mut self, rect: PixelRect, entries: &[Entry], font: Font) -> f64 {
         let places = legend_places(rect.width, entries, font);
         for (entry, place) in entries.iter().zip(&places) {

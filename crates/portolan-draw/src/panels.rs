@@ -85,7 +85,8 @@ impl Panels {
         (canvas, views)
     }
 
-    /// The same with bare rectangles of `width × height` pixels instead of views: for charts or mixed content.
+    /// The same with bare rectangles of `width × height` pixels instead of views: for charts or mixed
+    /// content.
     pub fn layout_rects(&self, width: f64, height: f64) -> (Canvas, Vec<PixelRect>) {
         let count = self.panels.len().max(1);
         let columns =

@@ -6,8 +6,8 @@ use crate::{Anchor, Canvas, Entry, Font, Pen, PixelRect, Swatch, View, color};
 use crate::{linear_ticks, log_ticks, tick_label};
 
 impl Chart {
-    /// Draws the chart into a rectangle of the canvas and returns the view of its plot area, in the units of the
-    /// axes (on a logarithmic axis: in decades).
+    /// Draws the chart into a rectangle of the canvas and returns the view of its plot area, in the units
+    /// of the axes (on a logarithmic axis: in decades).
     pub fn draw(&self, canvas: &mut Canvas, rect: PixelRect) -> View {
         let (title, small) = (Font::new(20).bold(), Font::new(16));
         let mut top = rect.y;
@@ -31,13 +31,19 @@ impl Chart {
         let (x, y) = (self.limits(0), self.limits(1));
         let x_label_height = if self.x.label.is_empty() { 0.0 } else { small.height() + 4.0 };
         let bottom = rect.bottom() - small.height() - 6.0 - x_label_height;
-        let y_ticks = ticks(&self.y, y, ((bottom - top) / 48.0) as usize);
+        let y_ticks = ticks(&self.y, y, ((bottom - top) / 36.0) as usize);
         let widest = y_ticks.iter().map(|(_, label)| small.width(label)).fold(0.0, f64::max);
         let y_label_width = if self.y.label.is_empty() { 0.0 } else { small.height() + 6.0 };
         let left = rect.x + y_label_width + widest + 7.0;
-        let plot = PixelRect::new(left, top, rect.right() - left, bottom - top);
+        let width = rect.right() - left;
+        let x_ticks = ticks(&self.x, x, (width / 90.0) as usize);
+        // The last label is centred below its tick, which may be the end of the axis.
+        let overhang = x_ticks.last().map_or(0.0, |(value, label)| {
+            let room = (x[1] - value) / (x[1] - x[0]) * width;
+            (0.5 * small.width(label) - room).max(0.0)
+        });
+        let plot = PixelRect::new(left, top, width - overhang, bottom - top);
         let view = View::stretch([x[0], y[0]], [x[1], y[1]], plot);
-        let x_ticks = ticks(&self.x, x, (plot.width / 90.0) as usize);
 
         let grid = Pen::new(color::GRID, 1.0);
         for (value, label) in &y_ticks {
@@ -49,12 +55,10 @@ impl Chart {
         for (value, label) in &x_ticks {
             let at = view.pixel_from_world([*value, y[0]])[0];
             canvas.pixel_line([snap(at), plot.y], [snap(at), plot.bottom()], grid);
-            // The last label may hang over the plot, not over the rectangle.
             let half = 0.5 * small.width(label);
-            let centre = at.min(rect.right() - half);
-            if centre - half >= free_from {
-                canvas.text([centre, plot.bottom() + 5.0], label, small, Anchor::Centre);
-                free_from = centre + half + 8.0;
+            if at - half >= free_from {
+                canvas.text([at, plot.bottom() + 5.0], label, small, Anchor::Centre);
+                free_from = at + half + 8.0;
             }
         }
         for mark in &self.marks {
@@ -95,7 +99,8 @@ impl Chart {
         series.chain(marks).filter(|entry| !entry.label.is_empty()).collect()
     }
 
-    /// Limits of an axis in its own units (decades on a log axis): as set, or those of the data with some air.
+    /// Limits of an axis in its own units (decades on a log axis): as set, or those of the data with some
+    /// air.
     fn limits(&self, which: usize) -> [f64; 2] {
         let axis = [&self.x, &self.y][which];
         let set = axis.range.map(|[low, high]| [axis.place(low), axis.place(high)]);

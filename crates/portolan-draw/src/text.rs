@@ -1,7 +1,7 @@
 //! Text from pre-rendered glyphs: monospaced, so that widths are known before anything is drawn.
 //!
-//! Basic Latin and Latin-1 (±, ², ·, ×, °, µ) are present; a few common characters outside are replaced by their
-//! nearest ASCII, the rest by a question mark.
+//! Basic Latin and Latin-1 (±, ², ·, ×, °, µ) are present; a few common characters outside are replaced by
+//! their nearest ASCII, the rest by a question mark.
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 

@@ -63,7 +63,7 @@ const ROOMS: [Room; 10] = [
         ("dresser", 0.45, [2.2, 3.2]),
     ),
     room(("shower", true), (1.5, 0.5, true), ("shower tray", 0.0, 0.8, 0.5), ("washer", 0.45, [2.2, 2.8])),
-    room(("store", true), (1.5, 0.8, true), ("rack", 0.0, 1.5, 0.4), ("boxes", 0.4, [2.4, 3.1])),
+    room(("store", true), (1.5, 0.6, true), ("rack", 0.0, 1.5, 0.4), ("boxes", 0.4, [2.4, 3.1])),
     room(("dining room", true), (2.7, 1.4, true), ("sideboard", 0.4, 1.6, 0.45), ("piano", 0.55, [2.1, 3.3])),
     room(("office", true), (2.1, 1.0, false), ("long desk", 0.0, 1.7, 0.6), ("cabinet", 0.45, [2.2, 3.0])),
 ];
@@ -145,10 +145,11 @@ impl Placed<'_> {
         }
     }
 
-    /// Middle of the passage beside the stub, and of the door (x).
+    /// Middle of the door (x): that of the passage beside the stub, as far as both jambs stay inside the room.
     fn passage(&self) -> f64 {
         let [a, b] = self.across(self.room.stub, self.room.width);
-        0.5 * (a + b)
+        let jamb = 0.5 * DOOR + 0.05;
+        (0.5 * (a + b)).clamp(self.left + jamb, self.right - jamb)
     }
 
     fn furnish(&self, solids: &mut Vec<Solid>) {
@@ -195,7 +196,7 @@ mod tests {
             let inside = world.solids().iter().filter(|s| s.contains(middle)).count();
             assert_eq!(inside, 1, "{}", solid.name);
         }
-        let moved = world.with_moved("chair", CHAIR_MOVE);
+        let moved = world.with_moved("chair", CHAIR_MOVE).unwrap();
         let chair = moved.solids().iter().find(|s| s.name == "chair").unwrap().aabb();
         for corner in [chair.min, chair.max, [chair.min[0], chair.max[1]], [chair.max[0], chair.min[1]]] {
             assert!(!world.is_inside(corner), "the chair's new place is taken at {corner:?}");

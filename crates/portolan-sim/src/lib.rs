@@ -22,7 +22,7 @@ mod solid;
 mod world;
 
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
-pub use drive::{LapConfig, SEED, lap, lap_poses};
+pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
 pub use lidar::{Lidar, scan_at};
 pub use random::Random;
 pub use solid::{Solid, SolidKind};

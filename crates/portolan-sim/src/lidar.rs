@@ -41,8 +41,10 @@ pub fn scan_at(world: &World, world_from_sensor: &Pose<2>, lidar: &Lidar, seed: 
         } else if fate < lidar.dropped_rate + lidar.no_return_rate {
             (BeamKind::NoReturn, 0.0)
         } else {
-            match hit.map(|h| h.range + lidar.noise * noise) {
-                Some(range) if range <= lidar.max_range => (BeamKind::Hit, range.max(0.0)),
+            match hit.map(|h| (h.range, h.range + lidar.noise * noise)) {
+                Some((truth, range)) if truth.max(range) <= lidar.max_range => {
+                    (BeamKind::Hit, range.max(0.0))
+                }
                 _ => (BeamKind::MaxRange, lidar.max_range),
             }
         };

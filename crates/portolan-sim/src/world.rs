@@ -40,9 +40,26 @@ pub struct World {
 /// Points this far to either side of a boundary decide what it separates (metres).
 const ASIDE: f64 = 1e-7;
 
+/// How far a ray may pass beyond the ends of a segment and still meet it, as a share of its length: a ray into
+/// the corner of a room must not slip between the two faces that meet there.
+const END_SLACK: f64 = 1e-9;
+
 impl World {
-    /// A world of these solids.
-    pub fn new(solids: Vec<Solid>) -> Self {
+    /// A world of these solids. Corners that run clockwise are turned round.
+    ///
+    /// # Panics
+    /// Where a corner is not finite.
+    pub fn new(mut solids: Vec<Solid>) -> Self {
+        for solid in &mut solids {
+            assert!(
+                solid.corners.iter().flatten().all(|v| v.is_finite()),
+                "solid {} has no place",
+                solid.name
+            );
+            if solid.edges().map(|[a, b]| cross(a, b)).sum::<f64>() < 0.0 {
+                solid.corners.reverse();
+            }
+        }
         let boxes: Vec<_> = solids.iter().map(|s| s.aabb().grown(2.0 * ASIDE)).collect();
         let boundary = boundary(&solids, &boxes);
         Self { solids, boxes, boundary }
@@ -64,8 +81,12 @@ impl World {
         Self::new(walls).boundary.iter().map(|s| portolan::geom::vector::distance(s.a, s.b)).sum()
     }
 
-    /// The same world with one solid moved by an offset (metres); solids of another name stay.
-    pub fn with_moved(&self, name: &str, offset: [f64; 2]) -> Self {
+    /// The same world with one solid moved by an offset (metres). `None` where no solid has that name.
+    pub fn with_moved(&self, name: &str, offset: [f64; 2]) -> Option<Self> {
+        self.solids.iter().any(|s| s.name == name).then(|| self.moved(name, offset))
+    }
+
+    fn moved(&self, name: &str, offset: [f64; 2]) -> Self {
         Self::new(
             self.solids.iter().map(|s| if s.name == name { s.moved(offset) } else { s.clone() }).collect(),
         )
@@ -101,7 +122,8 @@ impl World {
             let to = sub(s.a, origin);
             let range = cross(to, edge) / facing;
             let t = cross(to, direction) / facing;
-            if range >= 0.0 && (0.0..=1.0).contains(&t) && best.is_none_or(|b| range < b.0) {
+            if range >= 0.0 && (-END_SLACK..=1.0 + END_SLACK).contains(&t) && best.is_none_or(|b| range < b.0)
+            {
                 best = Some((range, s));
             }
         }
@@ -226,9 +248,34 @@ mod tests {
     }
 
     #[test]
+    fn rays_into_corners_do_not_slip_through() {
+        let world = crate::apartment().world;
+        let mut random = Random::stream(5, 5);
+        let mut rays = 0;
+        for s in world.boundary() {
+            for _ in 0..200 {
+                let p = [12.0 * random.uniform(), 9.0 * random.uniform()];
+                let Some(direction) = unit(sub(s.a, p)) else { continue };
+                let reach = portolan::geom::vector::distance(p, s.a);
+                // A corner that stands in the way: solid behind it, free space up to it.
+                let free = |range: f64| !world.is_inside(along(p, direction, range));
+                let blocked = !free(reach + 1e-4);
+                if !blocked || (0..500).any(|k| !free((reach - 1e-6) * f64::from(k) / 500.0)) {
+                    continue;
+                }
+                rays += 1;
+                let range = world.cast_ray(p, direction).map(|h| h.range);
+                assert!(range.is_some_and(|r| r < reach + 1e-6), "{p:?} to {:?}: {range:?}", s.a);
+            }
+        }
+        assert!(rays > 500, "{rays}");
+    }
+
+    #[test]
     fn moving_a_solid_moves_only_it() {
         let a = crate::apartment();
-        let moved = a.world.with_moved("chair", crate::CHAIR_MOVE);
+        let moved = a.world.with_moved("chair", crate::CHAIR_MOVE).unwrap();
+        assert_eq!(a.world.with_moved("chiar", [0.0, 0.0]), None);
         let differing = a.world.solids().iter().zip(moved.solids()).filter(|(x, y)| x != y).count();
         assert_eq!(differing, 1);
     }

@@ -11,6 +11,7 @@ pub mod field;
 pub mod gallery;
 pub mod geom;
 pub mod map;
+pub mod radiance;
 pub mod scan;
 pub mod store;
 pub mod surface;

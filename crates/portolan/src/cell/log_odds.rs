@@ -26,6 +26,23 @@ pub struct LogOddsRule<V> {
     pub quantum: f64,
 }
 
+/// P(occupied) of every byte: an exponential is ten times as dear as the cell it belongs to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProbabilityTable(Box<[f64; 256]>);
+
+impl ProbabilityTable {
+    /// The table of a rule.
+    pub fn new(rule: &LogOddsRule<i8>) -> Self {
+        Self(Box::new(std::array::from_fn(|i| LogOdds8(i as u8 as i8).probability(rule))))
+    }
+
+    /// P(occupied) of a cell.
+    #[inline(always)]
+    pub fn of(&self, cell: LogOdds8) -> f64 {
+        self.0[usize::from(cell.0 as u8)]
+    }
+}
+
 impl LogOddsRule<i8> {
     /// The rule of a model, rounded to bytes.
     ///

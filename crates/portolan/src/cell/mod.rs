@@ -12,7 +12,7 @@ mod signed_distance;
 
 pub use distances::{DistanceObservation, Distances};
 pub use hit_miss::{Endpoint, HitMiss};
-pub use log_odds::{LogOdds8, LogOdds32, LogOddsEvent, LogOddsRule, LogOddsValue};
+pub use log_odds::{LogOdds8, LogOdds32, LogOddsEvent, LogOddsRule, LogOddsValue, ProbabilityTable};
 pub use model::{OccupancyModel, OccupancyModelError};
 pub use signed_distance::{DistancePlanes, FusionEvent, SignedDistance, TsdfRule, TsdfRuleError};
 

@@ -179,7 +179,7 @@ impl Cell for SignedDistance {
         let observed = &evidence.distances()[from..from + len];
         let gained = &evidence.weights()[from..from + len];
         // Rows of blocks inside a map are eight long: the fixed length lets the compiler use whole vectors.
-        if len % 8 == 0 {
+        if len.is_multiple_of(8) {
             let rows = distance.chunks_exact_mut(8).zip(weight.chunks_exact_mut(8));
             for ((d, w), (o, g)) in rows.zip(observed.chunks_exact(8).zip(gained.chunks_exact(8))) {
                 if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into())

@@ -7,7 +7,9 @@ use super::row::{Cost, Row, Winner, winners};
 use crate::cell::OccupancyModel;
 use crate::field::{Esdf2, EsdfSettings, esdf_from_tsdf};
 use crate::geom::{Aabb, Grid, Pose, vector};
-use crate::map::{Cloud, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
+use crate::map::{
+    Cloud, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config, inner_only_node_bytes,
+};
 use crate::scan::{Scan, ScanStats};
 use crate::store::Store;
 use crate::surface::{Ambiguity, Contour, ContourSettings, level_set, marching_squares};
@@ -196,7 +198,6 @@ pub fn run(
             Ambiguity::Decide,
         )),
         note: "the chapter's seeding".into(),
-        ..Default::default()
     });
     rows.push(Row {
         name: "extracted contour".into(),
@@ -216,7 +217,6 @@ pub fn run(
         distance_error: asker.distance_error(|p| contour.nearest_distance(p)),
         surface_error: asker.surface_error(&contour),
         note: format!("{} segments, {:.1} m", contour.segments.len(), contour.length()),
-        ..Default::default()
     });
     rows.push(Row {
         name: "point cloud, k-d tree".into(),
@@ -379,8 +379,7 @@ fn tree_crossovers(
     let [width, height] = grid.aabb().extent();
     let plane = (settings.surface_length.unwrap_or(contour.length()), width * height);
     let dense = grid.len();
-    // The formula counts leaves too; a fourth of the nodes, the inner ones, carries ours.
-    let ours = 9.0 / 4.0;
+    let ours = inner_only_node_bytes::<2>(9.0);
     let (fine, coarse) = (grid.lattice.resolution, chapter_tree.tree().lattice().resolution);
     vec![
         TreeCrossover::new(

@@ -16,7 +16,7 @@ fn bytes(n: usize, derived: bool) -> String {
 fn time(cost: Option<Cost>) -> String {
     let Some(cost) = cost else { return "-".into() };
     match cost.seconds {
-        s if s == 0.0 => "0".into(),
+        0.0 => "0".into(),
         s if s < 1e-6 => format!("{:.1} ns", s * 1e9),
         s if s < 1e-3 => format!("{:.2} us", s * 1e6),
         s => format!("{} ms", format_ms(s)),

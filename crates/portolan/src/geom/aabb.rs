@@ -20,10 +20,8 @@ impl<const D: usize> Aabb<D> {
 
     /// Grows to hold `p`.
     pub fn include(&mut self, p: [f64; D]) {
-        for k in 0..D {
-            self.min[k] = self.min[k].min(p[k]);
-            self.max[k] = self.max[k].max(p[k]);
-        }
+        self.min = std::array::from_fn(|k| self.min[k].min(p[k]));
+        self.max = std::array::from_fn(|k| self.max[k].max(p[k]));
     }
 
     /// The smallest box that holds both.

@@ -111,13 +111,12 @@ impl<const D: usize> Grid<D> {
         let mut fraction = [0.0; D];
         for k in 0..D {
             let shifted = c[k] - 0.5;
-            let low = shifted.floor();
             // False for NaN; an axis of one cell has no neighbours to interpolate between.
-            if !(low >= 0.0 && low + 1.0 < self.shape[k] as f64) {
+            if !(shifted >= 0.0 && shifted < self.shape[k] as f64 - 1.0) {
                 return None;
             }
-            base[k] = low as i32;
-            fraction[k] = shifted - low;
+            base[k] = shifted as i32;
+            fraction[k] = shifted - f64::from(base[k]);
         }
         Some((base, fraction))
     }

@@ -31,11 +31,17 @@ impl<const D: usize> Lattice<D> {
     /// The cell that holds a world point; `None` where an `i32` cannot hold its index.
     #[inline(always)]
     pub fn cell_of(&self, p_world: [f64; D]) -> Option<[i32; D]> {
-        let c = self.to_cells(p_world).map(f64::floor);
+        let c = self.to_cells(p_world);
         // Two bits are kept free: neighbours of a valid index and its block arithmetic cannot overflow.
         const LIMIT: f64 = (1u32 << 30) as f64;
         let held = c.iter().all(|v| v.abs() < LIMIT); // false for NaN
-        held.then(|| c.map(|v| v as i32))
+        // Truncation and a step down: on baseline x86-64 `floor` is a call.
+        held.then(|| {
+            c.map(|v| {
+                let toward_zero = v as i32;
+                toward_zero - i32::from(v < f64::from(toward_zero))
+            })
+        })
     }
 
     /// World position of the centre of a cell, where its sample sits.

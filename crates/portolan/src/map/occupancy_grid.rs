@@ -4,7 +4,7 @@ use super::error::check_grid;
 use super::integrate::integrate;
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
-use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
+use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, OccupancyModel, ProbabilityTable};
 use crate::geom::vector::distance;
 use crate::geom::{Aabb, Grid, Pose, block_cells};
 use crate::scan::{Scan, ScanStats};
@@ -19,6 +19,7 @@ use crate::sweep::Rays;
 pub struct OccupancyGrid<const D: usize> {
     store: Dense<LogOdds8, D>,
     rule: LogOddsRule<i8>,
+    probabilities: ProbabilityTable,
     model: OccupancyModel,
     bounds: Aabb<D>,
     sweep: Rays<D>,
@@ -44,7 +45,9 @@ impl<const D: usize> OccupancyGrid<D> {
         let rule = LogOddsRule::<i8>::new(&model)?;
         let bounds = store.grid().aabb();
         let sweep = Rays::new(model.wall_depth.unwrap_or(store.grid().lattice.resolution));
-        Ok(Self { store, rule, model, bounds, sweep, scratch: HitMiss::silent(block_cells::<D>()) })
+        let probabilities = ProbabilityTable::new(&rule);
+        let scratch = HitMiss::silent(block_cells::<D>());
+        Ok(Self { store, rule, probabilities, model, bounds, sweep, scratch })
     }
 
     /// Fuses a scan taken at a known pose.
@@ -64,7 +67,7 @@ impl<const D: usize> OccupancyGrid<D> {
     #[inline]
     pub fn probability(&self, p_world: impl Into<[f64; D]>) -> Answer<f64> {
         let Some(i) = self.store.grid().index_of(p_world.into()) else { return Answer::Outside };
-        self.store.at(i).map_or(Answer::Unknown, |v| Answer::Known(v.probability(&self.rule)))
+        self.store.at(i).map_or(Answer::Unknown, |v| Answer::Known(self.probabilities.of(v)))
     }
 
     /// Whether a cell is more likely occupied than not; `None`: never observed or outside.

@@ -4,7 +4,7 @@ use super::error::check_grid;
 use super::integrate::integrate;
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
-use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
+use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, OccupancyModel, ProbabilityTable};
 use crate::geom::{Aabb, Grid, Pose, block_cells};
 use crate::scan::{Scan, ScanStats};
 use crate::store::{Store, Tree};
@@ -15,6 +15,7 @@ use crate::sweep::Rays;
 pub struct TreeMap<const D: usize> {
     tree: Tree<LogOdds8, D>,
     rule: LogOddsRule<i8>,
+    probabilities: ProbabilityTable,
     model: OccupancyModel,
     bounds: Aabb<D>,
     sweep: Rays<D>,
@@ -58,7 +59,9 @@ impl<const D: usize> TreeMap<D> {
         let rule = LogOddsRule::<i8>::new(&model)?;
         let bounds = tree.grid().aabb();
         let sweep = Rays::new(model.wall_depth.unwrap_or(tree.grid().lattice.resolution));
-        Ok(Self { tree, rule, model, bounds, sweep, scratch: HitMiss::silent(block_cells::<D>()) })
+        let probabilities = ProbabilityTable::new(&rule);
+        let scratch = HitMiss::silent(block_cells::<D>());
+        Ok(Self { tree, rule, probabilities, model, bounds, sweep, scratch })
     }
 
     /// Fuses a scan taken at a known pose; prunes on the way.
@@ -81,7 +84,7 @@ impl<const D: usize> TreeMap<D> {
         let Some(cell) = self.tree.lattice().cell_of(p).filter(|_| self.bounds.contains(p)) else {
             return Answer::Outside;
         };
-        self.tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(v.probability(&self.rule)))
+        self.tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(self.probabilities.of(v)))
     }
 
     /// The tree.
@@ -132,6 +135,12 @@ fn nodes_per_surface_cell<const D: usize>() -> f64 {
 /// `node_bytes` a node, surface measure `S` (metres in the plane, square metres in space), bounded volume `V`.
 pub fn memory_ratio<const D: usize>(node_bytes: f64, surface: f64, volume: f64, resolution: f64) -> f64 {
     node_bytes * nodes_per_surface_cell::<D>() * surface * resolution / volume
+}
+
+/// What a node weighs in [`memory_ratio`] where only inner nodes are stored, `inner_bytes` each: of the
+/// `c_d S / r^(d-1)` nodes that the formula counts, one in `2^(d-1)` is inner.
+pub fn inner_only_node_bytes<const D: usize>(inner_bytes: f64) -> f64 {
+    inner_bytes / f64::from(1u32 << (D - 1))
 }
 
 /// The resolution (metres) below which a tree is smaller than a dense array of one-byte cells:

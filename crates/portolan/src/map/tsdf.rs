@@ -18,7 +18,7 @@ pub enum SweepKind {
     /// At cell centres, with the range interpolated between neighbouring beams.
     #[default]
     CellCentre,
-    /// The textbook's march along every beam; puts surfaces about a quarter of a cell too far out.
+    /// The textbook's march along every beam; puts surfaces about a quarter of a cell too far away.
     March,
 }
 

@@ -13,12 +13,12 @@
 mod beam;
 mod incidence;
 mod laser;
-mod scan;
+mod record;
 mod stats;
 
 pub use beam::{Beam, BeamKind};
 pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, connected};
 pub use laser::RangeLimits;
-pub use scan::{BeamOrder, Scan};
+pub use record::{BeamOrder, Scan};
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};

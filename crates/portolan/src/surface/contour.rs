@@ -46,19 +46,33 @@ impl Contour {
         distances.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Whether a point lies inside by the crossing number of the ray to the right: odd is inside. `None` where
-    /// there is no segment. Right for closed contours only: through a gap in the contour, where a wall was not
-    /// observed, the count is off by one, and a contour cannot tell free from unknown. O(segments).
+    /// Crossings of the ray to the right: odd is inside where the contour is closed and was seen from outside.
+    /// A building that was seen from its rooms only has no outer face, and every count is off by one:
+    /// [`Contour::is_inside`] does not depend on it. O(segments).
+    pub fn crossing_number(&self, p_world: impl Into<[f64; 2]>) -> usize {
+        self.crossings(p_world.into()).count()
+    }
+
+    /// Whether a point lies inside: the first crossing of the ray to the right shows the point either its free
+    /// side or its back. Agrees with the crossing number where that is right, and needs nothing of the contour
+    /// but the nearest wall. `None` where no segment lies to the right. Through a gap in the contour it looks at
+    /// the next wall, and a contour cannot tell free from unknown. O(segments).
     pub fn is_inside(&self, p_world: impl Into<[f64; 2]>) -> Option<bool> {
-        let p = p_world.into();
-        let crossings = self
-            .ends()
-            .filter(|[a, b]| {
-                // Half-open in y, so that a ray through a vertex counts once.
-                (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
-            })
-            .count();
-        (!self.segments.is_empty()).then_some(crossings % 2 == 1)
+        let first = self.crossings(p_world.into()).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        // Free space lies on the left of a segment: one that runs up shows its free side to the left.
+        Some(!first.1)
+    }
+
+    /// Where the ray to the right crosses segments (x), and whether they run upwards.
+    fn crossings(&self, p: [f64; 2]) -> impl Iterator<Item = (f64, bool)> + '_ {
+        self.ends().filter_map(move |[a, b]| {
+            // Half-open in y, so that a ray through a vertex counts once.
+            if (a[1] > p[1]) == (b[1] > p[1]) {
+                return None;
+            }
+            let x = a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
+            (p[0] < x).then_some((x, b[1] > a[1]))
+        })
     }
 
     /// The segments joined end to end.
@@ -109,10 +123,13 @@ mod tests {
         assert_eq!(c.nearest_distance([1.0, 0.5]), Some(0.5));
         assert_eq!(c.nearest_distance([5.0, 6.0]), Some(5.0));
         assert_eq!(c.nearest_segment([1.0, 1.9]).unwrap().0, 1);
-        assert_eq!(
-            (c.is_inside([1.0, 1.0]), c.is_inside([3.0, 1.0]), c.is_inside([-1.0, 0.0])),
-            (Some(true), Some(false), Some(false))
-        );
+        assert_eq!((c.is_inside([1.0, 1.0]), c.crossing_number([1.0, 1.0])), (Some(true), 1));
+        assert_eq!((c.is_inside([-1.0, 0.0]), c.crossing_number([-1.0, 0.0])), (Some(false), 2));
+        assert_eq!((c.is_inside([3.0, 1.0]), c.crossing_number([3.0, 1.0])), (None, 0));
+        // A room seen from inside has no outer face: the count is odd in its free space.
+        let mut room = square();
+        room.segments.iter_mut().for_each(|s| s.reverse());
+        assert_eq!((room.is_inside([1.0, 1.0]), room.crossing_number([1.0, 1.0])), (Some(false), 1));
         assert_eq!(c.length(), 8.0);
         assert_eq!(Contour::default().nearest_distance([0.0, 0.0]), None);
         assert_eq!(Contour::default().is_inside([0.0, 0.0]), None);

@@ -90,6 +90,8 @@ pub fn level_set(
             }
         }
     }
+    contour.vertices.shrink_to_fit();
+    contour.segments.shrink_to_fit();
     contour
 }
 

@@ -16,7 +16,7 @@ use crate::scan::{BeamOrder, Scan};
 /// the shorter one, less the truncation. The cost is that of the cells, not of the beams: no cell is looked at
 /// twice. Scans without neighbourhood give each cell the beam that passes nearest to its centre.
 ///
-/// Against [`super::March`] this removes an outward bias of about a quarter of a cell.
+/// Against [`super::March`] this removes a bias of about a quarter of a cell away from the sensor.
 #[derive(Clone, Debug)]
 pub struct CellCentre<const D: usize> {
     truncation: f64,

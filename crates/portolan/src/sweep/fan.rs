@@ -43,6 +43,10 @@ struct Chord {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fan {
     wedges: Vec<Wedge>,
+    /// Per wedge, up to where everything is free whatever the bearing (metres); 0 where that is not known.
+    clear: Vec<f32>,
+    /// The weight that all beams share, if they do.
+    common_weight: Option<f32>,
     chords: Vec<Chord>,
     /// Diamond angle of the first beam of each wedge, ascending, and a last one that no angle reaches.
     start: Vec<f32>,
@@ -92,6 +96,9 @@ impl Fan {
         let first = angles.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |least| least.0);
         self.wedges.clear();
         self.chords.clear();
+        self.clear.clear();
+        let weight = weights.first().copied().unwrap_or(0.0);
+        self.common_weight = weights.iter().all(|&w| w == weight).then_some(weight);
         self.start.clear();
         let mut lowest = 0.0;
         for k in 0..n {
@@ -105,6 +112,8 @@ impl Fan {
             let b = spokes[(i + 1) % n];
             let free = if narrow { a.range.min(b.range) } else { 0.0 };
             self.wedges.push(Wedge { a, b, free });
+            // A chord comes nearer than its ends by less than 1 % up to the opening at which beams are neighbours.
+            self.clear.push(0.99 * free);
             self.chords.push(Chord::new(&a, &b, joined));
             // Ascending, rounding included.
             lowest = diamond(a.direction[0], a.direction[1]).max(lowest);
@@ -149,6 +158,35 @@ impl Fan {
         wedge
     }
 
+    /// The weight of a block that lies wholly in free space, nearer than all surfaces by more than the
+    /// truncation: such blocks need no look at their cells. The sensor must see it under a narrow angle that does
+    /// not cross the x axis, or nothing is said.
+    fn free_block(&self, corner: [f32; 2], step: f32) -> Option<f32> {
+        let weight = self.common_weight.filter(|_| self.carve)?;
+        let size = step * (BLOCK_EDGE - 1) as f32;
+        let ([x0, y0], [x1, y1]) = (corner, [corner[0] + size, corner[1] + size]);
+        if x1 > 0.0 && y0 <= 0.0 && y1 >= 0.0 {
+            return None;
+        }
+        // The angles of a box are those of its corners, as long as it does not hold the sensor.
+        let angles = [diamond(x0, y0), diamond(x1, y0), diamond(x0, y1), diamond(x1, y1)];
+        let from = angles.into_iter().fold(f32::INFINITY, f32::min);
+        let to = angles.into_iter().fold(0.0, f32::max);
+        if to - from >= 1.0 {
+            return None;
+        }
+        let far = x0.abs().max(x1.abs()).hypot(y0.abs().max(y1.abs()));
+        let first = self.wedge_at(from);
+        let needed = far + self.truncation;
+        let mut clear = self.clear[first] > needed;
+        let mut wedge = if from < self.start[0] { 0 } else { first + 1 };
+        while clear && self.start[wedge] <= to {
+            clear = self.clear[wedge] > needed;
+            wedge += 1;
+        }
+        clear.then_some(weight)
+    }
+
     /// What the scan says about the 64 cells of a block whose first centre lies at `corner` relative to the
     /// sensor, in the world's axes, `step` apart; weight 0: nothing.
     ///
@@ -161,6 +199,11 @@ impl Fan {
         distance: &mut [f32; CELLS],
         weight: &mut [f32; CELLS],
     ) {
+        if let Some(free) = self.free_block(corner, step) {
+            distance.fill(self.truncation);
+            weight.fill(free);
+            return;
+        }
         let (mut x, mut y) = ([0.0f32; CELLS], [0.0f32; CELLS]);
         let mut angle = [0.0f32; CELLS];
         for i in 0..CELLS {
@@ -189,7 +232,7 @@ impl Fan {
             let d = (t - 1.0) * r;
             // Written so that NaN, at the sensor itself, counts as free space.
             let before = if d <= tau { 1.0 } else { free };
-            let behind = (1.0 + d / tau).min(1.0).max(0.0);
+            let behind = (1.0 + d / tau).clamp(0.0, 1.0);
             weight[i] = trust[i] * before * behind;
             distance[i] = d.min(tau);
         }

@@ -12,7 +12,7 @@ use crate::scan::Scan;
 /// behind the surface.
 ///
 /// The sample is nearer to the sensor than the cell's centre, on average, which puts surfaces about a quarter
-/// of a cell too far out; [`super::CellCentre`] does not do that.
+/// of a cell too far away; [`super::CellCentre`] does not do that.
 #[derive(Clone, Debug)]
 pub struct March<const D: usize> {
     truncation: f64,

@@ -1,0 +1,182 @@
+//! One run of the toy: a scene, a start, a fit, and what became of it. The named seeds show what to look for.
+
+use super::fit::{Fit, Report, Residuals};
+use super::line::{Far, Line, LineRay};
+use super::model::{Channels, Measurement};
+use super::ray::{Passage, Sample, render};
+use super::scene::Scene;
+use super::settings::{FitError, Settings};
+
+/// A seed worth looking at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NamedSeed {
+    /// Its name.
+    pub name: &'static str,
+    /// The seed.
+    pub seed: u64,
+    /// What it shows, with [`Experiment::default`].
+    pub shows: &'static str,
+}
+
+/// A lucky start: solid matter only where there are walls. Depth alone is enough, also for rays that were
+/// held out.
+pub const LUCKY: NamedSeed =
+    NamedSeed { name: "lucky", seed: 127, shows: "a lucky start: depth alone fits the held-out rays too" };
+
+/// Training residuals at the noise floor, held-out residuals of a metre.
+pub const AMBIGUOUS: NamedSeed = NamedSeed {
+    name: "ambiguous",
+    seed: 136,
+    shows: "depth alone fits its own rays to the noise and is a metre wrong on held-out ones",
+};
+
+/// Density of the start stays parked in empty space under depth alone; reflectance clears it.
+pub const PARKED: NamedSeed = NamedSeed {
+    name: "parked",
+    seed: 41,
+    shows: "depth alone keeps density of the start parked in empty space; with reflectance it clears",
+};
+
+/// Two channels fit all they are shown and leave density parked between gray surfaces: a dark clump in
+/// front of a bright wall has both the mean distance and the mean colour that were measured.
+pub const TWO_NOT_ENOUGH: NamedSeed = NamedSeed {
+    name: "two-not-enough",
+    seed: 175,
+    shows: "between gray walls two channels do not clear it; the spread of the return does",
+};
+
+/// An opaque clump in empty space: next to nothing passes, so no channel of these rays can tell. Gradient
+/// descent leaves it there; Adam, which scales small gradients up, does not.
+pub const OPAQUE: NamedSeed = NamedSeed {
+    name: "opaque",
+    seed: 2,
+    shows: "an invented opaque bin has next to no gradient in any channel, and stays",
+};
+
+/// All named seeds.
+pub const NAMED_SEEDS: [NamedSeed; 5] = [LUCKY, AMBIGUOUS, PARKED, TWO_NOT_ENOUGH, OPAQUE];
+
+/// What to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// The world and the rays.
+    pub scene: Scene,
+    /// How to fit; its channels are those given to [`Experiment::run`].
+    pub settings: Settings,
+    /// Steps of the optimiser.
+    pub steps: usize,
+}
+
+impl Default for Experiment {
+    /// The corridor, plain gradient descent, 20 000 steps: the setting of the named seeds.
+    fn default() -> Self {
+        Self { scene: Scene::corridor(), settings: Settings::default(), steps: 20_000 }
+    }
+}
+
+/// The fit at one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Negative logarithm of the posterior, up to a constant.
+    pub objective: f64,
+    /// Residuals of the rays to learn from.
+    pub training: Residuals,
+    /// Residuals of the rays that were held out.
+    pub held_out: Residuals,
+}
+
+/// What came of a run.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The field at the start.
+    pub start: Line,
+    /// Measurements that were learned from.
+    pub training: Vec<Measurement>,
+    /// Measurements that were held out.
+    pub held_out: Vec<Measurement>,
+    /// Before every step, and after the last one.
+    pub curve: Vec<Progress>,
+    /// Most light that any training ray brought to each bin, at the start, at the end and every hundred
+    /// steps.
+    pub reach: Vec<f64>,
+    /// The fit, with the field that it found.
+    pub fit: Fit,
+}
+
+impl Experiment {
+    /// Measures the scene, starts at random, fits. The same seed gives the same noise and the same start
+    /// for any channels.
+    ///
+    /// # Errors
+    /// When the settings make no sense.
+    pub fn run(&self, seed: u64, channels: Channels) -> Result<Outcome, FitError> {
+        self.run_from(self.scene.random_start(seed), seed, channels)
+    }
+
+    /// The same from a given field: to see whether another channel frees what one got stuck on.
+    ///
+    /// # Errors
+    /// When the settings or the field make no sense.
+    pub fn run_from(&self, start: Line, seed: u64, channels: Channels) -> Result<Outcome, FitError> {
+        let settings = Settings { channels, ..self.settings };
+        let (training, held_out) = self.scene.measure(&settings.noise, seed);
+        let mut fit = Fit::new(start, &training, settings)?;
+        let start = fit.line().clone();
+        let mut reach = vec![0.0; start.bins()];
+        let mut curve = Vec::with_capacity(self.steps + 1);
+        for step in 0..self.steps {
+            if step % 100 == 0 {
+                add_reach(fit.line(), &training, &mut reach);
+            }
+            let of_held_out = fit.residuals(&held_out);
+            let Report { objective, training } = fit.step();
+            curve.push(Progress { objective, training, held_out: of_held_out });
+        }
+        add_reach(fit.line(), &training, &mut reach);
+        let Report { objective, training: of_training } = fit.report();
+        curve.push(Progress { objective, training: of_training, held_out: fit.residuals(&held_out) });
+        Ok(Outcome { start, training, held_out, curve, reach, fit })
+    }
+}
+
+impl Outcome {
+    /// Residuals at the end.
+    pub fn last(&self) -> Progress {
+        self.curve[self.curve.len() - 1]
+    }
+
+    /// Optical depth `Σ σδ` that the fit has in bins from which every surface of the scene is more than
+    /// `margin` metres away: matter where there is none.
+    pub fn misplaced(&self, scene: &Scene, margin: f64) -> f64 {
+        let line = self.fit.line();
+        scene.empty_bins(margin).map(|bin| line.density[bin] * line.resolution).sum()
+    }
+
+    /// The bin with the most density of those that [`Outcome::misplaced`] counts.
+    pub fn worst_bin(&self, scene: &Scene, margin: f64) -> Option<usize> {
+        let density = &self.fit.line().density;
+        scene.empty_bins(margin).max_by(|a, b| density[*a].total_cmp(&density[*b]))
+    }
+}
+
+/// Transmittance along a ray at each of its samples, in the order of the ray, and behind the last one.
+pub fn transmittance(line: &Line, ray: &LineRay) -> Vec<f64> {
+    let crossing = line.crossing(ray);
+    let empty = Sample { density: 0.0, length: 0.0, depth: 0.0, color: [0.0; 2] };
+    let mut samples = vec![empty; crossing.count];
+    let mut passages = vec![Passage::default(); crossing.count];
+    line.sample(ray, &crossing, &mut samples);
+    let background = Far::default().background();
+    let rendered = render(&samples, &background, &mut passages);
+    passages.iter().map(|p| p.transmittance).chain([rendered.transmittance]).collect()
+}
+
+fn add_reach(line: &Line, training: &[Measurement], reach: &mut [f64]) {
+    for m in training {
+        let crossing = line.crossing(&m.ray);
+        for (i, t) in transmittance(line, &m.ray).iter().take(crossing.count).enumerate() {
+            let bin = crossing.bin(i);
+            reach[bin] = t.max(reach[bin]);
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Why a bin moves, or does not: the factors of its gradient, ray by ray.
+//!
+//! The chapter's `∂z/∂σ_k = δ [T_{k+1} t_k − (Σ_{i>k} T_i α_i t_i + T_n t_far)]` holds for every channel
+//! with its own values `v`. Divided by what passes bin `k`, the bracket is a difference of two values:
+//!
+//! ```text
+//! ∂v/∂σ_k = δ · T_{k+1} · (v_k − v̄_k),    v̄_k = (Σ_{i>k} T_i α_i v_i + T_n v_far) / T_{k+1}
+//! ```
+//!
+//! `T_{k+1}` is the same for all channels: no channel sees past an opaque bin. The contrast `v_k − v̄_k`
+//! and the residual in front of it are each channel's own: those a second channel can repair.
+
+use super::fit::{Fit, differences, precisions};
+use super::model::Measurement;
+use super::ray::{Passage, Sample, SampleGradient, Upstream, backward, render};
+
+/// One channel's share in the gradient of one bin by one ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Term {
+    /// Rendered minus measured, in standard deviations of the noise.
+    pub residual: f64,
+    /// Value of the bin minus the mean value behind it, `v_k − v̄_k`; 0 where nothing passes.
+    pub contrast: f64,
+    /// `∂v/∂σ_k`.
+    pub slope: f64,
+    /// Contribution to `∂J/∂σ_k`: negative asks for more density. 0 for a channel outside the likelihood.
+    pub pull: f64,
+}
+
+/// The gradient of one bin's density by one ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Terms {
+    /// The ray and what was measured along it.
+    pub measurement: Measurement,
+    /// Share `T_{k+1}` of the light that passes the bin.
+    pub passes: f64,
+    /// Depth, m.
+    pub depth: Term,
+    /// Reflectance.
+    pub reflectance: Term,
+    /// Second moment of the return, m².
+    pub second_moment: Term,
+}
+
+impl Fit {
+    /// The factors of `∂J/∂σ` of a bin at the field as it stands, for every ray to learn from that crosses
+    /// it.
+    pub fn explain(&self, bin: usize) -> Vec<Terms> {
+        let line = self.line();
+        let settings = self.settings();
+        let background = settings.far.background();
+        let precision = precisions(settings.channels, &settings.noise);
+        let noise = [settings.noise.depth, settings.noise.reflectance, settings.noise.second_moment];
+        let mut out = Vec::new();
+        for (measurement, crossing) in self.measurements() {
+            let Some(k) = crossing.sample_in(bin) else { continue };
+            let empty = Sample { density: 0.0, length: 0.0, depth: 0.0, color: [0.0; 2] };
+            let mut samples = vec![empty; crossing.count];
+            let mut passages = vec![Passage::default(); crossing.count];
+            let mut gradients = vec![SampleGradient::ZERO; crossing.count];
+            line.sample(&measurement.ray, crossing, &mut samples);
+            let rendered = render(&samples, &background, &mut passages);
+            let passes = passages.get(k + 1).map_or(rendered.transmittance, |p| p.transmittance);
+            let difference = differences(&rendered, measurement);
+            let mut term = |channel: usize| {
+                let unit = |c: usize| if c == channel { 1.0 } else { 0.0 };
+                let upstream = Upstream { depth: unit(0), color: [unit(1), unit(2)] };
+                backward(&samples, &background, &passages, &rendered, &upstream, &mut gradients);
+                let slope = gradients[k].density;
+                let through = samples[k].length * passes;
+                Term {
+                    residual: difference[channel] / noise[channel],
+                    contrast: if through > 0.0 { slope / through } else { 0.0 },
+                    slope,
+                    pull: precision[channel] * difference[channel] * slope,
+                }
+            };
+            let [depth, reflectance, second_moment] = [term(0), term(1), term(2)];
+            out.push(Terms { measurement: *measurement, passes, depth, reflectance, second_moment });
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::line::{Line, LineRay};
+    use super::super::{Channels, Settings};
+    use super::*;
+
+    #[test]
+    fn pulls_add_up_to_the_gradient() {
+        let ray = |origin, ascending| Measurement {
+            ray: LineRay { origin, ascending },
+            depth: 0.5,
+            reflectance: 0.7,
+            second_moment: 0.3,
+        };
+        let mut line = Line::uniform(0.0, 0.1, 12, 3.0, 0.4);
+        line.reflectance[7] = 0.9;
+        let settings = Settings { channels: Channels::DepthReflectanceSpread, ..Settings::default() };
+        let mut fit = Fit::new(line, &[ray(0.05, true), ray(1.1, false)], settings).unwrap();
+        for bin in [0, 5, 11] {
+            let by_ray: f64 = fit
+                .explain(bin)
+                .iter()
+                .map(|t| t.depth.pull + t.reflectance.pull + t.second_moment.pull)
+                .sum();
+            // The fit's gradient is by θ: through the parametrisation, and with the prior.
+            let prior = fit.settings().prior;
+            let theta = super::super::softplus_inverse(fit.line().density[bin] * 0.1);
+            let chained = by_ray * super::super::logistic(theta) / 0.1
+                + (theta - prior.density_mean) / prior.density_spread.powi(2);
+            let gradient = fit.gradient()[bin];
+            assert!((chained - gradient).abs() < 1e-9 * gradient.abs().max(1.0), "{chained} {gradient}");
+        }
+        assert_eq!(fit.explain(11).len(), 1, "the descending ray starts below bin 11");
+    }
+
+    #[test]
+    fn contrast_is_the_bracket_of_the_chapter() {
+        // One bin at 3 m that lets e^-1 pass, nothing behind: the contrast is 3 m - 10 m.
+        let line = Line { origin: 2.95, resolution: 0.1, density: vec![10.0], reflectance: vec![0.5] };
+        let m = Measurement {
+            ray: LineRay { origin: 0.0, ascending: true },
+            depth: 3.0,
+            reflectance: 0.5,
+            second_moment: 9.0,
+        };
+        let fit = Fit::new(line, &[m], Settings::default()).unwrap();
+        let terms = fit.explain(0);
+        assert!((terms[0].depth.contrast + 7.0).abs() < 1e-9);
+        assert!((terms[0].passes - (-1.0_f64).exp()).abs() < 1e-9);
+    }
+}
