@@ -13,7 +13,7 @@ use portolan::map::SweepKind;
 use portolan::scan::{RangeLimits, Scan, ScanStats};
 use portolan::sweep::WeightModel;
 use portolan_io::{MapFile, write_atomic};
-use portolan_sim::{Lidar, LapConfig, SEED, World};
+use portolan_sim::{LapConfig, Lidar, SEED, World};
 use serde_json::{Value, json};
 
 use super::gallery;
@@ -26,7 +26,7 @@ use crate::report::{self, Facts};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan demo --out out")]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder for the results; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -56,12 +56,13 @@ fn seed(text: &str) -> Result<u64, String> {
 }
 
 /// Simulates the lap, builds every representation, writes everything.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     if args.out.exists() && !args.out.is_dir() {
         bail!("{}: is a file, not a folder; name a folder for the results", args.out.display());
     }
     let mut run = Run::default();
-    let config = LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };
+    let config =
+        LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };
 
     let world = portolan_sim::apartment().world;
     let scans = run.timed("simulate", || portolan_sim::lap(&world, &config));
@@ -85,7 +86,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     run.files.extend(written);
     run.files.extend(["report.html", "summary.json"]);
 
-    let found = Found { config, settings, grid, world: &world, fusion, bytes, file, derived, gallery: &gallery };
+    let found =
+        Found { config, settings, grid, world: &world, fusion, bytes, file, derived, gallery: &gallery };
     let facts = Facts {
         scene,
         esdf_against_contour: against_contour(&gallery),

@@ -58,6 +58,9 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
          them overestimate there; that is in the column too.</p>\
          <p>Surfaces, and answers to \"is this point occupied?\" (millimetres; positive bias: in front of the true face; \
          wrong answers among points further than half a cell from any face):</p>{}\
+         <p>Maps of bits stand a whole cell in front of the faces here: the faces of this apartment lie on the borders of \
+         cells, the noise of the range puts half of all end points into the cell in front, and one end point in a scan is \
+         enough to count the cell as hit. A signed distance averages the noise instead.</p>\
          <p>The crossing number of the contour counts on closed outlines. Seen from inside, a building is none: of the outer \
          walls only the inner faces were observed, so that the count takes a room for the inside of a solid.</p>\
          <p>A gradient of length one says \"this way is away from the obstacle\". Median ‖∇‖ at observed free points: \

@@ -7,7 +7,8 @@ use super::{Facts, Section};
 use crate::arguments::shown_bytes;
 use crate::pictures::shown_seconds;
 
-const LANGUAGE: &str = "The text's times are those of a TypeScript port in a browser; here compiled code on one core.";
+const LANGUAGE: &str =
+    "The text's times are those of a TypeScript port in a browser; here compiled code on one core.";
 const BLOCKS: &str =
     "Compiled; evidence is gathered by blocks of 8 × 8 cells and applied once a scan, not cell by cell.";
 
@@ -64,7 +65,7 @@ pub(super) fn section(facts: &Facts) -> Section {
             "contour, segments",
             "2,236",
             segments.to_string(),
-            "Another apartment: more faces were seen, and each crossing of the lattice makes a segment.",
+            "Another apartment: one segment for each square of four cells that the seen faces run through.",
         ),
         (
             "contour, memory",
@@ -87,7 +88,7 @@ pub(super) fn section(facts: &Facts) -> Section {
             "distance probe, contour",
             "45 µs",
             time("extracted contour", |r| r.distance),
-            "The same brute force over all segments, compiled.",
+            "The same brute force over all segments, a few more of them, compiled.",
         ),
         (
             "‖∇d‖, ESDF",
@@ -108,18 +109,19 @@ pub(super) fn section(facts: &Facts) -> Section {
             "The text measures against the extracted contour, and so does the large number. The seeding treats a cell's offset \
              to the surface as orthogonal to the way there, which makes distances too small.",
         ),
-        ("ESDF error, 99 %", "7.5 cm", both(|e| e.p99), "As above; values of the field are projective, and ours fewer at grazing angles."),
+        ("ESDF error, 99 %", "7.5 cm", both(|e| e.p99), "As above, and the field's values are measured along beams: too large where a face was seen at a grazing angle."),
         (
             "ESDF error, worst",
             "28 cm<small>too small</small>",
             both(|e| e.worst_under),
-            "The text's worst is a doorway's lip seen from one side. The lips of this apartment are seen from both.",
+            "The text's worst is a doorway's lip seen from one side only; which lips were, depends on the rooms and the way.",
         ),
         (
             "ESDF, worst too large",
             "&lt; 5 cm",
             both(|e| e.worst_over),
-            "The text's claim is about its contour. Against the world, surfaces that were never observed count.",
+            "The text's bound does not hold here: on a fused field the seeds are projective values, and those can be too large. \
+             Against the world, surfaces that were never observed count too.",
         ),
     ]
     .map(|(what, text, ours, why)| [what.to_owned(), text.to_owned(), ours, why.to_owned()])

@@ -19,7 +19,8 @@ fn cheapest(rows: &[Row], cost: impl Fn(&Row) -> Option<Cost>) -> Vec<usize> {
 
 pub(super) fn table(facts: &Facts) -> Section {
     let rows = &facts.scene.gallery.rows;
-    let columns: [fn(&Row) -> Option<Cost>; 4] = [|r| r.update, |r| r.occupancy, |r| r.distance, |r| r.surface];
+    let columns: [fn(&Row) -> Option<Cost>; 4] =
+        [|r| r.update, |r| r.occupancy, |r| r.distance, |r| r.surface];
     let best: Vec<Vec<usize>> = columns.iter().map(|cost| cheapest(rows, cost)).collect();
     let cells = rows.iter().enumerate().map(|(i, row)| {
         let plus = if row.derived { "+" } else { "" };
@@ -58,7 +59,8 @@ pub(super) fn winners(facts: &Facts) -> Section {
         let first = cheapest(rows, |r| workload.cost(r));
         first.iter().for_each(|&i| ever[i] = true);
         let names: Vec<_> = first.iter().map(|&i| escaped(&rows[i].name)).collect();
-        let best = first.iter().filter_map(|&i| workload.cost(&rows[i])).map(|c| c.seconds).fold(f64::MAX, f64::min);
+        let best =
+            first.iter().filter_map(|&i| workload.cost(&rows[i])).map(|c| c.seconds).fold(f64::MAX, f64::min);
         let next = (0..rows.len())
             .filter(|i| !first.contains(i))
             .filter_map(|i| Some((workload.cost(&rows[i])?.seconds, i)))
