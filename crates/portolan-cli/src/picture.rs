@@ -4,7 +4,7 @@ use portolan::cell::{LogOdds8, LogOddsValue};
 use portolan::geom::vector::distance;
 use portolan::geom::{Aabb, Grid};
 use portolan_draw::{Anchor, Canvas, Color, Entry, Font, Pen, PixelRect, Swatch, View, color};
-use portolan_io::MapFile;
+use portolan_io::{MapCell, MapFile};
 
 use crate::mapping::{Derived, cells_for_map_server};
 
@@ -30,8 +30,9 @@ pub(crate) fn of_map(file: &MapFile, derived: &Derived, title: &str) -> Option<V
     let view = View::fit(shown.min, shown.max, frame);
     canvas.fill_rect(frame, color::UNKNOWN);
     let mut legend = vec![Entry::new(Swatch::Area(color::UNKNOWN), "not observed")];
-    draw_occupancy(&mut canvas, &view, file, &mut legend);
-    draw_distances(&mut canvas, &view, file, &mut legend);
+    let colors = cell_colors(file, &grid, &mut legend);
+    let [columns, _] = grid.shape;
+    canvas.raster(&view, grid.shape, grid.lattice.origin, r, |[x, y]| colors[y * columns + x]);
     if let Some(contour) = &derived.contour {
         let segments: Vec<_> = contour.ends().collect();
         let pen = Pen::new(color::SURFACE, (0.5 * scale * r).clamp(1.2, 2.5));
@@ -39,11 +40,14 @@ pub(crate) fn of_map(file: &MapFile, derived: &Derived, title: &str) -> Option<V
         legend.push(Entry::new(Swatch::Line(Pen::new(color::SURFACE, 2.5)), "contour"));
     }
     draw_path(&mut canvas, &view, file, &mut legend);
-    canvas.scale_bar(&view);
     let heading = Font::new(24).bold();
     canvas.text([MARGIN, MARGIN - 4.0], &heading.fit(title, frame.width), heading, Anchor::Left);
-    let below = PixelRect::new(MARGIN, frame.bottom() + 14.0, frame.width, LEGEND);
-    canvas.legend(below, &legend, Font::new(16));
+    // The scale bar stands beside the legend, not on the map.
+    let below = PixelRect::new(MARGIN, frame.bottom() + 10.0, frame.width, LEGEND);
+    let [scale_x, scale_y] = view.scale();
+    let metres = [below.width / scale_x, below.height / scale_y];
+    canvas.scale_bar(&View::stretch([0.0; 2], metres, below.inset(0.0, 0.0, 0.0, 4.0)));
+    canvas.legend(below.inset(0.0, 4.0, 0.3 * below.width, 0.0), &legend, Font::new(16));
     Some(canvas.encode_png())
 }
 
@@ -69,57 +73,58 @@ fn shown_part(file: &MapFile) -> Option<(Grid<2>, Aabb<2>)> {
     Some((grid, seen.grown(6.0 * grid.lattice.resolution)))
 }
 
-/// Occupancy in light tones: what is drawn above stays legible.
-fn draw_occupancy(canvas: &mut Canvas, view: &View, file: &MapFile, legend: &mut Vec<Entry>) {
-    let lightly = |p: f64| color::UNKNOWN.mix(color::occupancy(p), if p < 0.5 { 1.0 } else { 0.45 });
-    let mut entries = || {
-        legend.push(Entry::new(Swatch::Area(lightly(0.12)), "free"));
-        legend.push(Entry::new(Swatch::Area(lightly(0.97)), "occupied"));
-    };
+/// The colour of every cell: occupancy in light tones, and over it the signed distance near surfaces.
+fn cell_colors(file: &MapFile, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<Color> {
+    let mut colors = vec![color::UNKNOWN; grid.len()];
     if let Some(map) = &file.grid {
         let table: Vec<Color> = (i8::MIN..=i8::MAX)
             .map(|v| match LogOdds8(v) {
                 v if v.is_unobserved() => color::UNKNOWN,
-                v => lightly(v.probability(map.rule())),
+                v => occupancy_color(v.probability(map.rule())),
             })
             .collect();
-        let grid = *map.store().grid();
-        let planes = map.store().planes();
-        canvas.raster(view, grid.shape, grid.lattice.origin, grid.lattice.resolution, |[x, y]| {
-            table[(i16::from(planes[y * grid.shape[0] + x].0) + 128) as usize]
-        });
-        entries();
-    } else if let Some((grid, cells)) = cells_for_map_server(file) {
-        use portolan_io::MapCell::{Free, Occupied, Unknown};
-        canvas.raster(view, grid.shape, grid.lattice.origin, grid.lattice.resolution, |[x, y]| {
-            match cells[y * grid.shape[0] + x] {
-                Free => lightly(0.12),
-                Occupied => lightly(0.97),
-                Unknown => color::UNKNOWN,
+        let cells = map.store().planes();
+        colors.iter_mut().zip(cells).for_each(|(c, v)| *c = table[(i16::from(v.0) + 128) as usize]);
+    } else if let Some((_, cells)) = cells_for_map_server(file) {
+        colors.iter_mut().zip(&cells).for_each(|(c, cell)| {
+            *c = match cell {
+                MapCell::Free => occupancy_color(0.1),
+                MapCell::Occupied => occupancy_color(0.9),
+                MapCell::Unknown => color::UNKNOWN,
             }
         });
-        entries();
+    }
+    legend.push(Entry::new(Swatch::Area(occupancy_color(0.1)), "free"));
+    legend.push(Entry::new(Swatch::Area(occupancy_color(0.9)), "occupied"));
+    if let Some(map) = &file.tsdf {
+        let (planes, truncation) = (map.store().planes(), map.config().truncation);
+        let observed = planes.distances().iter().zip(planes.weights());
+        for (c, (&d, _)) in colors.iter_mut().zip(observed).filter(|(_, (_, w))| **w >= 0.5) {
+            *c = distance_color(f64::from(d), truncation).over(*c);
+        }
+        legend
+            .push(Entry::new(Swatch::Area(distance_color(-0.7, 1.0).over(color::PAPER)), "behind a surface"));
+        legend.push(Entry::new(Swatch::Area(distance_color(0.5, 1.0).over(color::PAPER)), "in front of it"));
+    }
+    colors
+}
+
+/// From the paper of surely free space over the tone of what is not known to a dark grey.
+fn occupancy_color(p: f64) -> Color {
+    if p < 0.5 {
+        // The lower clamp is 0.12: one miss is a third of the way, three are nearly all of it.
+        color::UNKNOWN.mix(color::FREE, (0.5 - p) / 0.33)
+    } else {
+        color::UNKNOWN.mix(color::OCCUPIED, (p - 0.5) / 0.47 * 0.65)
     }
 }
 
-/// The signed field near surfaces; where it is saturated the occupancy below shows.
-fn draw_distances(canvas: &mut Canvas, view: &View, file: &MapFile, legend: &mut Vec<Entry>) {
-    let Some(map) = &file.tsdf else { return };
-    let (grid, planes) = (*map.grid(), map.store().planes());
-    let truncation = map.config().truncation;
-    canvas.raster(view, grid.shape, grid.lattice.origin, grid.lattice.resolution, |[x, y]| {
-        let i = y * grid.shape[0] + x;
-        let (d, w) = (f64::from(planes.distances()[i]), planes.weights()[i]);
-        if w < 0.5 {
-            return color::TRANSPARENT;
-        }
-        let tone = color::signed_distance(d, truncation);
-        // In front of the surface the ramp runs out again towards the truncation.
-        let rest = if d > 0.0 { (1.0 - d / truncation).clamp(0.0, 1.0) } else { 1.0 };
-        tone.with_alpha(f64::from(tone.a) / 255.0 * rest)
-    });
-    legend.push(Entry::new(Swatch::Area(color::NEGATIVE.with_alpha(0.8)), "behind a surface"));
-    legend.push(Entry::new(Swatch::Area(color::POSITIVE.with_alpha(0.3)), "in front of it"));
+/// The ramp of signed distances; in front of the surface it runs out again towards the truncation, so that the
+/// occupancy shows there.
+fn distance_color(d: f64, truncation: f64) -> Color {
+    let tone = color::signed_distance(d, truncation);
+    let rest = if d > 0.0 { (1.0 - d / truncation).clamp(0.0, 1.0) } else { 1.0 };
+    tone.with_alpha(f64::from(tone.a) / 255.0 * rest)
 }
 
 fn draw_path(canvas: &mut Canvas, view: &View, file: &MapFile, legend: &mut Vec<Entry>) {

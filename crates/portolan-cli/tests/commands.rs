@@ -116,20 +116,20 @@ fn saturated_cells_answer_at_least_so_far() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.esdf.bin");
     let mut bytes = b"PORTESDF".to_vec();
-    for word in [1u32, 2, 3, 3, 1, 1] {
+    for word in [1u32, 2, 4, 3, 1, 1] {
         bytes.extend(word.to_le_bytes());
     }
     for number in [0.0f64, 0.0, 0.0, 1.0] {
         bytes.extend(number.to_le_bytes());
     }
-    bytes.extend((0..9).flat_map(|i| (if i % 3 == 2 { -2.0f32 } else { 1.0 }).to_le_bytes()));
-    bytes.extend([1, 1, 2, 1, 1, 2, 1, 1, 2]);
+    bytes.extend((0..12).flat_map(|i| (if i % 4 > 1 { -2.0f32 } else { 1.0 }).to_le_bytes()));
+    bytes.extend([1, 1, 2, 2].repeat(3));
     std::fs::write(&path, bytes).unwrap();
     let points = folder.path().join("p.csv");
-    std::fs::write(&points, "1,1\n2.5,1\n").unwrap();
+    std::fs::write(&points, "1,1\n3,1\n").unwrap();
     let text = succeed(["query", arg(&path), "--points", arg(&points)]);
     let rows: Vec<_> = text.lines().skip(1).collect();
-    assert_eq!(rows, ["1,1,known,,1,,,0,0", "2.5,1,saturated,,-2,2,,,"]);
+    assert_eq!(rows, ["1,1,known,,1,,,0,0", "3,1,saturated,,-2,2,,,"]);
 }
 
 #[test]

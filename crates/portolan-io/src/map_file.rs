@@ -180,8 +180,9 @@ impl MapFile {
             }
         }
         fields.retain(|key, _| !["version", "dimension", "maps"].contains(&key.as_str()));
-        file.header = serde_json::from_value(Value::Object(fields))
-            .map_err(|e| reading.bad("the header", shown(e.to_string().as_bytes()), "write the file again"))?;
+        file.header = serde_json::from_value(Value::Object(fields)).map_err(|e| {
+            reading.bad("the header", shown(e.to_string().as_bytes()), "write the file again")
+        })?;
         Ok(file)
     }
 
@@ -472,8 +473,9 @@ impl Reading<'_> {
                 let planes = DistancePlanes::from_parts(distance, weight).ok_or_else(|| {
                     self.bad("a distance or weight", "not finite or negative", "write the file again")
                 })?;
-                let word =
-                    |field: &str, value: &str| self.bad(field, shown(value.as_bytes()), "use a newer program");
+                let word = |field: &str, value: &str| {
+                    self.bad(field, shown(value.as_bytes()), "use a newer program")
+                };
                 let config = TsdfConfig {
                     truncation,
                     w_max: w_max.unwrap_or(f32::INFINITY),
@@ -489,7 +491,9 @@ impl Reading<'_> {
     }
 
     fn made<T>(&self, kind: &str, map: Result<T, impl std::fmt::Display>) -> Result<T, IoError> {
-        map.map_err(|e| self.bad(format!("map {kind}"), format!("not possible ({e})"), "write the file again"))
+        map.map_err(|e| {
+            self.bad(format!("map {kind}"), format!("not possible ({e})"), "write the file again")
+        })
     }
 
     fn dense<T>(&self, kind: &str, store: Option<T>) -> Result<T, IoError> {
@@ -589,7 +593,9 @@ mod tests {
             },
             grid: Some(OccupancyGrid::new(grid, OccupancyModel::default()).unwrap()),
             tree: Some(Quadtree::covering(&grid, OccupancyModel::default()).unwrap()),
-            tsdf: Some(Tsdf::new(TsdfConfig { truncation: 0.3, ..Default::default() }.with_grid(&grid)).unwrap()),
+            tsdf: Some(
+                Tsdf::new(TsdfConfig { truncation: 0.3, ..Default::default() }.with_grid(&grid)).unwrap(),
+            ),
             ..Default::default()
         };
         let bearings: Vec<f64> = (0..180).map(|i| f64::from(i) * 0.0349).collect();

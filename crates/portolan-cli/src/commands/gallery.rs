@@ -9,7 +9,7 @@ use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
 use portolan::geom::{Aabb, Grid, Pose};
-use portolan::map::{Tsdf2Config, SweepKind};
+use portolan::map::{SweepKind, Tsdf2Config};
 use portolan::scan::Scan;
 use portolan::surface::ContourSettings;
 use portolan::sweep::WeightModel;
@@ -25,8 +25,10 @@ use crate::output::Output;
 use crate::pictures::{Scene, sheet};
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  portolan gallery demo\n  portolan gallery intel-corrected.log.gz --out intel")]
-pub struct Args {
+#[command(
+    after_help = "Examples:\n  portolan gallery demo\n  portolan gallery intel-corrected.log.gz --out intel"
+)]
+pub(crate) struct Args {
     /// Log of range scans with poses, or the word demo for the simulated Apartment
     #[arg(value_name = "LOG|demo")]
     log: PathBuf,
@@ -61,7 +63,7 @@ pub struct Args {
 }
 
 /// Builds and measures all of them.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let simulated = args.log.as_os_str() == "demo";
     let settings = args.settings();
     let (world, scans, grid, name) = if simulated {

@@ -1,6 +1,6 @@
 //! How large a map must be, and whether there is memory for it.
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use portolan::geom::vector::{along, distance};
 use portolan::geom::{Aabb, Grid, Pose};
 use portolan::scan::Scan;
@@ -14,7 +14,7 @@ const MARGIN_CELLS: f64 = 4.0;
 const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
 
 /// Box of everything that the scans saw, free ends of beams and the sensor included.
-fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
+pub(crate) fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
     let mut bounds = Aabb::EMPTY;
     for (world_from_sensor, scan) in scans {
         bounds.include(world_from_sensor.translation);
@@ -29,23 +29,22 @@ fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
 /// The grid for what was seen or, where the user said so, for his bounds; joined with the grid of a map that is
 /// to grow.
 pub(crate) fn grid_over(
+    seen: Aabb<2>,
     settings: &Settings,
     before: Option<Grid<2>>,
-    scans: &[(Pose<2>, Scan<2>)],
     log: &str,
 ) -> anyhow::Result<Grid<2>> {
     let r = settings.resolution;
-    let bounds = settings.bounds.unwrap_or_else(|| seen(scans).grown(settings.truncation + MARGIN_CELLS * r));
+    let bounds = settings.bounds.unwrap_or_else(|| seen.grown(settings.truncation + MARGIN_CELLS * r));
     let held = bounds.min.iter().chain(&bounds.max).all(|v| (v / r).abs() < LARGEST_INDEX);
     let grid = if held { Grid::covering(bounds, r) } else { None };
     let Some(grid) = grid else {
         let [w, h] = bounds.extent();
         bail!(
             "{log}: the extent is {w:.3e} x {h:.3e} m around ({:.3e}, {:.3e}), too much for cells of {r} m; \
-             {}give --bounds x0,y0,x1,y1 or a coarser --resolution",
+             give --bounds x0,y0,x1,y1 or a coarser --resolution",
             0.5 * (bounds.min[0] + bounds.max[0]),
             0.5 * (bounds.min[1] + bounds.max[1]),
-            outlier(scans, w.max(h)),
         );
     };
     Ok(before.map_or(grid, |before| joined(&before, &grid)))
@@ -89,28 +88,28 @@ pub(crate) fn check_memory(
     let coarser = two_digits_up(r * (needed / limit as f64).sqrt());
     bail!(
         "{log}: a map of {w:.1} x {h:.1} m with --resolution {r} needs about {} and --memory allows {}; \
-         {}give --bounds x0,y0,x1,y1, --resolution {coarser} or coarser, or more --memory",
+         give --bounds x0,y0,x1,y1, --resolution {coarser} or coarser, or more --memory",
         shown_bytes(needed),
         shown_bytes(limit as f64),
-        outlier(scans, w.max(h)),
     );
 }
 
-/// Names the scan that makes the extent so large, if a single one does.
-fn outlier(scans: &[(Pose<2>, Scan<2>)], size: f64) -> String {
-    let mut xs: Vec<_> = scans.iter().map(|(p, _)| p.translation).collect();
+/// An error about the size of a map, with the scan named that makes it so large, if a single one does.
+pub(crate) fn with_outlier(error: anyhow::Error, scans: &[(Pose<2>, Scan<2>)]) -> anyhow::Error {
+    let mut positions: Vec<_> = scans.iter().map(|(p, _)| p.translation).collect();
     let mut median = [0.0; 2];
     for (k, m) in median.iter_mut().enumerate() {
-        xs.sort_unstable_by(|a, b| a[k].total_cmp(&b[k]));
-        *m = xs.get(xs.len() / 2).map_or(0.0, |p| p[k]);
+        positions.sort_unstable_by(|a, b| a[k].total_cmp(&b[k]));
+        *m = positions.get(positions.len() / 2).map_or(0.0, |p| p[k]);
     }
-    let from_median = |i: usize| distance(scans[i].0.translation, median);
-    match (0..scans.len()).max_by(|&a, &b| from_median(a).total_cmp(&from_median(b))) {
-        Some(i) if from_median(i) > 0.4 * size && size > 1e4 => {
-            let [x, y] = scans[i].0.translation;
-            format!("scan {i} alone lies at ({x:.6e}, {y:.6e}), {:.3e} m off; ", from_median(i))
+    let size = seen(scans).extent();
+    let from_median = |i: &usize| distance(scans[*i].0.translation, median);
+    match (0..scans.len()).max_by(|a, b| from_median(a).total_cmp(&from_median(b))) {
+        Some(i) if size[0].max(size[1]) > 1e4 && from_median(&i) > 0.4 * size[0].max(size[1]) => {
+            let ([x, y], off) = (scans[i].0.translation, from_median(&i));
+            anyhow!("{error} (scan {i} lies at ({x:.4e}, {y:.4e}), {off:.1e} m from the others)")
         }
-        _ => String::new(),
+        _ => error,
     }
 }
 
