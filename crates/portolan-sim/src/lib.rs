@@ -17,13 +17,19 @@
 mod apartment;
 mod drive;
 mod lidar;
+mod odometry;
+mod outline;
 mod random;
+mod scan_match;
 mod solid;
 mod world;
 
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
 pub use drive::{LapConfig, SEED, lap, lap_poses};
 pub use lidar::{Lidar, scan_at};
+pub use odometry::{OdometryNoise, dead_reckon, measure_motions};
+pub use outline::Outline;
 pub use random::Random;
+pub use scan_match::{MatchRefusal, MatchSettings, ScanMatch, match_scans};
 pub use solid::{Solid, SolidKind};
 pub use world::{BoundarySegment, RayHit, World};
