@@ -196,7 +196,7 @@ mod tests {
             let inside = world.solids().iter().filter(|s| s.contains(middle)).count();
             assert_eq!(inside, 1, "{}", solid.name);
         }
-        let moved = world.with_moved("chair", CHAIR_MOVE).unwrap();
+        let moved = world.with_moved("chair", CHAIR_MOVE);
         let chair = moved.solids().iter().find(|s| s.name == "chair").unwrap().aabb();
         for corner in [chair.min, chair.max, [chair.min[0], chair.max[1]], [chair.max[0], chair.min[1]]] {
             assert!(!world.is_inside(corner), "the chair's new place is taken at {corner:?}");

@@ -16,14 +16,30 @@
 
 mod apartment;
 mod drive;
+mod ghost;
 mod lidar;
+mod loop_closure;
+mod odometry;
+mod outline;
+mod pose_error;
 mod random;
+mod relations;
+mod scan_match;
 mod solid;
+mod static_noise;
 mod world;
 
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
 pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
+pub use ghost::{Ghost, GhostGroup, GhostRun, GhostSettings, ghost};
 pub use lidar::{Lidar, scan_at};
+pub use loop_closure::{Closure, CorrectedLap, CorrectionSettings, RefusedCandidates, Round, correct};
+pub use odometry::{OdometryNoise, dead_reckon, measure_motions};
+pub use outline::Outline;
+pub use pose_error::{ErrorMeasures, PoseErrors};
 pub use random::Random;
+pub use relations::{Relation, RelationError, parse_relations, score_relations};
+pub use scan_match::{MatchRefusal, MatchSettings, ScanMatch, match_scans};
 pub use solid::{Solid, SolidKind};
+pub use static_noise::{StaticNoise, static_noise};
 pub use world::{BoundarySegment, RayHit, World};

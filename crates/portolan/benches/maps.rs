@@ -21,7 +21,9 @@ static LOG: LazyLock<Vec<(Pose<2>, Scan<2>)>> =
 static TSDF: LazyLock<Tsdf2> = LazyLock::new(|| tsdf(SweepKind::CellCentre, true));
 static PROBES: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
     let at = |i: u32, a: f64| (0.5 + f64::from(i) * a).fract();
-    (1..=10_000).map(|i| [12.0 * at(i, 0.754_877_666_246_692_7), 9.0 * at(i, 0.569_840_290_998_053_2)]).collect()
+    (1..=10_000)
+        .map(|i| [12.0 * at(i, 0.754_877_666_246_692_7), 9.0 * at(i, 0.569_840_290_998_053_2)])
+        .collect()
 });
 
 fn grid() -> Grid<2> {

@@ -1,7 +1,7 @@
 //! The one way a scan enters a map.
 
 use crate::cell::{Cell, Evidence};
-use crate::geom::{Aabb, Pose};
+use crate::geom::{Aabb, BlockKey, Pose};
 use crate::scan::{Scan, ScanStats};
 use crate::store::Store;
 use crate::sweep::Sweep;
@@ -13,7 +13,26 @@ pub(super) fn integrate<C, S, W, const D: usize>(
     scratch: &mut C::Evidence,
     rule: &C::Rule,
     bounds: &Aabb<D>,
+    at: (&Pose<D>, &Scan<D>),
+) -> ScanStats
+where
+    C: Cell,
+    S: Store<C, D>,
+    W: Sweep<D, Evidence = C::Evidence>,
+{
+    integrate_watched::<C, S, W, D>(store, sweep, scratch, rule, bounds, at, |_, _, _| ())
+}
+
+/// The same with an onlooker, who sees every block's evidence before it is fused: once a block, so that the loop over
+/// cells does not know of it.
+pub(super) fn integrate_watched<C, S, W, const D: usize>(
+    store: &mut S,
+    sweep: &mut W,
+    scratch: &mut C::Evidence,
+    rule: &C::Rule,
+    bounds: &Aabb<D>,
     (world_from_sensor, scan): (&Pose<D>, &Scan<D>),
+    mut onlooker: impl FnMut(BlockKey<D>, &S, &C::Evidence),
 ) -> ScanStats
 where
     C: Cell,
@@ -28,6 +47,7 @@ where
     for i in 0..sweep.blocks().len() {
         let evidence = sweep.evidence(i, scratch);
         cells += evidence.observed() as u64;
+        onlooker(sweep.blocks()[i], store, evidence);
         store.apply(sweep.blocks()[i], evidence, rule);
     }
     ScanStats {

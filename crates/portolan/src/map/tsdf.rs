@@ -1,13 +1,13 @@
 //! Truncated signed distance fields.
 
 use super::error::check_grid;
-use super::integrate::integrate;
+use super::integrate::integrate_watched;
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
 use crate::cell::{
     Cell, DistanceObservation, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
 };
-use crate::geom::{Aabb, Grid, Pose, block_cells};
+use crate::geom::{Aabb, BlockKey, Grid, Pose, block_cells};
 use crate::scan::{Scan, ScanStats};
 use crate::store::{Dense, Store};
 use crate::sweep::{CellCentre, March, WeightModel};
@@ -83,6 +83,32 @@ pub struct Tsdf<const D: usize> {
     carving: CellCentreOrMarch<D>,
     banded: CellCentreOrMarch<D>,
     scratch: Distances,
+    watched: Watched<D>,
+}
+
+/// Cells whose events are kept: block, cell in the block, and which cell that is, ascending.
+#[derive(Clone, Debug, Default)]
+struct Watched<const D: usize> {
+    places: Vec<(BlockKey<D>, usize, [i32; D])>,
+    events: Vec<([i32; D], FusionEvent)>,
+}
+
+impl<const D: usize> Watched<D> {
+    /// The events of the watched cells of a block, from the evidence that is about to be fused.
+    fn look(
+        &mut self,
+        key: BlockKey<D>,
+        store: &Dense<SignedDistance, D>,
+        evidence: &Distances,
+        rule: &TsdfRule,
+    ) {
+        let first = self.places.partition_point(|p| p.0 < key);
+        for &(_, i, cell) in self.places[first..].iter().take_while(|p| p.0 == key) {
+            if let Some(observation) = evidence.one(i) {
+                self.events.push((cell, SignedDistance::fuse(store.cell(cell), observation, rule).1));
+            }
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -126,6 +152,7 @@ impl<const D: usize> Tsdf<D> {
             carving: CellCentreOrMarch::new(&config, true),
             banded: CellCentreOrMarch::new(&config, false),
             scratch: Distances::silent(block_cells::<D>()),
+            watched: Watched { places: Vec::new(), events: Vec::new() },
             store,
             config,
             rule,
@@ -151,14 +178,38 @@ impl<const D: usize> Tsdf<D> {
     pub fn integrate(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>, carve: bool) -> ScanStats {
         let sweep = if carve { &mut self.carving } else { &mut self.banded };
         let (store, scratch, at) = (&mut self.store, &mut self.scratch, (world_from_sensor, scan));
+        let (rule, bounds, watched) = (&self.rule, &self.bounds, &mut self.watched);
+        watched.events.clear();
+        let look = |key, store: &Dense<SignedDistance, D>, evidence: &Distances| {
+            if !watched.places.is_empty() {
+                watched.look(key, store, evidence, rule);
+            }
+        };
         match sweep {
             CellCentreOrMarch::CellCentre(s) => {
-                integrate::<SignedDistance, _, _, D>(store, &mut **s, scratch, &self.rule, &self.bounds, at)
+                integrate_watched::<SignedDistance, _, _, D>(store, &mut **s, scratch, rule, bounds, at, look)
             }
             CellCentreOrMarch::March(s) => {
-                integrate::<SignedDistance, _, _, D>(store, &mut **s, scratch, &self.rule, &self.bounds, at)
+                integrate_watched::<SignedDistance, _, _, D>(store, &mut **s, scratch, rule, bounds, at, look)
             }
         }
+    }
+
+    /// Watches these cells from now on, and no others: every scan leaves what it did to them in
+    /// [`Tsdf::events`]. Cells outside of the map are left out. What is not watched pays nothing.
+    pub fn watch(&mut self, cells: impl IntoIterator<Item = [i32; D]>) {
+        let inside = cells.into_iter().filter(|&c| self.store.grid().index(c).is_some());
+        self.watched.places =
+            inside.map(|cell| (BlockKey::of_cell(cell), BlockKey::offset(cell), cell)).collect();
+        self.watched.places.sort_unstable();
+        self.watched.places.dedup();
+        self.watched.events.clear();
+    }
+
+    /// What the last scan that was integrated did to the watched cells that it observed: computed by
+    /// [`Cell::fuse`] from the same evidence, so that it is what happened. In the order of blocks.
+    pub fn events(&self) -> &[([i32; D], FusionEvent)] {
+        &self.watched.events
     }
 
     /// What the filter of a cell would do with an observation, without doing it; for inspectors.
@@ -227,5 +278,54 @@ impl<const D: usize> MapRepr<D> for Tsdf<D> {
 
     fn abilities(&self) -> Abilities {
         Abilities { occupancy: true, distance: false }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::RangeLimits;
+
+    fn events_are_what_happened(sweep: SweepKind) {
+        let config =
+            TsdfConfig { cells: [60, 60], origin: [-1.5, -1.5], w_max: 3.0, sweep, ..Default::default() };
+        let mut tsdf = Tsdf::<2>::new(config).unwrap();
+        let mut unwatched = tsdf.clone();
+        let cells = (0..60).flat_map(|x| (0..60).map(move |y| [x, y])).filter(|c| (c[0] * 7 + c[1]) % 3 == 0);
+        tsdf.watch(cells.clone().chain([[-1, 4], [60, 2], [3, 3], [3, 3]]));
+        let bearings: Vec<f64> = (0..90).map(|i| f64::from(i) * 0.07 - 3.1).collect();
+        let mut seen = 0;
+        for k in 0..6 {
+            let ranges: Vec<f64> = (0..90).map(|i| 0.8 + 0.1 * f64::from((i * k) % 5)).collect();
+            let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
+            let pose = Pose::<2>::new(0.02 * f64::from(k), 0.0, 0.3 * f64::from(k));
+            let before = tsdf.clone();
+            tsdf.integrate(&pose, &scan, true);
+            unwatched.integrate(&pose, &scan, true);
+            assert_eq!(tsdf.store(), unwatched.store());
+            assert!(unwatched.events().is_empty());
+            let observed: std::collections::HashMap<_, _> = tsdf.events().iter().copied().collect();
+            assert_eq!(observed.len(), tsdf.events().len());
+            seen += observed.len();
+            for cell in cells.clone() {
+                let (old, new) = (before.store().cell(cell), tsdf.store().cell(cell));
+                match observed.get(&cell) {
+                    None => assert_eq!(old, new),
+                    Some(e) => {
+                        let new = new.unwrap();
+                        assert_eq!((e.after as f32, e.weight_after as f32), (new.distance, new.weight));
+                        assert_eq!(e.weight_before, old.map_or(0.0, |c| c.weight.into()));
+                        assert!(e.gain > 0.0 && e.gain <= 1.0);
+                    }
+                }
+            }
+        }
+        assert!(seen > 1000);
+    }
+
+    #[test]
+    fn events_of_watched_cells_are_what_happened() {
+        events_are_what_happened(SweepKind::CellCentre);
+        events_are_what_happened(SweepKind::March);
     }
 }
