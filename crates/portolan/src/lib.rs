@@ -1,9 +1,40 @@
-//! Volumetric mapping in two and three dimensions.
+//! Volumetric mapping in two and three dimensions: range scans with known poses, fused once, into the maps that
+//! robots, renderers and people ask different questions of.
 //!
-//! Every map here is the same recursive estimator in another costume. Three choices make a map: a **sweep**
-//! turns a scan into evidence, a **cell** says how evidence moves an estimate, a **store** holds the cells.
-//! Read-only **fields** are derived from maps. The crate does no input or output, prints nothing and reads
-//! no clock.
+//! Every map here is the same recursive estimator in another costume. Three choices make a map: a [`sweep`]
+//! turns a scan into evidence, a [`cell`] says how evidence moves an estimate, a [`store`] holds the cells.
+//! Read-only fields are derived from maps: a distance [`field`], a [`surface`]. The crate does no input or
+//! output, prints nothing, starts no threads of its own and reads no clock.
+//!
+//! ```
+//! use portolan::{Answer, geom::{Grid, Pose}, map::{Tsdf2, Tsdf2Config}, scan::{RangeLimits, Scan}};
+//!
+//! // A laser in the middle of a room of 4 m x 4 m, 360 beams.
+//! let bearings: Vec<f64> = (0..360).map(|d| f64::from(d - 180).to_radians()).collect();
+//! let ranges: Vec<f64> = bearings.iter().map(|b| 2.0 / b.cos().abs().max(b.sin().abs())).collect();
+//! let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
+//!
+//! let mut tsdf = Tsdf2::new(Tsdf2Config::default().with_grid(&Grid::new([-2.5; 2], 0.05, [100; 2])))?;
+//! tsdf.integrate(&Pose::<2>::new(0.0, 0.0, 0.0), &scan, true);
+//!
+//! // Where is the surface? How far is it, and which way is away from it? And what is not known?
+//! let contour = portolan::surface::marching_squares(&tsdf, &Default::default());
+//! let esdf = portolan::field::esdf_from_tsdf(&tsdf, 0.5, 1.5);
+//! let (clearance, away) = esdf.distance_and_gradient([1.5, 0.02]).known().expect("seen by the laser");
+//! assert!((clearance - 0.5).abs() < 0.05 && away[0] < -0.9);
+//! assert!((contour.length() - 16.0).abs() < 0.2);
+//! assert_eq!(esdf.distance([2.4, 2.4]), Answer::Unknown);
+//! # Ok::<(), portolan::map::MapError>(())
+//! ```
+//!
+//! | question | map | cost |
+//! |---|---|---|
+//! | is this point occupied? | [`map::OccupancyGrid`] | one index |
+//! | the same, in space that is mostly never seen | [`map::Quadtree`], [`map::Octree`] | a descent |
+//! | where is the surface? | [`map::Tsdf`], then [`surface::marching_squares`] | one pass over the cells |
+//! | how far to the nearest surface, and which way is away? | [`field::Esdf`] | one interpolation |
+//! | how near is the nearest measurement? | [`map::Cloud`] | a k-d tree |
+//! | what does a renderer make of it? | [`radiance`] | on a line, so far |
 
 mod answer;
 pub mod cell;
