@@ -140,8 +140,8 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
     let after = before.with_moved("chair", CHAIR_MOVE);
     let places = [&before, &after].map(chair);
     let region = places[0].union(places[1]).grown(settings.truncation + 2.0 * settings.resolution);
-    let grid = Grid::covering(region, settings.resolution)
-        .ok_or_else(|| MapError::Resolution(settings.resolution))?;
+    let grid =
+        Grid::covering(region, settings.resolution).ok_or(MapError::Resolution(settings.resolution))?;
     let mut runs = Vec::new();
     for &w_max in &settings.w_max {
         runs.push(Run {

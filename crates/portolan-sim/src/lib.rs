@@ -1,5 +1,13 @@
 //! Worlds, robots and sensors, deterministic from a seed.
 //!
+//! | question | start at |
+//! |---|---|
+//! | what is there, what does the robot see | [`apartment`], [`lap`], [`scan_at`] |
+//! | where do the wheels say that it is | [`measure_motions`], [`dead_reckon`] |
+//! | where was it really | [`correct`]: scan matching ([`match_scans`]), loop closures, pose graph |
+//! | how far off are poses | [`PoseErrors`]; without truth [`score_relations`] |
+//! | how long does a map believe in what is gone, and what does forgetting cost | [`ghost`](fn@ghost), [`static_noise`](fn@static_noise) |
+//!
 //! Every transcendental function comes from `libm` and every random number from one small generator, so that a
 //! seed gives the same bytes on every platform and for any number of threads.
 //!

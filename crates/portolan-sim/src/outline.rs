@@ -40,8 +40,15 @@ impl Outline {
         let points: Vec<_> = hits.iter().map(|&i| end(i)).collect();
         let normals = hits.iter().map(|&i| normal(scan, i)).collect();
         let free = free_ranges(&points);
-        let mut outline =
-            Self { points, normals, corner: [0.0; 2], shape: [0; 2], starts: vec![0], members: Vec::new(), free };
+        let mut outline = Self {
+            points,
+            normals,
+            corner: [0.0; 2],
+            shape: [0; 2],
+            starts: vec![0],
+            members: Vec::new(),
+            free,
+        };
         outline.fill_grid();
         outline
     }
@@ -60,7 +67,8 @@ impl Outline {
         if self.points.is_empty() {
             return;
         }
-        let fold = |f: fn(f64, f64) -> f64, k: usize| self.points.iter().map(|p| p[k]).reduce(f).unwrap_or(0.0);
+        let fold =
+            |f: fn(f64, f64) -> f64, k: usize| self.points.iter().map(|p| p[k]).reduce(f).unwrap_or(0.0);
         self.corner = [fold(f64::min, 0), fold(f64::min, 1)];
         // A stray reading at a kilometre must not cost memory: beyond so many cells the last one holds the rest.
         let cells = |k: usize| (((fold(f64::max, k) - self.corner[k]) / CELL) as usize).min(1023) + 1;
@@ -175,8 +183,10 @@ fn normal(scan: &Scan<2>, i: usize) -> Option<[f64; 2]> {
             if !scan.beam(at).is_hit() {
                 continue;
             }
-            let spacing = distance(scan.beam(at).direction, scan.beam(last).direction) * scan.beam(last).range;
-            if distance(end(at), end(last)) > GAP.max(4.0 * spacing) || distance(end(at), centre) > TANGENT_REACH
+            let spacing =
+                distance(scan.beam(at).direction, scan.beam(last).direction) * scan.beam(last).range;
+            if distance(end(at), end(last)) > GAP.max(4.0 * spacing)
+                || distance(end(at), centre) > TANGENT_REACH
             {
                 break;
             }

@@ -100,7 +100,9 @@ mod tests {
         let moved: Vec<_> = truth.iter().map(|p| Pose::<2>::new(0.3, 0.4, 0.0) * *p).collect();
         let absolute = PoseErrors::absolute(&moved, &truth);
         assert_eq!((absolute.count, absolute.rotation.max), (4, 0.0));
-        assert!((absolute.translation.rms - 0.5).abs() < 1e-12 && (absolute.translation.max - 0.5).abs() < 1e-12);
+        assert!(
+            (absolute.translation.rms - 0.5).abs() < 1e-12 && (absolute.translation.max - 0.5).abs() < 1e-12
+        );
         assert!(PoseErrors::relative(&moved, &truth, 1).translation.max < 1e-12);
         assert_eq!(PoseErrors::relative(&moved, &truth, 4).count, 0);
     }

@@ -85,7 +85,8 @@ mod tests {
 
     #[test]
     fn poses_that_agree_score_zero_wherever_the_world_is() {
-        let poses: Vec<_> = (0..20).map(|k| (f64::from(k), planar(f64::from(k), 0.3, 0.2 * f64::from(k)))).collect();
+        let poses: Vec<_> =
+            (0..20).map(|k| (f64::from(k), planar(f64::from(k), 0.3, 0.2 * f64::from(k)))).collect();
         let relation = |a: usize, b: usize| Relation {
             first_time: poses[a].0 + 0.01,
             second_time: poses[b].0,

@@ -183,14 +183,15 @@ fn judge(
     let scale = 1.0 / (rms.max(0.005).powi(2) * settings.pairs_per_independent);
     let h = system.hessian;
     let upper = [h[0][0], h[0][1], h[0][2], h[1][1], h[1][2], h[2][2]].map(|v| v * scale);
-    let information =
-        Information::from_upper(&upper).map_err(|_| MatchRefusal::Degenerate { balance: system.balance() })?;
+    let information = Information::from_upper(&upper)
+        .map_err(|_| MatchRefusal::Degenerate { balance: system.balance() })?;
     Ok(ScanMatch { reference_from_scan: *pose, information, inlier_share, rms, iterations })
 }
 
 /// Share of the scan's points where the reference saw through.
 fn contradicted(reference: &Outline, scan: &Outline, reference_from_scan: &Pose<2>) -> f64 {
-    let through = |p: &&[f64; 2]| reference.sees_through(reference_from_scan.transform_point(**p), SEEN_BEYOND);
+    let through =
+        |p: &&[f64; 2]| reference.sees_through(reference_from_scan.transform_point(**p), SEEN_BEYOND);
     scan.points().iter().filter(through).count() as f64 / scan.points().len().max(1) as f64
 }
 
@@ -206,7 +207,13 @@ struct System {
 }
 
 impl System {
-    fn build(reference: &Outline, scan: &Outline, pose: &Pose<2>, reach: f64, settings: &MatchSettings) -> Self {
+    fn build(
+        reference: &Outline,
+        scan: &Outline,
+        pose: &Pose<2>,
+        reach: f64,
+        settings: &MatchSettings,
+    ) -> Self {
         let mut system = Self {
             hessian: [[0.0; 3]; 3],
             gradient: [0.0; 3],
@@ -324,9 +331,8 @@ mod tests {
                         [upper[1], upper[3], upper[4]],
                         [upper[2], upper[4], upper[5]],
                     ];
-                    chi_square += (0..3)
-                        .map(|i| (0..3).map(|j| r[i] * omega[i][j] * r[j]).sum::<f64>())
-                        .sum::<f64>();
+                    chi_square +=
+                        (0..3).map(|i| (0..3).map(|j| r[i] * omega[i][j] * r[j]).sum::<f64>()).sum::<f64>();
                     errors.push(r[0].hypot(r[1]));
                     turns.push(r[2].abs().to_degrees());
                 }
@@ -371,8 +377,9 @@ mod tests {
                 if poses[i].translation_to(&poses[j]) > 2.5 {
                     tried += 1;
                     let guess = planar(0.0, 0.0, 0.0);
-                    believed +=
-                        i32::from(match_scans(&outlines[i], &outlines[j], &guess, &Default::default()).is_ok());
+                    believed += i32::from(
+                        match_scans(&outlines[i], &outlines[j], &guess, &Default::default()).is_ok(),
+                    );
                 }
             }
         }

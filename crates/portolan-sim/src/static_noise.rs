@@ -60,8 +60,7 @@ struct Front {
 
 /// The pooled variance over all scans that said something in several laps, and the degrees of freedom.
 fn pooled(moments: &[Moments]) -> [f64; 2] {
-    let [m2, freedom] =
-        moments.iter().fold([0.0; 2], |[a, b], m| [a + m.m2, b + (m.n - 1.0).max(0.0)]);
+    let [m2, freedom] = moments.iter().fold([0.0; 2], |[a, b], m| [a + m.m2, b + (m.n - 1.0).max(0.0)]);
     [m2 / freedom, freedom]
 }
 
@@ -78,8 +77,8 @@ pub fn static_noise(
     let world = apartment().world;
     let chair = world.solids().iter().filter(|s| s.name == "chair");
     let region = chair.fold(Aabb::EMPTY, |b, s| b.union(s.aabb())).grown(1.2);
-    let grid = Grid::covering(region, settings.resolution)
-        .ok_or_else(|| MapError::Resolution(settings.resolution))?;
+    let grid =
+        Grid::covering(region, settings.resolution).ok_or(MapError::Resolution(settings.resolution))?;
     let mut maps = Vec::new();
     for &w_max in &settings.w_max {
         let config = TsdfConfig {

@@ -7,7 +7,13 @@ use portolan_sim::{GhostGroup, GhostSettings, ghost, static_noise};
 fn tell(name: &str, g: &GhostGroup) {
     println!(
         "  {name}: {} cells ({} halved), half-life {:.2}, predicted {:.2}, by their gains {:.2}; weight {:.2}, at the move {:.1}, {:.1} a lap",
-        g.cells, g.halved, g.half_life_measured, g.half_life_predicted, g.half_life_of_gains, g.weight, g.weight_at_move,
+        g.cells,
+        g.halved,
+        g.half_life_measured,
+        g.half_life_predicted,
+        g.half_life_of_gains,
+        g.weight,
+        g.weight_at_move,
         g.observations_per_lap
     );
 }
@@ -36,7 +42,13 @@ fn saturated_cells_forget_the_chair_with_the_predicted_half_life() {
         let n = run.static_noise.unwrap();
         println!(
             "  static: {} cells, observation {:.2} mm, weight {:.2}, cells {:.3} mm, predicted {:.3}; {} crossings {:.3} mm",
-            n.cells, 1e3 * n.observation, n.weight, 1e3 * n.measured, 1e3 * n.predicted, n.crossings, 1e3 * n.crossing
+            n.cells,
+            1e3 * n.observation,
+            n.weight,
+            1e3 * n.measured,
+            1e3 * n.predicted,
+            n.crossings,
+            1e3 * n.crossing
         );
         // Lost beams make it noisier than the filter alone: see the test of a lidar that loses none.
         assert!(n.cells > 100 && (0.95..1.4).contains(&(n.measured / n.predicted)));
@@ -54,7 +66,13 @@ fn a_static_map_is_as_noisy_as_the_filter_says() {
     for n in static_noise(&settings, 12, 24).unwrap() {
         println!(
             "W_max {}: {} cells, observation {:.2} mm, cells {:.3} mm, predicted {:.3}; {} crossings {:.3} mm",
-            n.w_max, n.cells, 1e3 * n.observation, 1e3 * n.measured, 1e3 * n.predicted, n.crossings, 1e3 * n.crossing
+            n.w_max,
+            n.cells,
+            1e3 * n.observation,
+            1e3 * n.measured,
+            1e3 * n.predicted,
+            n.crossings,
+            1e3 * n.crossing
         );
         assert!(n.cells > 100 && (n.measured / n.predicted - 1.0).abs() < 0.15);
     }

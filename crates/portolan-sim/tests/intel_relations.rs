@@ -8,10 +8,8 @@ use std::path::{Path, PathBuf};
 
 /// The folder of real data; `None` and a loud note where it is not there.
 fn data(name: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("PORTOLAN_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
+    let root = std::env::var_os("PORTOLAN_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
     let path = root.join(name);
     if !path.exists() {
         // Past the capture of test output, so that it is seen.
@@ -32,14 +30,18 @@ fn corrected_intel_poses_agree_with_the_verified_relations() {
     let raw = CarmenLog::read(folder.join("intel.clf.bz2")).unwrap();
     // The corrected log has a clock of its own; its readings are those of the raw log, to the centimetre.
     let key = |readings: &[f64]| readings.iter().map(|z| (100.0 * z).round() as i64).collect::<Vec<_>>();
-    let stamps: HashMap<_, _> =
-        raw.raw_scans().filter_map(|s| Some((key(s.readings), s.time?))).collect();
+    let stamps: HashMap<_, _> = raw.raw_scans().filter_map(|s| Some((key(s.readings), s.time?))).collect();
     let poses: Vec<_> = corrected
         .raw_scans()
         .filter_map(|s| Some((*stamps.get(&key(s.readings))?, s.world_from_laser)))
         .collect();
     let score = score_relations(&relations, &poses, 0.05);
-    println!("{} of {} scans found in the raw log, {} relations: {score}", poses.len(), corrected.len(), score.count);
+    println!(
+        "{} of {} scans found in the raw log, {} relations: {score}",
+        poses.len(),
+        corrected.len(),
+        score.count
+    );
     assert_eq!(poses.len(), 910);
     assert_eq!(score.count, 164);
     assert!((score.translation.median - 0.05).abs() < 0.01);

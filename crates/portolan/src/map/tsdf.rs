@@ -186,12 +186,12 @@ impl<const D: usize> Tsdf<D> {
             }
         };
         match sweep {
-            CellCentreOrMarch::CellCentre(s) => integrate_watched::<SignedDistance, _, _, D>(
-                store, &mut **s, scratch, rule, bounds, at, look,
-            ),
-            CellCentreOrMarch::March(s) => integrate_watched::<SignedDistance, _, _, D>(
-                store, &mut **s, scratch, rule, bounds, at, look,
-            ),
+            CellCentreOrMarch::CellCentre(s) => {
+                integrate_watched::<SignedDistance, _, _, D>(store, &mut **s, scratch, rule, bounds, at, look)
+            }
+            CellCentreOrMarch::March(s) => {
+                integrate_watched::<SignedDistance, _, _, D>(store, &mut **s, scratch, rule, bounds, at, look)
+            }
         }
     }
 
@@ -287,7 +287,8 @@ mod tests {
     use crate::scan::RangeLimits;
 
     fn events_are_what_happened(sweep: SweepKind) {
-        let config = TsdfConfig { cells: [60, 60], origin: [-1.5, -1.5], w_max: 3.0, sweep, ..Default::default() };
+        let config =
+            TsdfConfig { cells: [60, 60], origin: [-1.5, -1.5], w_max: 3.0, sweep, ..Default::default() };
         let mut tsdf = Tsdf::<2>::new(config).unwrap();
         let mut unwatched = tsdf.clone();
         let cells = (0..60).flat_map(|x| (0..60).map(move |y| [x, y])).filter(|c| (c[0] * 7 + c[1]) % 3 == 0);
