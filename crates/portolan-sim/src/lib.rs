@@ -24,6 +24,7 @@
 
 mod apartment;
 mod drive;
+mod followed;
 mod ghost;
 mod lidar;
 mod loop_closure;
@@ -39,7 +40,8 @@ mod world;
 
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
 pub use drive::{LapConfig, SEED, lap, lap_poses};
-pub use ghost::{Ghost, GhostGroup, GhostRun, GhostSettings, ghost};
+pub use followed::GhostGroup;
+pub use ghost::{Ghost, GhostRun, GhostSettings, ghost};
 pub use lidar::{Lidar, scan_at};
 pub use loop_closure::{Closure, CorrectedLap, CorrectionSettings, RefusedCandidates, Round, correct};
 pub use odometry::{OdometryNoise, dead_reckon, measure_motions};

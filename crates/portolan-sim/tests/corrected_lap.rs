@@ -1,5 +1,7 @@
 //! The lap with its poses corrected, and what maps of corrected poses are worth.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
+
 use portolan::geom::{Grid, Pose};
 use portolan::map::{Tsdf, TsdfConfig};
 use portolan::scan::Scan;

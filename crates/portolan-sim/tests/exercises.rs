@@ -1,5 +1,7 @@
 //! The chapter's exercises, as tests.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::field::esdf_from_tsdf;
 use portolan::geom::{Grid, vector::distance};
