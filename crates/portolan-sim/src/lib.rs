@@ -1,5 +1,13 @@
 //! Worlds, robots and sensors, deterministic from a seed.
 //!
+//! | question | start at |
+//! |---|---|
+//! | what is there, what does the robot see | [`apartment`], [`lap`], [`scan_at`] |
+//! | where do the wheels say that it is | [`measure_motions`], [`dead_reckon`] |
+//! | where was it really | [`correct`]: scan matching ([`match_scans`]), loop closures, pose graph |
+//! | how far off are poses | [`PoseErrors`]; without truth [`score_relations`] |
+//! | how long does a map believe in what is gone, and what does forgetting cost | [`ghost`](fn@ghost), [`static_noise`](fn@static_noise) |
+//!
 //! Every transcendental function comes from `libm` and every random number from one small generator, so that a
 //! seed gives the same bytes on every platform and for any number of threads.
 //!
@@ -16,6 +24,7 @@
 
 mod apartment;
 mod drive;
+mod followed;
 mod ghost;
 mod lidar;
 mod loop_closure;
@@ -31,7 +40,8 @@ mod world;
 
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
 pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
-pub use ghost::{Ghost, GhostGroup, GhostRun, GhostSettings, ghost};
+pub use followed::GhostGroup;
+pub use ghost::{Ghost, GhostRun, GhostSettings, ghost};
 pub use lidar::{Lidar, scan_at};
 pub use loop_closure::{Closure, CorrectedLap, CorrectionSettings, RefusedCandidates, Round, correct};
 pub use odometry::{OdometryNoise, dead_reckon, measure_motions};

@@ -38,12 +38,12 @@ impl OdometryNoise {
     /// quite zero, so that they can be inverted.
     pub fn sigmas(&self, motion: &Pose<2>) -> [f64; 2] {
         let (way, turn) = (norm(motion.translation), heading(motion).abs());
-        let position = (self.position_per_metre.powi(2) * way + (self.scale_bias * way).powi(2)).sqrt();
-        let heading = (self.heading_per_metre.powi(2) * way
-            + self.heading_per_radian.powi(2) * turn
-            + (self.heading_bias_per_metre * way).powi(2))
-        .sqrt();
-        [position.max(1e-3), heading.max(1e-3)]
+        let square = |v: f64| v * v;
+        let position = square(self.position_per_metre) * way + square(self.scale_bias * way);
+        let heading = square(self.heading_per_metre) * way
+            + square(self.heading_per_radian) * turn
+            + square(self.heading_bias_per_metre * way);
+        [position.sqrt().max(1e-3), heading.sqrt().max(1e-3)]
     }
 }
 

@@ -180,7 +180,8 @@ fn judge(
         return Err(MatchRefusal::Contradicted { share });
     }
     // Residuals smaller than half a centimetre are luck.
-    let scale = 1.0 / (rms.max(0.005).powi(2) * settings.pairs_per_independent);
+    let sigma = rms.max(0.005);
+    let scale = 1.0 / (sigma * sigma * settings.pairs_per_independent);
     let h = system.hessian;
     let upper = [h[0][0], h[0][1], h[0][2], h[1][1], h[1][2], h[2][2]].map(|v| v * scale);
     let information = Information::from_upper(&upper)
@@ -236,7 +237,7 @@ impl System {
             // The normal in the scan's frame; a turn moves the point by its quarter turn.
             let seen = pose.inverse().rotate(normal);
             let row = [seen[0], seen[1], seen[1] * p[0] - seen[0] * p[1]];
-            let weight = 1.0 / (1.0 + (residual / width).powi(2));
+            let weight = width * width / (width * width + residual * residual);
             for a in 0..3 {
                 for b in 0..3 {
                     system.hessian[a][b] += weight * row[a] * row[b];

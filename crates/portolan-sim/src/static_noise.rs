@@ -77,8 +77,8 @@ pub fn static_noise(
     let world = apartment().world;
     let chair = world.solids().iter().filter(|s| s.name == "chair");
     let region = chair.fold(Aabb::EMPTY, |b, s| b.union(s.aabb())).grown(1.2);
-    let grid = Grid::covering(region, settings.resolution)
-        .ok_or_else(|| MapError::Resolution(settings.resolution))?;
+    let grid =
+        Grid::covering(region, settings.resolution).ok_or(MapError::Resolution(settings.resolution))?;
     let mut maps = Vec::new();
     for &w_max in &settings.w_max {
         let config = TsdfConfig {

@@ -1,5 +1,7 @@
 //! The lap with its poses corrected, and what maps of corrected poses are worth.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
+
 use portolan::geom::{Grid, Pose};
 use portolan::map::{Tsdf, TsdfConfig};
 use portolan::scan::Scan;
@@ -14,11 +16,25 @@ struct Lap {
 }
 
 fn corrected(seed: u64) -> Lap {
+    corrected_with(seed, 1.0)
+}
+
+/// With odometry that is worse than usual by a factor, and believed to be so.
+fn corrected_with(seed: u64, factor: f64) -> Lap {
+    let usual = OdometryNoise::default();
+    let noise = OdometryNoise {
+        position_per_metre: factor * usual.position_per_metre,
+        heading_per_metre: factor * usual.heading_per_metre,
+        heading_per_radian: factor * usual.heading_per_radian,
+        scale_bias: factor * usual.scale_bias,
+        heading_bias_per_metre: factor * usual.heading_bias_per_metre,
+    };
     let world = apartment().world;
     let (truth, scans): (Vec<_>, Vec<_>) =
         lap(&world, &LapConfig { seed, ..Default::default() }).into_iter().unzip();
-    let motions = measure_motions(&truth, &OdometryNoise::default(), seed);
-    let corrected = correct(truth[0], &motions, &scans, &CorrectionSettings::default()).unwrap();
+    let motions = measure_motions(&truth, &noise, seed);
+    let settings = CorrectionSettings { odometry: noise, ..Default::default() };
+    let corrected = correct(truth[0], &motions, &scans, &settings).unwrap();
     Lap { world, truth, scans, corrected }
 }
 
@@ -95,6 +111,16 @@ fn a_map_of_optimised_poses_is_nearly_as_good_as_one_of_true_poses() {
     });
     assert!(medians[0] < 0.006 && medians[1] > 5.0 * medians[0]);
     assert!(medians[2] < 2.0 * medians[0] + 0.002);
+}
+
+#[test]
+fn odometry_that_is_twice_as_bad_is_corrected_too() {
+    for seed in (0..3).map(|k| SEED + k) {
+        let lap = corrected_with(seed, 2.0);
+        let [before, after] = tell(&lap);
+        assert!(before.translation.max > 0.6);
+        assert!(after.translation.mean < 0.03, "{after}");
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The chair moves, and maps forget it as fast as the filter says.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
+
 use portolan::map::SweepKind;
 use portolan::sweep::WeightModel;
 use portolan_sim::{GhostGroup, GhostSettings, ghost, static_noise};
@@ -101,4 +103,17 @@ fn with_weights_that_fall_with_the_range_the_received_weight_predicts() {
             assert!(m.weight < 0.5 && m.half_life_measured > 1.5 * with_unit_weight);
         }
     }
+}
+
+/// Cells deep in the chair see tapered weights only and need more than four laps to saturate.
+#[test]
+fn with_more_laps_more_cells_are_measured_and_they_obey_too() {
+    let settings =
+        GhostSettings { w_max: vec![64.0], max_laps_before: 12, noise_laps: 0, ..Default::default() };
+    let run = ghost(&settings).unwrap().per_w_max.remove(0);
+    println!("{} laps before ({:?}), {} after", run.laps_before, run.laps_until_saturated, run.laps_after);
+    tell("measured", &run.measured);
+    tell("unclamped", &run.unclamped);
+    assert!(run.measured.cells > 40);
+    assert!((run.measured.half_life_measured / run.measured.half_life_predicted - 1.0).abs() < 0.1);
 }
