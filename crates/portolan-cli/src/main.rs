@@ -12,6 +12,7 @@ mod output;
 mod picture;
 mod pictures;
 mod progress;
+mod report;
 mod source;
 
 use std::process::ExitCode;

@@ -63,7 +63,7 @@ pub const SURFACE: Color = Color::hex(0x7A3E9D);
 /// Ground truth; drawn dashed.
 pub const TRUTH: Color = Color::hex(0x7C858E);
 /// Never observed: neither free nor occupied.
-pub const UNKNOWN: Color = Color::hex(0xE7E5E1);
+pub const UNKNOWN: Color = Color::hex(0xDCD9D3);
 /// Free space, positive distance.
 pub const POSITIVE: Color = Color::hex(0x1F6FB5);
 /// Behind a surface, negative distance.

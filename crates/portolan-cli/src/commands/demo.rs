@@ -7,13 +7,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::bail;
-use portolan::gallery::Gallery;
+use portolan::gallery::{ErrorSummary, Gallery};
 use portolan::geom::{Grid, Pose};
 use portolan::map::SweepKind;
 use portolan::scan::{RangeLimits, Scan, ScanStats};
 use portolan::sweep::WeightModel;
 use portolan_io::{MapFile, write_atomic};
-use portolan_sim::{Lidar, LapConfig, SEED, World};
+use portolan_sim::{LapConfig, Lidar, SEED, World};
 use serde_json::{Value, json};
 
 use super::gallery;
@@ -22,10 +22,11 @@ use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, 
 use crate::output::Output;
 use crate::pictures::Scene;
 use crate::progress::Progress;
+use crate::report::{self, Facts};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan demo --out out")]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder for the results; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -55,12 +56,13 @@ fn seed(text: &str) -> Result<u64, String> {
 }
 
 /// Simulates the lap, builds every representation, writes everything.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     if args.out.exists() && !args.out.is_dir() {
         bail!("{}: is a file, not a folder; name a folder for the results", args.out.display());
     }
     let mut run = Run::default();
-    let config = LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };
+    let config =
+        LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };
 
     let world = portolan_sim::apartment().world;
     let scans = run.timed("simulate", || portolan_sim::lap(&world, &config));
@@ -82,13 +84,36 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let artefacts = Artefacts { file: &file, derived: &derived, title };
     let (written, _) = run.timed("map_files", || artefacts.write(&args.out))?;
     run.files.extend(written);
-    run.files.push("summary.json");
+    run.files.extend(["report.html", "summary.json"]);
 
-    let found = Found { config, settings, grid, world: &world, fusion, bytes, file, derived, gallery: &gallery };
+    let found =
+        Found { config, settings, grid, world: &world, fusion, bytes, file, derived, gallery: &gallery };
+    let facts = Facts {
+        scene,
+        esdf_against_contour: against_contour(&gallery),
+        seconds: run.total(),
+        warnings: found.warnings(),
+    };
+    let page = run.timed("report", || report::html(&facts));
+    write_atomic(args.out.join("report.html"), |w| w.write_all(page.as_bytes()))?;
     let mut summary = found.to_json(&run);
     write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{summary:#}"))?;
     summary["gallery"] = table;
     args.output.print(&summary, found.report(&run, &args.out.display().to_string()))
+}
+
+/// The ESDF against the contour: distances at free points beside every eighth cell centre, off it so that the
+/// interpolation is measured too.
+fn against_contour(gallery: &Gallery) -> Option<ErrorSummary> {
+    let (field, contour) = (&gallery.distance, &gallery.contour);
+    let grid = field.grid();
+    let errors = (0..grid.len()).step_by(8).filter(|&i| field.samples()[i] > 0.0).filter_map(|i| {
+        let [x, y] = grid.lattice.center(grid.cell(i));
+        let p = [x + 0.3 * grid.lattice.resolution, y - 0.2 * grid.lattice.resolution];
+        let d = field.distance(p).known().filter(|d| *d > 0.0)?;
+        Some(d - contour.nearest_distance(p)?)
+    });
+    ErrorSummary::of(errors.collect())
 }
 
 /// Files written and seconds spent.
@@ -264,7 +289,7 @@ impl Found<'_> {
             s("simulate"),
             s("fuse") + s("derive"),
             s("gallery"),
-            s("gallery_files") + s("map_files")
+            s("gallery_files") + s("map_files") + s("report")
         );
         let _ = writeln!(text, "wrote {} to {folder}", run.files.join(", "));
         text

@@ -9,7 +9,7 @@ use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
 use portolan::geom::{Aabb, Grid, Pose};
-use portolan::map::{Tsdf2Config, SweepKind};
+use portolan::map::{SweepKind, Tsdf2Config};
 use portolan::scan::Scan;
 use portolan::surface::ContourSettings;
 use portolan::sweep::WeightModel;
@@ -20,13 +20,15 @@ use serde_json::{Value, json};
 use crate::arguments::{bounds, bytes, length};
 use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
-use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen};
+use crate::mapping::{MapKind, Settings, check_memory, grid_over};
 use crate::output::Output;
 use crate::pictures::{Scene, sheet};
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  portolan gallery demo\n  portolan gallery intel-corrected.log.gz --out intel")]
-pub struct Args {
+#[command(
+    after_help = "Examples:\n  portolan gallery demo\n  portolan gallery intel-corrected.log.gz --out intel"
+)]
+pub(crate) struct Args {
     /// Log of range scans with poses, or the word demo for the simulated Apartment
     #[arg(value_name = "LOG|demo")]
     log: PathBuf,
@@ -61,7 +63,7 @@ pub struct Args {
 }
 
 /// Builds and measures all of them.
-pub fn run(args: &Args) -> anyhow::Result<()> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let simulated = args.log.as_os_str() == "demo";
     let settings = args.settings();
     let (world, scans, grid, name) = if simulated {
@@ -81,7 +83,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let (fused, _) = Selection { every: args.every, hold_out: None }.split(log.len());
         let scans = log::scans(&log, &fused, &limits);
         let name = args.log.display().to_string();
-        let grid = grid_over(seen(&scans), &settings, None, &name)?;
+        let grid = grid_over(&settings, None, &scans, &name)?;
         (None, scans, grid, name)
     };
     check_memory(&grid, &settings, &scans, args.memory, &name)?;

@@ -6,4 +6,4 @@ mod sheet;
 
 pub(crate) use layers::Layer;
 pub(crate) use scene::Scene;
-pub(crate) use sheet::{figure, sheet};
+pub(crate) use sheet::{figure, sheet, shown_seconds};

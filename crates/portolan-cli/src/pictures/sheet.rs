@@ -49,7 +49,10 @@ fn draw(canvas: &mut Canvas, layer: Layer, scene: &Scene, rect: PixelRect) {
     let rect = PixelRect::new(rect.x.round(), rect.y.round(), rect.width, rect.height);
     let view = View::fit(shown.min, shown.max, rect);
     layer.draw(canvas, &view, scene);
-    canvas.scale_bar(&view);
+    // All others have the scale of the first.
+    if matches!(layer, Layer::Log | Layer::CloseUp) {
+        canvas.scale_bar(&view);
+    }
 }
 
 fn panel_size(scene: &Scene) -> (f64, f64) {
@@ -66,7 +69,8 @@ fn heading(layer: Layer, scene: &Scene) -> &'static str {
         Layer::Log => "the log: all end points, the way, one scan",
         Layer::Grid => "occupancy grid",
         Layer::Tree => "quadtree, every leaf",
-        Layer::Tsdf => "TSDF, contour, truth",
+        Layer::Tsdf if scene.world.is_some() => "TSDF, contour, truth",
+        Layer::Tsdf => "TSDF, contour",
         Layer::Weight => "weight W of the TSDF",
         Layer::Esdf => "ESDF, a ring every 25 cm",
         Layer::EsdfError => "error of the ESDF",
@@ -102,7 +106,8 @@ fn lines(layer: Layer, scene: &Scene) -> [String; 2] {
         Layer::Contour => of("extracted contour", |row| row.note.clone()),
         Layer::Cloud => of("point cloud", |row| asked("distance probe", row.distance)),
         Layer::CloseUp => {
-            ["cells of 5 cm hold the signed distance;".into(), "the wall is where its sign changes".into()]
+            let r = scene.gallery.tsdf.config().resolution;
+            [format!("cells of {r} m hold the signed distance;"), "the wall is where its sign changes".into()]
         }
     }
 }
@@ -140,7 +145,13 @@ pub(crate) fn shown_seconds(seconds: f64) -> String {
 
 /// About two to three significant digits.
 fn three(v: f64) -> String {
-    let digits = if v >= 100.0 { 0 } else if v >= 10.0 { 1 } else { 2 };
+    let digits = if v >= 100.0 {
+        0
+    } else if v >= 10.0 {
+        1
+    } else {
+        2
+    };
     format!("{v:.digits$}")
 }
 
