@@ -1,4 +1,5 @@
 //! Every command once, on a small log that the test writes itself.
+#![allow(clippy::unwrap_used)] // in a test a panic is the report
 
 mod support;
 
