@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
@@ -20,7 +20,7 @@ use serde_json::{Value, json};
 use crate::arguments::{bounds, bytes, length};
 use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
-use crate::mapping::{MapKind, Settings, check_memory, grid_over};
+use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen, with_outlier};
 use crate::output::Output;
 use crate::pictures::{Scene, sheet};
 
@@ -62,6 +62,9 @@ pub(crate) struct Args {
     output: Output,
 }
 
+/// A gallery holds about so many times what the maps of one run hold.
+const COPIES: u64 = 3;
+
 /// Builds and measures all of them.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let simulated = args.log.as_os_str() == "demo";
@@ -83,10 +86,16 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         let (fused, _) = Selection { every: args.every, hold_out: None }.split(log.len());
         let scans = log::scans(&log, &fused, &limits);
         let name = args.log.display().to_string();
-        let grid = grid_over(&settings, None, &scans, &name)?;
+        let grid =
+            grid_over(seen(&scans), &settings, None, &name).map_err(|error| with_outlier(error, &scans))?;
         (None, scans, grid, name)
     };
-    check_memory(&grid, &settings, &scans, args.memory, &name)?;
+    // Three truncated fields and two trees are built, to compare ways of fusing.
+    check_memory(&grid, &settings, &scans, args.memory / COPIES, &name)
+        .map_err(|error| with_outlier(error, &scans))
+        .map_err(|error| {
+            anyhow!("{error} (a gallery holds {COPIES} times that, so a {COPIES}rd of --memory counts)")
+        })?;
     let gallery = measure(&scans, &grid, settings.truncation, args.probes as usize, world.as_ref())?;
     let document = document(&gallery, &name, scans.len());
     if let Some(folder) = &args.out {
