@@ -2,7 +2,7 @@
 
 use portolan::geom::{Aabb, Grid};
 use portolan::scan::ScanStats;
-use portolan_io::CarmenStats;
+use portolan_io::{CarmenStats, TimeOrder};
 use serde_json::{Map, Value, json};
 
 /// An object of these fields.
@@ -59,7 +59,11 @@ pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
         },
         "other_messages": stats.other_messages,
         "declared_max_range": stats.declared_max_range,
-        "times": format!("{:?}", stats.times).to_lowercase(),
+        "times": match stats.times {
+            TimeOrder::Absent => "absent",
+            TimeOrder::Ascending => "ascending",
+            TimeOrder::NotAscending => "not ascending",
+        },
     })
 }
 

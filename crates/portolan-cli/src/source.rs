@@ -59,6 +59,18 @@ fn yaml_beside(path: &Path) -> Option<PathBuf> {
 }
 
 impl Source {
+    /// What the user should know before he trusts it.
+    pub(crate) fn warning(&self) -> Option<String> {
+        let Self::Server(map) = self else { return None };
+        let cells = map.unknown_grey_taken_for_free;
+        (cells > 0).then(|| {
+            format!(
+                "{cells} cells have the grey of unknown (205 or 206) but count as free, because free_thresh is above \
+                 0.196; lower it to keep them unknown"
+            )
+        })
+    }
+
     /// What it is, in words.
     pub(crate) fn describe(&self) -> &'static str {
         match self {

@@ -63,8 +63,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         "input": args.input.display().to_string(),
         "kind": source.describe(),
         "out": args.out.display().to_string(),
+        "warning": source.warning(),
     });
-    args.output.print(&document, format!("{} -> {}\n", args.input.display(), args.out.display()))
+    let mut text = format!("{} -> {}\n", args.input.display(), args.out.display());
+    if let Some(warning) = source.warning() {
+        text += &format!("warning: {warning}\n");
+    }
+    args.output.print(&document, text)
 }
 
 fn target(out: &Path) -> Option<Target> {

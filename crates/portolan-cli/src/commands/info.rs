@@ -32,6 +32,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             let source = open(&args.file)?;
             let mut document = about(&source);
             document["kind"] = json!(source.describe());
+            document["warning"] = json!(source.warning());
             document
         }
     };
@@ -143,19 +144,12 @@ fn of_esdf<const D: usize>(field: &EsdfBin<D>) -> Value {
 fn of_server(map: &MapServerMap) -> Value {
     let count = |cell: MapCell| map.cells.iter().filter(|&&c| c == cell).count();
     let grid: &Grid<2> = &map.grid;
-    let grey = map.unknown_grey_taken_for_free;
-    let hint = (grey > 0).then(|| {
-        format!(
-            "{grey} cells have the grey of unknown (205, 206) but count as free: free_thresh is above 0.196"
-        )
-    });
     json!({
         "extent": json::grid(grid),
         "yaw": map.yaw,
         "free": count(MapCell::Free),
         "occupied": count(MapCell::Occupied),
         "unknown": count(MapCell::Unknown),
-        "warning": hint,
     })
 }
 

@@ -1,6 +1,7 @@
 //! `map`: fuse a log into maps.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -103,17 +104,13 @@ pub(crate) struct Args {
 
 /// Fuses the log.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let start = Instant::now();
-    let mut seconds = BTreeMap::new();
-    let mut stage = |name: &'static str, since: Instant| {
-        seconds.insert(name, since.elapsed().as_secs_f64());
-        Instant::now()
-    };
+    let mut watch = Watch::start();
     let threads = start_threads(args.threads)?;
     let before = args.saved_map()?;
     let log = log::read(&args.log, &args.source)?;
-    let now = stage("read", start);
+    watch.stage("read");
 
+    let name = args.log.display().to_string();
     let settings = args.settings(&log, before.as_ref());
     if let Some(before) = &before {
         settings.check_agree(before, &args.map_path().display().to_string())?;
@@ -121,23 +118,21 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let selection = Selection { every: settings.every, hold_out: settings.hold_out };
     let (fused, held_out) = selection.split(log.len());
     let scans = log::scans(&log, &fused, &settings.limits);
-    let name = args.log.display().to_string();
     let saved_grid = before.as_ref().and_then(grid_of);
     let grid = grid_over(seen(&scans), &settings, saved_grid, &name)
         .and_then(|grid| check_memory(&grid, &settings, &scans, args.memory, &name).map(|()| grid))
         .map_err(|error| with_outlier(error, &scans))?;
-    let now = stage("prepare", now);
+    watch.stage("prepare");
 
     let mut file = before.unwrap_or_default();
     let mut maps = args.maps_to_fuse_into(&mut file, &settings, &grid)?;
+    watch.stage("allocate");
     let progress = Progress::new(scans.len() * maps.count(), "fusing", args.output);
-    let now_fuse = Instant::now();
     let fusion = fuse(&mut maps, &scans, settings.carve, threads, &progress);
     drop(progress);
-    stage("allocate", now);
-    let bytes_of_maps = maps.bytes();
+    watch.stage("fuse");
+    let mut bytes = maps.bytes();
     Maps { grid: file.grid, tree: file.tree, tsdf: file.tsdf } = maps;
-    let now = stage("fuse", now_fuse);
 
     // The others were refused: the maps have no index for them.
     let held = |pose: &Pose<2>| pose.is_rigid() && grid.lattice.cell_of(pose.translation).is_some();
@@ -145,7 +140,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     drop(scans);
     describe(&mut file, &settings, &log, &fusion.stats);
     let derived = Derived::of(&file, &settings);
-    let _ = now;
+    bytes.extend(derived.bytes());
 
     std::fs::create_dir_all(&args.out).with_context(|| {
         format!("{}: cannot make the folder; name one that can be written to", args.out.display())
@@ -153,18 +148,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let title = title(&file, settings.resolution);
     let (mut files, written) = Artefacts { file: &file, derived: &derived, title }.write(&args.out)?;
     files.push("summary.json");
-    seconds.extend(fusion.seconds.iter());
-    seconds.extend(derived.seconds.iter());
-    seconds.extend(written);
-    seconds.insert("total", start.elapsed().as_secs_f64());
-    let mut bytes = bytes_of_maps;
-    bytes.extend(derived.bytes());
-    let held_out = held_out.len();
+    let mut seconds = watch.total();
+    seconds.extend(fusion.seconds.iter().chain(&derived.seconds).chain(&written));
     let summary = Summary {
         log: &log,
         settings: &settings,
         grid,
-        held_out,
+        held_out: held_out.len(),
         fusion: &fusion,
         file: &file,
         derived: &derived,
@@ -173,10 +163,36 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         files,
     };
     let document = summary.to_json();
-    write_atomic(args.out.join("summary.json"), |w| {
-        std::io::Write::write_fmt(w, format_args!("{document:#}\n"))
-    })?;
+    let text = format!("{document:#}\n");
+    write_atomic(args.out.join("summary.json"), |w| w.write_all(text.as_bytes()))?;
     args.output.print(&document, report(&summary, &args.out.display().to_string()))
+}
+
+/// Seconds per stage.
+struct Watch {
+    start: Instant,
+    last: Instant,
+    seconds: BTreeMap<&'static str, f64>,
+}
+
+impl Watch {
+    fn start() -> Self {
+        let start = Instant::now();
+        Self { start, last: start, seconds: BTreeMap::new() }
+    }
+
+    /// The stage that ends here.
+    fn stage(&mut self, name: &'static str) {
+        let now = Instant::now();
+        self.seconds.insert(name, (now - self.last).as_secs_f64());
+        self.last = now;
+    }
+
+    /// All stages, and everything since the start.
+    fn total(mut self) -> BTreeMap<&'static str, f64> {
+        self.seconds.insert("total", self.start.elapsed().as_secs_f64());
+        self.seconds
+    }
 }
 
 /// Number of threads; those of the distance transform are started.

@@ -28,6 +28,8 @@ pub(crate) enum Command {
     Convert(convert::Args),
     /// Extract the contour of a map again, with other settings
     Mesh(mesh::Args),
+    /// The differentiable renderer on a line: rendering as a measurement model
+    Radiance(radiance::Args),
     /// Measure a map against scans that were not fused, or against a reference contour
     Eval(eval::Args),
 }
@@ -43,6 +45,7 @@ impl Command {
             Self::Info(args) => info::run(args),
             Self::Convert(args) => convert::run(args),
             Self::Mesh(args) => mesh::run(args),
+            Self::Radiance(args) => radiance::run(args),
             Self::Eval(args) => eval::run(args),
         }
     }

@@ -31,7 +31,12 @@ pub(crate) struct Args {
 
 /// Answers at all points.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let field = Fields::open(&args.map)?;
+    let source = open(&args.map)?;
+    if let Some(warning) = source.warning().filter(|_| !args.output.quiet) {
+        // Standard output is for the answers.
+        writeln!(io::stderr(), "portolan: warning: {}: {warning}", args.map.display())?;
+    }
+    let field = Fields::of(source, &args.map)?;
     let points = if args.points == Path::new("-") {
         QueryPoints::parse(Input::from_reader(io::stdin(), "standard input".as_ref())?)?
     } else {
@@ -103,8 +108,8 @@ struct Field<const D: usize> {
 type Occupancy<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<f64>>;
 
 impl Fields {
-    fn open(path: &Path) -> anyhow::Result<Self> {
-        Ok(match open(path)? {
+    fn of(source: Source, path: &Path) -> anyhow::Result<Self> {
+        Ok(match source {
             Source::Map(file) => Self::Two(of_map(*file)),
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
             Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
