@@ -64,7 +64,7 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
         _ => return Err("must be a number of bytes, like 512M or 4G".to_owned()),
     };
     match number(digits).map(|v| v * factor) {
-        Ok(v) if v >= 1.0 && v < 1e18 => Ok(v as u64),
+        Ok(v) if (1.0..1e18).contains(&v) => Ok(v as u64),
         _ => Err("must be a number of bytes, like 512M or 4G".to_owned()),
     }
 }

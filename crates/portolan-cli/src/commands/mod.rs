@@ -16,8 +16,6 @@ pub(crate) enum Command {
     Demo(demo::Args),
     /// One log in every representation: what each costs and how true its answers are
     Gallery(gallery::Args),
-    /// The differentiable renderer on a line: density, transmittance, rays, residuals and bias
-    Radiance(radiance::Args),
     /// Fuse a log into maps and write them into a folder
     Map(Box<map::Args>),
     /// Ask a map at points: occupancy, distance, gradient
@@ -39,7 +37,6 @@ impl Command {
         match self {
             Self::Demo(args) => demo::run(args),
             Self::Gallery(args) => gallery::run(args),
-            Self::Radiance(args) => radiance::run(args),
             Self::Map(args) => map::run(args),
             Self::Query(args) => query::run(args),
             Self::Info(args) => info::run(args),
