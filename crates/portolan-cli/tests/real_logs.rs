@@ -2,6 +2,8 @@
 //!
 //! Needs the real data: at `PORTOLAN_DATA`, else `../shared/data` beside the workspace.
 
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
+
 mod support;
 
 use std::io::Write;
