@@ -1,5 +1,5 @@
 //! Bad input and bad calls: the error that each gives, in one line, within seconds and without a gigabyte.
-#![allow(clippy::unwrap_used)] // in a test a panic is the report
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 mod support;
 

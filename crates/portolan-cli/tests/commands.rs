@@ -1,6 +1,8 @@
 //! Every command once, on a small log that the test writes itself.
 #![allow(clippy::unwrap_used)] // in a test a panic is the report
 
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
+
 mod support;
 
 use std::io::Write;

@@ -3,6 +3,8 @@
 //! Needs the real data: at `PORTOLAN_DATA`, else `../shared/data` beside the workspace.
 #![allow(clippy::unwrap_used)] // in a test a panic is the report
 
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
+
 mod support;
 
 use std::io::Write;

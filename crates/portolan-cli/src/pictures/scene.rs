@@ -1,6 +1,7 @@
 //! What a picture is made of: the log, the maps made of it and, where it is known, the truth.
 
 use portolan::gallery::{Gallery, Row};
+use portolan::geom::vector::distance;
 use portolan::geom::{Aabb, Pose};
 use portolan::scan::Scan;
 use portolan_sim::World;
@@ -65,10 +66,13 @@ impl Scene<'_> {
         Aabb::new([x - half[0], y - half[1]], [x + half[0], y + half[1]])
     }
 
+    /// A place of the contour near to what the sensor saw nearest in the middle of the log.
     fn nearest_hit(&self) -> Option<[f64; 2]> {
         let (pose, scan) = self.log.get(self.log.len() / 2)?;
         let nearest = scan.beams().filter(|b| b.is_hit()).min_by(|a, b| a.range.total_cmp(&b.range))?;
-        Some(pose.transform_point(nearest.direction.map(|d| d * nearest.range)))
+        let hit = pose.transform_point(nearest.direction.map(|d| d * nearest.range));
+        let vertices = self.gallery.contour.vertices.iter().copied();
+        vertices.min_by(|&a, &b| distance(a, hit).total_cmp(&distance(b, hit))).or(Some(hit))
     }
 
     /// The scan whose beams are shown.

@@ -61,8 +61,9 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
          <p>Maps of bits stand a whole cell in front of the faces here: the faces of this apartment lie on the borders of \
          cells, the noise of the range puts half of all end points into the cell in front, and one end point in a scan is \
          enough to count the cell as hit. A signed distance averages the noise instead.</p>\
-         <p>The crossing number of the contour counts on closed outlines. Seen from inside, a building is none: of the outer \
-         walls only the inner faces were observed, so that the count takes a room for the inside of a solid.</p>\
+         <p>The text asks the contour by its crossing number, which counts on closed outlines. Seen from its rooms a building \
+         is none: of the outer walls only the inner faces were observed, and every count is off by one. Here the first segment \
+         that a ray meets decides, by the side that it shows; through a gap in the contour it still sees the wrong wall.</p>\
          <p>A gradient of length one says \"this way is away from the obstacle\". Median ‖∇‖ at observed free points: \
          <b>{:.3}</b> for the ESDF, <b>{:.3}</b> for the raw TSDF, which is constant beyond 15 cm: a planner on it stands \
          still.</p>{picture}",

@@ -120,8 +120,9 @@ pub(super) fn section(facts: &Facts) -> Section {
             "ESDF, worst too large",
             "&lt; 5 cm",
             both(|e| e.worst_over),
-            "The text's bound does not hold here: on a fused field the seeds are projective values, and those can be too large. \
-             Against the world, surfaces that were never observed count too.",
+            "The text's bound does not hold here. A face that was seen at grazing angles only makes the field jump from one side of \
+             the seeding band to the other between two cells: there is contour there, and no seed. Against the world, surfaces \
+             that were never observed count too.",
         ),
     ]
     .map(|(what, text, ours, why)| [what.to_owned(), text.to_owned(), ours, why.to_owned()])

@@ -1,6 +1,6 @@
 //! A small world with a log of it, and ways to run the program.
 #![allow(dead_code)] // every test file uses another part
-#![allow(clippy::unwrap_used)] // in a test a panic is the report
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
