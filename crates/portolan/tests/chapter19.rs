@@ -1,4 +1,5 @@
 //! The chapter's own two tests, in our words and with its numbers.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 mod common;
 

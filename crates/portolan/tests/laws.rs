@@ -1,4 +1,5 @@
 //! Laws that hold for every map.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! A wall seen from both sides: what the truncation does to it.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 mod common;
 

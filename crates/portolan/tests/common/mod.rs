@@ -1,4 +1,5 @@
 //! The Apartment's log and maps, made once for the tests of a file.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use portolan::geom::{Grid, Pose};
