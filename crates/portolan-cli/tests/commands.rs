@@ -1,5 +1,4 @@
 //! Every command once, on a small log that the test writes itself.
-#![allow(clippy::unwrap_used)] // in a test a panic is the report
 
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 

@@ -1,7 +1,6 @@
 //! The Intel lab and Freiburg 079 at 5 cm: nine of ten scans are fused, the tenth is predicted.
 //!
 //! Needs the real data: at `PORTOLAN_DATA`, else `../shared/data` beside the workspace.
-#![allow(clippy::unwrap_used)] // in a test a panic is the report
 
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 

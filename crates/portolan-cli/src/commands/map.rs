@@ -17,7 +17,8 @@ use crate::arguments::{bounds, bytes, length, weight};
 use crate::json;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::{
-    Artefacts, Derived, MapKind, Maps, Settings, Summary, check_memory, fuse, grid_over, grown, report,
+    Artefacts, Derived, MapKind, Maps, Settings, Summary, check_memory, fuse, grid_over, grown, report, seen,
+    with_outlier,
 };
 use crate::output::Output;
 use crate::progress::Progress;
@@ -118,8 +119,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (fused, held_out) = selection.split(log.len());
     let scans = log::scans(&log, &fused, &settings.limits);
     let saved_grid = before.as_ref().and_then(grid_of);
-    let grid = grid_over(&settings, saved_grid, &scans, &name)?;
-    check_memory(&grid, &settings, &scans, args.memory, &name)?;
+    let grid = grid_over(seen(&scans), &settings, saved_grid, &name)
+        .and_then(|grid| check_memory(&grid, &settings, &scans, args.memory, &name).map(|()| grid))
+        .map_err(|error| with_outlier(error, &scans))?;
     watch.stage("prepare");
 
     let mut file = before.unwrap_or_default();

@@ -1,6 +1,6 @@
 //! How large a map must be, and whether there is memory for it.
 
-use anyhow::anyhow;
+use anyhow::{anyhow, bail};
 use portolan::geom::vector::{along, distance};
 use portolan::geom::{Aabb, Grid, Pose};
 use portolan::scan::Scan;
@@ -14,7 +14,7 @@ const MARGIN_CELLS: f64 = 4.0;
 const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
 
 /// Box of everything that the scans saw, free ends of beams and the sensor included.
-fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
+pub(crate) fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
     let mut bounds = Aabb::EMPTY;
     for (world_from_sensor, scan) in scans {
         bounds.include(world_from_sensor.translation);
@@ -29,24 +29,23 @@ fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
 /// The grid for what was seen or, where the user said so, for his bounds; joined with the grid of a map that is
 /// to grow.
 pub(crate) fn grid_over(
+    seen: Aabb<2>,
     settings: &Settings,
     before: Option<Grid<2>>,
-    scans: &[(Pose<2>, Scan<2>)],
     log: &str,
 ) -> anyhow::Result<Grid<2>> {
     let r = settings.resolution;
-    let bounds = settings.bounds.unwrap_or_else(|| seen(scans).grown(settings.truncation + MARGIN_CELLS * r));
+    let bounds = settings.bounds.unwrap_or_else(|| seen.grown(settings.truncation + MARGIN_CELLS * r));
     let held = bounds.min.iter().chain(&bounds.max).all(|v| (v / r).abs() < LARGEST_INDEX);
     let grid = if held { Grid::covering(bounds, r) } else { None };
     let Some(grid) = grid else {
         let [w, h] = bounds.extent();
-        let error = anyhow!(
+        bail!(
             "{log}: the extent is {w:.3e} x {h:.3e} m around ({:.3e}, {:.3e}), too much for cells of {r} m; \
              give --bounds x0,y0,x1,y1 or a coarser --resolution",
             0.5 * (bounds.min[0] + bounds.max[0]),
             0.5 * (bounds.min[1] + bounds.max[1]),
         );
-        return Err(with_outlier(error, scans));
     };
     Ok(before.map_or(grid, |before| joined(&before, &grid)))
 }
@@ -87,17 +86,16 @@ pub(crate) fn check_memory(
     let r = settings.resolution;
     let [w, h] = grid.aabb().extent();
     let coarser = two_digits_up(r * (needed / limit as f64).sqrt());
-    let error = anyhow!(
+    bail!(
         "{log}: a map of {w:.1} x {h:.1} m with --resolution {r} needs about {} and --memory allows {}; \
          give --bounds x0,y0,x1,y1, --resolution {coarser} or coarser, or more --memory",
         shown_bytes(needed),
         shown_bytes(limit as f64),
     );
-    Err(with_outlier(error, scans))
 }
 
 /// An error about the size of a map, with the scan named that makes it so large, if a single one does.
-fn with_outlier(error: anyhow::Error, scans: &[(Pose<2>, Scan<2>)]) -> anyhow::Error {
+pub(crate) fn with_outlier(error: anyhow::Error, scans: &[(Pose<2>, Scan<2>)]) -> anyhow::Error {
     let mut positions: Vec<_> = scans.iter().map(|(p, _)| p.translation).collect();
     let mut median = [0.0; 2];
     for (k, m) in median.iter_mut().enumerate() {

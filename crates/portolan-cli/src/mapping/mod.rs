@@ -8,7 +8,7 @@ mod settings;
 mod words;
 
 pub(crate) use artefacts::{Artefacts, Derived, cells_for_map_server, polylines, write_contour};
-pub(crate) use extent::{check_memory, grid_over};
+pub(crate) use extent::{check_memory, grid_over, seen, with_outlier};
 pub(crate) use fuse::{FusionReport, Maps, fuse};
 pub(crate) use grow::grown;
 pub(crate) use settings::{MapKind, Settings};
