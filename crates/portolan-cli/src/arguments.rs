@@ -30,6 +30,14 @@ pub(crate) fn weight(text: &str) -> Result<f32, String> {
     }
 }
 
+/// A share above 0 and at most 1.
+pub(crate) fn share(text: &str) -> Result<f32, String> {
+    match number(text)? as f32 {
+        v if v > 0.0 && v <= 1.0 => Ok(v),
+        _ => Err("must be above 0 and at most 1".to_owned()),
+    }
+}
+
 /// A weight of zero or more.
 pub(crate) fn weight_or_zero(text: &str) -> Result<f32, String> {
     match number(text)? as f32 {

@@ -36,15 +36,16 @@ struct Limits {
     doubled: f64,
 }
 
-// The aim is a median of 3 cm and 85 % within two cells for both logs, and 3 % doubled contour. What is measured:
-// Intel 26.3 mm, 82.1 %, 0.4 %; Freiburg 43.3 mm, 68.0 %, 0.9 %. The poses are not the reason: 98.4 and 99.8 % of
-// the held-out end points have a fused one within 5 cm. It is the filter: free space in front of a far surface
-// weighs as much as a surface (+tau with weight 1), observations behind a surface weigh less than those before it
-// (linear taper), so surfaces recede (bias +14 and +31 mm, growing with the incidence angle), and what is thinner
-// than a cell or two (chairs, table legs: Freiburg is full of them) is carved away. With carving of weight 0.1 and
-// a taper that starts one cell behind the surface, and nothing else changed, Intel gives 21.4 mm and 87.0 %.
-const INTEL: Limits = Limits { median: 0.03, within_two_cells: 0.81, doubled: 0.03 };
-const FREIBURG: Limits = Limits { median: 0.045, within_two_cells: 0.67, doubled: 0.03 };
+// The aim is a median of 3 cm and 85 % within two cells for both logs, and 3 % doubled contour. What is measured, with
+// free space at the default weight of 0.3: Intel 22.3 mm, 85.4 %, 0.4 %; Freiburg 34.0 mm, 75.2 %, 0.6 %. (With the
+// chapter's weight of 1: Intel 26.3 mm, 82.1 %; Freiburg 43.3 mm, 68.0 %.)
+//
+// Freiburg misses the aim, and its poses are not the reason: 99.8 % of its held-out end points have a fused one within
+// 5 cm. Its rooms are full of table and chair legs, which are thinner than two cells: the beams that pass them carve
+// them away (a quarter of all predictions are too long), and casting through the occupancy grid does worse (68.7 %).
+// Even a weight of 0.1 gives 78.1 % only.
+const INTEL: Limits = Limits { median: 0.03, within_two_cells: 0.85, doubled: 0.03 };
+const FREIBURG: Limits = Limits { median: 0.036, within_two_cells: 0.74, doubled: 0.03 };
 
 fn predicts_the_tenth_scan(name: &str, limits: &Limits) {
     let Some(log) = real_log(name) else { return };

@@ -144,6 +144,7 @@ fn settings(lidar: &Lidar) -> Settings {
         weights: WeightModel::default(),
         sweep: SweepKind::default(),
         carve: true,
+        carve_weight: 1.0,
         limits: RangeLimits { max: lidar.max_range, ..Default::default() },
         every: None,
         hold_out: None,

@@ -116,6 +116,7 @@ impl Args {
             weights: WeightModel::default(),
             sweep: SweepKind::default(),
             carve: true,
+            carve_weight: 1.0,
             limits: Default::default(),
             every: self.every,
             hold_out: None,

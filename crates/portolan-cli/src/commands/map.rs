@@ -13,7 +13,7 @@ use portolan::sweep::WeightModel;
 use portolan_io::{CarmenLog, MapFile, sweep_of, weights_of, write_atomic};
 use serde_json::{Map, Value};
 
-use crate::arguments::{bounds, bytes, length, weight};
+use crate::arguments::{bounds, bytes, length, share, weight};
 use crate::json;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::{
@@ -80,6 +80,10 @@ pub(crate) struct Args {
     /// Do not fuse the free space in front of surfaces into the distances: faster, but free is then unknown
     #[arg(long)]
     no_carve: bool,
+    /// Weight of free space against that of a surface, above 0 and at most 1; with less, thin things survive and
+    /// what has gone fades more slowly; default 0.3 (the chapter's is 1)
+    #[arg(long, value_name = "W", value_parser = share, allow_negative_numbers = true, conflicts_with = "no_carve")]
+    carve_weight: Option<f32>,
     /// Map this box only: x0,y0,x1,y1 (metres)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     bounds: Option<Aabb<2>>,
@@ -256,6 +260,10 @@ impl Args {
                 None => saved.word("sweep").and_then(sweep_of).unwrap_or_default(),
             },
             carve: !self.no_carve && saved.flag("carve").unwrap_or(true),
+            carve_weight: self
+                .carve_weight
+                .or(saved.number("carve_weight").map(|w| w as f32))
+                .unwrap_or(CARVE_WEIGHT),
             limits,
             every: self.every.or(saved.number("every").map(|n| n as u64)),
             hold_out: self.hold_out.or(saved.number("hold_out").map(|n| n as u64)),
@@ -307,6 +315,10 @@ impl Saved<'_> {
         self.0?.get(key)?.as_bool()
     }
 }
+
+/// Free space weighs less than a surface: on real logs, full of table legs, surfaces that weigh as much as the beams
+/// that pass beside them are carved away (Intel at 5 cm: 85.5 % of held-out ranges within two cells, 82.2 with 1).
+const CARVE_WEIGHT: f32 = 0.3;
 
 /// Three times the resolution, without the rounding error that would show in every file (0.15000000000000002).
 fn three_cells(resolution: f64) -> f64 {

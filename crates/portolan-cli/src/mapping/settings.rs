@@ -36,6 +36,7 @@ pub(crate) struct Settings {
     pub(crate) weights: WeightModel,
     pub(crate) sweep: SweepKind,
     pub(crate) carve: bool,
+    pub(crate) carve_weight: f32,
     pub(crate) limits: RangeLimits,
     pub(crate) every: Option<u64>,
     pub(crate) hold_out: Option<u64>,
@@ -57,6 +58,7 @@ impl Settings {
             w_max: self.w_max,
             sweep: self.sweep,
             weights: self.weights,
+            carve_weight: self.carve_weight,
             ..TsdfConfig::default()
         };
         let made = |kind| self.wants(kind);
@@ -77,6 +79,7 @@ impl Settings {
             "weights": weights_word(self.weights),
             "sweep": sweep_word(self.sweep),
             "carve": self.carve,
+            "carve_weight": f64::from((self.carve_weight * 1e4).round()) / 1e4,
             "min_range": self.limits.min,
             "max_range": finite(self.limits.max),
             "no_return": finite(self.limits.no_return),
@@ -91,13 +94,14 @@ impl Settings {
     /// Refuses to go on with a map that was made with other settings.
     pub(crate) fn check_agree(&self, file: &MapFile, name: &str) -> anyhow::Result<()> {
         let (ours, theirs) = (self.to_json(), &file.header.settings);
-        const SHAPING: [&str; 9] = [
+        const SHAPING: [&str; 10] = [
             "resolution",
             "truncation",
             "w_max",
             "weights",
             "sweep",
             "carve",
+            "carve_weight",
             "min_range",
             "max_range",
             "hold_out",

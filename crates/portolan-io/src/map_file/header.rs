@@ -78,6 +78,7 @@ pub(super) enum Entry {
         truncation: f64,
         /// `null`: never forget.
         w_max: Option<f32>,
+        carve_weight: f32,
         sweep: String,
         weights: String,
     },

@@ -182,7 +182,7 @@ impl Reading<'_> {
                 let tree = self.made(&kind, tree)?;
                 file.tree = Some(self.made(&kind, Quadtree::from_tree(tree, model.model()))?);
             }
-            Entry::Tsdf { chunk, place, truncation, w_max, sweep, weights, .. } => {
+            Entry::Tsdf { chunk, place, truncation, w_max, carve_weight, sweep, weights, .. } => {
                 let grid = self.grid_of(&place)?;
                 let bytes = 4 * grid.len() as u64;
                 let distance = floats(&self.plane(&chunk, "distance", bytes)?);
@@ -196,6 +196,7 @@ impl Reading<'_> {
                 let config = TsdfConfig {
                     truncation,
                     w_max: w_max.unwrap_or(f32::INFINITY),
+                    carve_weight,
                     sweep: sweep_of(&sweep).ok_or_else(|| word("the sweep", &sweep))?,
                     weights: weights_of(&weights).ok_or_else(|| word("the weights", &weights))?,
                     ..TsdfConfig::default()

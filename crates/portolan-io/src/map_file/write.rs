@@ -106,6 +106,7 @@ impl MapFile {
                 place: Place::of(tsdf.grid()),
                 truncation: config.truncation,
                 w_max: config.w_max.is_finite().then_some(config.w_max),
+                carve_weight: config.carve_weight,
                 sweep: sweep_word(config.sweep).into(),
                 weights: weights_word(config.weights).into(),
             });

@@ -24,6 +24,9 @@ pub enum MapError {
     /// The tree's depth is out of range.
     #[error("tree depth {0} is not between 3 and 28")]
     Depth(u32),
+    /// The weight of free space is not between 0 and 1.
+    #[error("carve_weight must be above 0 and at most 1, got {0}")]
+    CarveWeight(f32),
     /// The occupancy model is not valid.
     #[error(transparent)]
     Model(#[from] OccupancyModelError),

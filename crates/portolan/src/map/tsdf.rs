@@ -36,6 +36,10 @@ pub struct TsdfConfig<const D: usize> {
     pub truncation: f64,
     /// Clamp of the weight. Infinity: never forget.
     pub w_max: f32,
+    /// Weight of an observation of free space beyond the truncation, times the beam's. The chapter's is 1. With
+    /// less, what was seen of a surface counts for more than that beams passed near it: thin things survive, and
+    /// what has gone fades more slowly, by the same factor.
+    pub carve_weight: f32,
     /// How scans become observations.
     pub sweep: SweepKind,
     /// How much each beam is trusted.
@@ -51,6 +55,7 @@ impl<const D: usize> Default for TsdfConfig<D> {
             origin: [0.0; D],
             truncation: 0.15,
             w_max: 64.0,
+            carve_weight: 1.0,
             sweep: SweepKind::default(),
             weights: WeightModel::default(),
         }
@@ -118,12 +123,14 @@ enum CellCentreOrMarch<const D: usize> {
 }
 
 impl<const D: usize> CellCentreOrMarch<D> {
-    fn new(config: &TsdfConfig<D>, carve: bool) -> Self {
+    fn new(config: &TsdfConfig<D>, carve_weight: f32) -> Self {
         match config.sweep {
             SweepKind::CellCentre => {
-                Self::CellCentre(Box::new(CellCentre::new(config.truncation, carve, config.weights)))
+                Self::CellCentre(Box::new(CellCentre::new(config.truncation, carve_weight, config.weights)))
             }
-            SweepKind::March => Self::March(Box::new(March::new(config.truncation, carve, config.weights))),
+            SweepKind::March => {
+                Self::March(Box::new(March::new(config.truncation, carve_weight, config.weights)))
+            }
         }
     }
 }
@@ -147,10 +154,13 @@ impl<const D: usize> Tsdf<D> {
         let config = config.with_grid(store.grid());
         let rule = TsdfRule { truncation: config.truncation as f32, w_max: config.w_max };
         rule.validate()?;
+        if !(config.carve_weight > 0.0 && config.carve_weight <= 1.0) {
+            return Err(MapError::CarveWeight(config.carve_weight));
+        }
         Ok(Self {
             bounds: store.grid().aabb(),
-            carving: CellCentreOrMarch::new(&config, true),
-            banded: CellCentreOrMarch::new(&config, false),
+            carving: CellCentreOrMarch::new(&config, config.carve_weight),
+            banded: CellCentreOrMarch::new(&config, 0.0),
             scratch: Distances::silent(block_cells::<D>()),
             watched: Watched { places: Vec::new(), events: Vec::new() },
             store,

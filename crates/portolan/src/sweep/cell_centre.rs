@@ -20,7 +20,7 @@ use crate::scan::{BeamOrder, Scan};
 #[derive(Clone, Debug)]
 pub struct CellCentre<const D: usize> {
     truncation: f64,
-    carve: bool,
+    carve_weight: f32,
     model: WeightModel,
     weights: Vec<f32>,
     cosines: Vec<f32>,
@@ -37,12 +37,12 @@ pub struct CellCentre<const D: usize> {
 }
 
 impl<const D: usize> CellCentre<D> {
-    /// A sweep that says something within `truncation` metres of the surface, and with `carve` about all free
-    /// space up to there.
-    pub fn new(truncation: f64, carve: bool, model: WeightModel) -> Self {
+    /// A sweep that says something within `truncation` metres of the surface, and about all free space up to
+    /// there with `carve_weight` times the weight of a beam; 0: nothing.
+    pub fn new(truncation: f64, carve_weight: f32, model: WeightModel) -> Self {
         Self {
             truncation,
-            carve,
+            carve_weight,
             model,
             weights: Vec::new(),
             cosines: Vec::new(),
@@ -65,7 +65,7 @@ impl<const D: usize> CellCentre<D> {
         lattice: &Lattice<D>,
         bounds: &Aabb<D>,
     ) {
-        let settings = (self.truncation, self.carve, lattice.resolution);
+        let settings = (self.truncation, self.carve_weight, lattice.resolution);
         self.fan.rebuild(scan, world_from_sensor, &self.weights, settings, &mut self.spokes);
         let origin = world_from_sensor.translation;
         self.resolution = lattice.resolution;
@@ -95,23 +95,22 @@ impl<const D: usize> CellCentre<D> {
         let mut last: Option<(Stretch, [[f64; 2]; 2])> = None;
         let mut together = 0;
         let n = self.spokes.len();
+        let carve = self.carve_weight > 0.0;
         let closing = usize::from(scan.next(n - 1).is_some());
         for i in (0..n).chain(0..closing) {
             let spoke = &self.spokes[i];
-            let stretch = Stretch::of(spoke, self.truncation, self.carve);
+            let stretch = Stretch::of(spoke, self.truncation, carve);
             let ends = stretch.map(|s| {
                 [s.from, s.to].map(|s| [0, 1].map(|k| zero[k] + f64::from(spoke.direction[k]) * s * inverse))
             });
             // Without carving there is nothing between two bands that do not overlap.
             let continues = match (&last, &stretch) {
-                (Some((before, _)), Some(now)) => {
-                    self.carve || (before.from <= now.to && now.from <= before.to)
-                }
+                (Some((before, _)), Some(now)) => carve || (before.from <= now.to && now.from <= before.to),
                 _ => false,
             };
             if let (Some((_, before)), Some(now), true) = (&last, &ends, continues) {
                 self.outline.edge(before[1], now[1]);
-                if !self.carve {
+                if !carve {
                     self.outline.edge(before[0], now[0]);
                 }
                 together += 1;
@@ -144,7 +143,7 @@ impl<const D: usize> Sweep<D> for CellCentre<D> {
         if self.ordered {
             self.plan_fan(scan, world_from_sensor, lattice, bounds);
         } else {
-            let how = (self.truncation, self.carve);
+            let how = (self.truncation, self.carve_weight);
             self.rays.plan(scan, world_from_sensor, (lattice, bounds), &self.weights, how);
         }
     }
@@ -278,7 +277,7 @@ mod tests {
             let scan = laser(&readings, 90.0);
             let pose = Pose::<2>::new(x, y, theta);
             let lattice = Lattice::new([0.0; 2], 0.05);
-            let mut sweep = CellCentre::new(0.15, carve, WeightModel::Constant);
+            let mut sweep = CellCentre::new(0.15, if carve { 1.0 } else { 0.0 }, WeightModel::Constant);
             sweep.plan(&scan, &pose, &lattice, &Aabb::new([-4.0; 2], [4.0; 2]));
             assert!(sweep.blocks().is_sorted());
             let said = said(&sweep);
@@ -299,7 +298,7 @@ mod tests {
         ahead[0] = 1.0;
         let scan = Scan::from_points(&[ahead]);
         let pose = Pose { translation: [0.05; D], ..Pose::IDENTITY };
-        let mut sweep = CellCentre::<D>::new(0.25, true, WeightModel::Constant);
+        let mut sweep = CellCentre::<D>::new(0.25, 1.0, WeightModel::Constant);
         sweep.plan(&scan, &pose, &Lattice::new([0.0; D], 0.1), &Aabb::new([-3.0; D], [3.0; D]));
         let said = said(&sweep);
         let mut cell = [0; D];

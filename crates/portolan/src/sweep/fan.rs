@@ -53,7 +53,8 @@ pub(super) struct Fan {
     /// For each part of the circle, the wedge in which it begins.
     table: Vec<u16>,
     truncation: f32,
-    carve: bool,
+    /// Weight of an observation of free space beyond the truncation, times the beam's; 0: none is made.
+    carve_weight: f32,
     /// A beam speaks for cells whose centres it passes within this distance (metres).
     reach_aside: f32,
 }
@@ -75,10 +76,10 @@ impl Fan {
         scan: &Scan<D>,
         world_from_sensor: &Pose<D>,
         weights: &[f32],
-        (truncation, carve, resolution): (f64, bool, f64),
+        (truncation, carve_weight, resolution): (f64, f32, f64),
         spokes: &mut Vec<Spoke>,
     ) {
-        (self.truncation, self.carve) = (truncation as f32, carve);
+        (self.truncation, self.carve_weight) = (truncation as f32, carve_weight);
         self.reach_aside = (0.5 * resolution) as f32;
         spokes.clear();
         spokes.extend(scan.beams().zip(weights).map(|(beam, &weight)| {
@@ -162,7 +163,7 @@ impl Fan {
     /// truncation: such blocks need no look at their cells. The sensor must see it under a narrow angle that does
     /// not cross the x axis, or nothing is said.
     fn free_block(&self, corner: [f32; 2], step: f32) -> Option<f32> {
-        let weight = self.common_weight.filter(|_| self.carve)?;
+        let weight = self.carve_weight * self.common_weight.filter(|_| self.carve_weight > 0.0)?;
         let size = step * (BLOCK_EDGE - 1) as f32;
         let ([x0, y0], [x1, y1]) = (corner, [corner[0] + size, corner[1] + size]);
         if x1 > 0.0 && y0 <= 0.0 && y1 >= 0.0 {
@@ -224,14 +225,13 @@ impl Fan {
             torn |= u64::from(chord.weight < 0.0) << i;
         }
         let tau = self.truncation;
-        let free = if self.carve { 1.0 } else { 0.0 };
         for i in 0..CELLS {
             let r = (x[i] * x[i] + y[i] * y[i]).sqrt();
             // The ray through the point meets the chord at t times the point's own distance.
             let t = cross[i] / (x[i] * chord_y[i] - y[i] * chord_x[i]);
             let d = (t - 1.0) * r;
             // Written so that NaN, at the sensor itself, counts as free space.
-            let before = if d <= tau { 1.0 } else { free };
+            let before = if d <= tau { 1.0 } else { self.carve_weight };
             let behind = (1.0 + d / tau).clamp(0.0, 1.0);
             weight[i] = trust[i] * before * behind;
             distance[i] = d.min(tau);
@@ -273,7 +273,8 @@ impl Fan {
 
     #[inline(always)]
     fn free(&self, seen: bool, weight: f32) -> Option<DistanceObservation> {
-        (self.carve && seen).then_some(DistanceObservation { distance: self.truncation, weight })
+        let weight = weight * self.carve_weight;
+        (weight > 0.0 && seen).then_some(DistanceObservation { distance: self.truncation, weight })
     }
 }
 

@@ -16,7 +16,7 @@ use crate::scan::Scan;
 #[derive(Clone, Debug)]
 pub struct March<const D: usize> {
     truncation: f64,
-    carve: bool,
+    carve_weight: f32,
     model: WeightModel,
     touched: Touched<Distances, D>,
     weights: Vec<f32>,
@@ -24,10 +24,17 @@ pub struct March<const D: usize> {
 }
 
 impl<const D: usize> March<D> {
-    /// A march that says something within `truncation` metres of the surface, and with `carve` about all free
-    /// space up to there.
-    pub fn new(truncation: f64, carve: bool, model: WeightModel) -> Self {
-        Self { truncation, carve, model, touched: Touched::new(), weights: Vec::new(), cosines: Vec::new() }
+    /// A march that says something within `truncation` metres of the surface, and about all free space up to
+    /// there with `carve_weight` times the weight of a beam; 0: nothing.
+    pub fn new(truncation: f64, carve_weight: f32, model: WeightModel) -> Self {
+        Self {
+            truncation,
+            carve_weight,
+            model,
+            touched: Touched::new(),
+            weights: Vec::new(),
+            cosines: Vec::new(),
+        }
     }
 }
 
@@ -38,13 +45,14 @@ impl<const D: usize> Sweep<D> for March<D> {
         self.touched.clear();
         self.model.weigh(scan, &mut self.cosines, &mut self.weights);
         let (tau, step) = (self.truncation, 0.5 * lattice.resolution);
+        let carve = self.carve_weight > 0.0;
         let origin = world_from_sensor.translation;
         for (beam, &weight) in scan.beams().zip(&self.weights) {
             let z = beam.free_range();
-            if z <= 0.0 || (!beam.is_hit() && !self.carve) {
+            if z <= 0.0 || (!beam.is_hit() && !carve) {
                 continue;
             }
-            let first = if self.carve { 0.5 * step } else { (z - tau).max(0.5 * step) };
+            let first = if carve { 0.5 * step } else { (z - tau).max(0.5 * step) };
             let last = if beam.is_hit() { z + tau } else { z };
             let direction = world_from_sensor.rotate(beam.direction);
             let Some((near, far)) = clip(bounds, origin, direction, last) else { continue };
@@ -57,7 +65,11 @@ impl<const D: usize> Sweep<D> for March<D> {
                     break;
                 }
                 let d = if beam.is_hit() { z - s } else { tau };
-                let w = if d >= 0.0 { weight } else { weight * (1.0 + d / tau) as f32 };
+                let w = match d {
+                    d if d > tau || !beam.is_hit() => weight * self.carve_weight,
+                    d if d >= 0.0 => weight,
+                    _ => weight * (1.0 + d / tau) as f32,
+                };
                 let Some(cell) = lattice.cell_of(along(origin, direction, s)) else { continue };
                 let evidence = self.touched.of_cell(cell);
                 let i = BlockKey::offset(cell);
@@ -112,7 +124,7 @@ mod tests {
                 }
             }
         }
-        let mut sweep = March::new(tau, carve, WeightModel::Constant);
+        let mut sweep = March::new(tau, if carve { 1.0 } else { 0.0 }, WeightModel::Constant);
         sweep.plan(&scan, &pose, &lattice, &Aabb::new([-100.0; D], [100.0; D]));
         let mut said = HashMap::new();
         let mut scratch = Distances::silent(block_cells::<D>());

@@ -52,9 +52,10 @@ impl<const D: usize> NearestRay<D> {
         world_from_sensor: &Pose<D>,
         (lattice, bounds): (&Lattice<D>, &Aabb<D>),
         weights: &[f32],
-        (tau, carve): (f64, bool),
+        (tau, carve_weight): (f64, f32),
     ) {
         self.touched.clear();
+        let carve = carve_weight > 0.0;
         let origin = world_from_sensor.translation;
         for (beam, &weight) in scan.beams().zip(weights) {
             let z = beam.free_range();
@@ -79,7 +80,8 @@ impl<const D: usize> NearestRay<D> {
                 } else {
                     f64::NEG_INFINITY
                 };
-                let w = weight * (1.0 + d / tau).clamp(0.0, 1.0) as f32;
+                let free = if d > tau || !beam.is_hit() { carve_weight } else { 1.0 };
+                let w = weight * free * (1.0 + d / tau).clamp(0.0, 1.0) as f32;
                 if w > 0.0 && (carve || d <= tau) {
                     let aside_sq = (dot(offset, offset) - s * s) as f32;
                     let i = BlockKey::offset(cell);
