@@ -66,7 +66,8 @@ impl<const D: usize> Sweep<D> for March<D> {
                 }
                 let d = if beam.is_hit() { z - s } else { tau };
                 let w = match d {
-                    d if d > tau || !beam.is_hit() => weight * self.carve_weight,
+                    // Without carving the first sample is at tau, or a rounding error beyond it.
+                    d if (d > tau && carve) || !beam.is_hit() => weight * self.carve_weight,
                     d if d >= 0.0 => weight,
                     _ => weight * (1.0 + d / tau) as f32,
                 };
