@@ -69,6 +69,7 @@ impl Evidence for Distances {
     }
 
     fn observed(&self) -> usize {
-        self.weight.iter().filter(|&&w| w > 0.0).count()
+        // Summed as u32, which stands in vectors of the same width as the weights.
+        self.weight.iter().map(|&w| u32::from(w > 0.0)).sum::<u32>() as usize
     }
 }

@@ -182,6 +182,10 @@ impl Cell for SignedDistance {
         if len.is_multiple_of(8) {
             let rows = distance.chunks_exact_mut(8).zip(weight.chunks_exact_mut(8));
             for ((d, w), (o, g)) in rows.zip(observed.chunks_exact(8).zip(gained.chunks_exact(8))) {
+                // Near surfaces most rows of a block say nothing.
+                if g.iter().fold(0.0, |most: f32, &g| most.max(g)) <= 0.0 {
+                    continue;
+                }
                 if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into())
                 {
                     fuse_lanes::<8>(d, w, o, g, rule);

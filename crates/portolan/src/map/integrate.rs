@@ -46,7 +46,11 @@ where
     let mut cells = 0;
     for i in 0..sweep.blocks().len() {
         let evidence = sweep.evidence(i, scratch);
-        cells += evidence.observed() as u64;
+        let observed = evidence.observed();
+        if observed == 0 {
+            continue;
+        }
+        cells += observed as u64;
         onlooker(sweep.blocks()[i], store, evidence);
         store.apply(sweep.blocks()[i], evidence, rule);
     }

@@ -163,7 +163,7 @@ impl Fan {
     /// truncation: such blocks need no look at their cells. The sensor must see it under a narrow angle that does
     /// not cross the x axis, or nothing is said.
     fn free_block(&self, corner: [f32; 2], step: f32) -> Option<f32> {
-        let weight = self.carve_weight * self.common_weight.filter(|_| self.carve_weight > 0.0)?;
+        let weight = self.carve_weight * self.common_weight?;
         let size = step * (BLOCK_EDGE - 1) as f32;
         let ([x0, y0], [x1, y1]) = (corner, [corner[0] + size, corner[1] + size]);
         if x1 > 0.0 && y0 <= 0.0 && y1 >= 0.0 {
