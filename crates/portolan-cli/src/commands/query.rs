@@ -22,7 +22,7 @@ use crate::source::{Source, open};
 pub(crate) struct Args {
     /// A folder that `map` wrote, a map.portolan, an esdf.bin, or a map_server yaml
     map: PathBuf,
-    /// CSV of x,y[,z] in metres; - reads standard input
+    /// CSV of x,y or x,y,z in metres; - reads standard input
     #[arg(long, value_name = "FILE")]
     points: PathBuf,
     #[command(flatten)]
