@@ -72,5 +72,9 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
         gallery.esdf_gradient,
         gallery.tsdf_gradient,
     );
-    Some(Section { title: "How true the answers are", body, command: "portolan gallery demo --json" })
+    Some(Section {
+        title: "How true the answers are",
+        body,
+        command: "portolan demo --out out   (for machines: out/gallery.json)",
+    })
 }
