@@ -26,6 +26,7 @@ pub(crate) fn drift(drift: &Drift, scene: &Scene) -> Vec<u8> {
             drift.lap.closures.len()
         ))
         .columns(2)
+        .large()
         .panel("what the wheels say", [told(before.mean, before.max), degrees(&drift.before)])
         .panel("after the pose graph", [told(after.mean, after.max), degrees(&drift.after)])
         .legend([

@@ -6,7 +6,7 @@ use portolan_sim::GhostRun;
 use crate::experiment::Forgetting;
 
 /// Width and height of the sheet (pixels).
-const SHEET: [u32; 2] = [1560, 640];
+const SHEET: [u32; 2] = [1240, 600];
 
 /// Two charts, where the prediction holds and where it does not, as PNG bytes.
 pub(crate) fn ghost(forgetting: &Forgetting) -> Vec<u8> {

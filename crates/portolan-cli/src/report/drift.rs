@@ -67,12 +67,12 @@ pub(super) fn section(facts: &Facts) -> Section {
         "<p>The text maps with the poses of its pose graph, and so does this page. The wheels measure each step with noise \
          (position {:.1} cm and heading {:.2}° after one metre, {:.2}° more after a turn of one radian) and with a bias that \
          no averaging removes: {:.0} % in length, {:.2}° in heading a metre. The errors add up along the lap, and the map \
-         that is made with them has every wall twice.</p>\
+         that is made with them has many a wall twice.</p>\
          <p>Every scan is then matched, point to line, to earlier ones near it, with the pose known so far as the first \
          guess. A match counts only where it is found from both sides and neither scan sees through the other's walls: of \
          {candidates} candidates in the last round {} were believed, {refused} refused. A pose graph of motions and closures \
-         with a robust kernel gives the poses; {} closures do not agree with them in the end. Then all of this a second time, \
-         from the better poses.</p>{}{lost}\
+         with a robust kernel gives the poses; then all of this is done once more, from the better poses. Closures that do not \
+         agree with the final poses: {}.</p>{}{lost}\
          <p>Position and heading are compared with the simulator's without any alignment, since the lap starts at the true \
          pose. The contours of this table are made on a box with room around it, the same for all three sets; the set in bold \
          is the one that everything else on this page uses. The graph is out/pose_graph.g2o, with the optimised vertices.</p>{picture}",

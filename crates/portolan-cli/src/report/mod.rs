@@ -31,7 +31,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) warnings: Vec<String>,
 }
 
-/// A heading, its text in HTML, and the command that gives its numbers.
+/// A heading, its text in HTML, and the command that gives its numbers (after three blanks what is to be said of it).
 struct Section {
     title: &'static str,
     body: String,
@@ -42,11 +42,11 @@ struct Section {
 pub(crate) fn html(facts: &Facts) -> String {
     let sections = [
         Some(pictures::section(facts)),
+        Some(drift::section(facts)),
         Some(costs::table(facts)),
         Some(costs::winners(facts)),
         Some(memory::section(facts)),
         accuracy::section(facts),
-        Some(drift::section(facts)),
         ghost::section(facts),
         Some(against_text::section(facts)),
     ];

@@ -34,12 +34,15 @@ pub(super) fn page(introduction: &str, sections: impl Iterator<Item = Section>) 
          {introduction}\n"
     );
     for Section { title, body, command } in sections {
+        // What is said about the command stands behind it, three blanks away.
+        let (command, note) = command.split_once("   ").unwrap_or((command, ""));
         // Writing to a string cannot fail.
         let _ = write!(
             html,
-            "<section>\n<h2>{}</h2>\n{body}\n<p class=command>The command: <code>{}</code></p>\n</section>\n",
+            "<section>\n<h2>{}</h2>\n{body}\n<p class=command>The command: <code>{}</code> {}</p>\n</section>\n",
             escaped(title),
-            escaped(command)
+            escaped(command),
+            escaped(note)
         );
     }
     html.push_str("</main>\n</body>\n</html>\n");
