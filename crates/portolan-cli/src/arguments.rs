@@ -1,5 +1,6 @@
 //! Values on the command line: read, checked, refused with a reason (clap then exits with status 2).
 
+use portolan::cell::TsdfRule;
 use portolan::geom::Aabb;
 
 fn number(text: &str) -> Result<f64, String> {
@@ -35,6 +36,32 @@ pub(crate) fn share(text: &str) -> Result<f32, String> {
     match number(text)? as f32 {
         v if v > 0.0 && v <= 1.0 => Ok(v),
         _ => Err("must be above 0 and at most 1".to_owned()),
+    }
+}
+
+/// A number of observations; `inf` is one.
+pub(crate) fn half_life(text: &str) -> Result<f64, String> {
+    match number(text)? {
+        v if v >= 0.1 => Ok(v),
+        _ => Err("must be a number of observations from 0.1 on, or inf to never forget".to_owned()),
+    }
+}
+
+/// How soon distances forget, in either of two units.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub(crate) struct ForgettingArgs {
+    /// Clamp of the weight of a cell, inf to never forget; default 64
+    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
+    w_max: Option<f32>,
+    /// The same as the number of observations after which half of a stale distance is left
+    #[arg(long, value_name = "N", value_parser = half_life, allow_negative_numbers = true, conflicts_with = "w_max")]
+    half_life: Option<f64>,
+}
+
+impl ForgettingArgs {
+    /// The clamp, where one was asked for.
+    pub(crate) fn w_max(&self) -> Option<f32> {
+        self.w_max.or(self.half_life.map(|n| TsdfRule::w_max_for_half_life(n, 1.0) as f32))
     }
 }
 
@@ -106,6 +133,11 @@ mod tests {
         }
         assert_eq!(length("0.05"), Ok(0.05));
         assert!(length_or_zero("0").is_ok() && length_or_zero("-0.1").is_err());
+        assert!(half_life("10").is_ok() && half_life("0").is_err() && half_life("nan").is_err());
+        let asked = |n: &str| ForgettingArgs { w_max: None, half_life: half_life(n).ok() }.w_max();
+        assert_eq!(asked("1"), Some(1.0));
+        assert_eq!(asked("inf"), Some(f32::INFINITY));
+        assert!(asked("0.1").is_some_and(|w| w > 0.0));
         assert!(weight("inf").is_ok() && weight("nan").is_err() && weight("0").is_err());
     }
 

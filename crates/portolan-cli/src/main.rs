@@ -5,6 +5,7 @@
 mod arguments;
 mod commands;
 mod error;
+mod experiment;
 mod json;
 mod log;
 mod mapping;

@@ -323,3 +323,40 @@ fn every_help_ends_with_an_example() {
     }
     assert_eq!(range([1.0, 1.0], 0.0), 5.0);
 }
+
+/// One scan is enough to know what it saw, whatever free space and distant beams weigh.
+#[test]
+fn what_was_seen_once_is_known_under_every_weighting() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("one.log");
+    std::fs::write(&log, log_lines(0, 1)).unwrap();
+    let [x, y, theta] = support::pose(0);
+    let points = folder.path().join("points.csv");
+    // Half a metre ahead of the sensor.
+    std::fs::write(&points, format!("{},{}\n", x + 0.5 * theta.cos(), y + 0.5 * theta.sin())).unwrap();
+    for weights in ["constant", "range", "incidence", "range-incidence"] {
+        for carve_weight in ["1", "0.3", "0.05"] {
+            let out = folder.path().join(format!("{weights}-{carve_weight}"));
+            map(&log, &out, &["--weights", weights, "--carve-weight", carve_weight]);
+            let answer = succeed(["query", arg(&out), "--points", arg(&points)]);
+            assert!(answer.contains(",known,"), "{weights} {carve_weight}: {answer}");
+            let summary: serde_json::Value =
+                serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+            assert!(summary["contour"]["length"].as_f64().unwrap() > 2.0, "{weights} {carve_weight}");
+        }
+    }
+}
+
+/// A heading so small that its inverse overflows does not stop the walk through the cells.
+#[test]
+fn a_subnormal_heading_is_a_heading() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("subnormal.log");
+    let readings: Vec<String> = (0..7).map(|i| format!("{:.2}", 1.0 + 0.01 * f64::from(i))).collect();
+    std::fs::write(&log, format!("FLASER 7 {} 0 0 -1e-320 0 0 -1e-320 1.0 host 1.0\n", readings.join(" ")))
+        .unwrap();
+    for resolution in ["1", "0.5", "0.25"] {
+        let out = folder.path().join(resolution);
+        succeed(["map", arg(&log), "--resolution", resolution, "--no-return", "50", "--out", arg(&out)]);
+    }
+}

@@ -1,4 +1,5 @@
 //! `demo` and `gallery`: the whole experiment, from the command line.
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 mod support;
 
@@ -7,17 +8,21 @@ use std::path::Path;
 use serde_json::Value;
 use support::{arg, fail, json, room, succeed};
 
-const FILES: [&str; 12] = [
+const FILES: [&str; 16] = [
     "contour.geojson",
     "contour.svg",
     "esdf.bin",
     "gallery.json",
     "gallery.png",
     "gallery.txt",
+    "ghost.json",
+    "ghost.png",
     "map.pgm",
     "map.png",
     "map.portolan",
     "map.yaml",
+    "pose_graph.g2o",
+    "pose_graph.png",
     "report.html",
     "summary.json",
 ];
@@ -45,6 +50,78 @@ fn check_html(html: &str) {
     assert!(open.is_empty(), "{open:?}");
 }
 
+fn check_poses(poses: &Value) {
+    let number = |path: &str| poses.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}"));
+    assert_eq!(poses["used"], "optimised");
+    assert!(number("/odometry/translation/max") > 0.3, "the odometry does not drift");
+    assert!(number("/optimised/translation/mean") < 0.03);
+    assert!(number("/optimised/rotation/rms").to_degrees() < 0.5);
+    assert!(number("/closures") > 100.0);
+    let [truth, odometry, optimised] =
+        ["true", "odometry", "optimised"].map(|set| number(&format!("/contour/{set}/median")));
+    assert!(truth < 0.006 && odometry > 5.0 * truth && optimised < 2.0 * truth + 0.002);
+}
+
+/// 200 poses, 199 motions, and the closures.
+fn check_graph(g2o: &str) {
+    let count = |tag: &str| g2o.lines().filter(|l| l.split(' ').next() == Some(tag)).count();
+    assert_eq!((count("VERTEX_SE2"), count("FIX")), (200, 1));
+    assert!(count("EDGE_SE2") > 199 + 100);
+}
+
+fn check_ghost(ghost: &Value) {
+    let runs = ghost["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 3);
+    for (run, w_max) in runs.iter().zip([4.0f64, 24.0, 64.0]) {
+        let predicted = std::f64::consts::LN_2 / (1.0 / w_max).ln_1p();
+        let measured = run["measured"]["half_life"].as_f64().unwrap();
+        assert!((measured / predicted - 1.0).abs() < 0.1, "{measured} instead of {predicted}");
+        assert!(run["measured"]["cells"].as_u64().unwrap() >= 8);
+        let noise = &run["static_noise"];
+        let ratio = noise["measured"].as_f64().unwrap() / noise["predicted"].as_f64().unwrap();
+        assert!((0.9..1.5).contains(&ratio), "noise {ratio} times the prediction");
+    }
+}
+
+#[test]
+fn poses_and_forgetting_are_the_callers() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("ghost.png"), "of an earlier run").unwrap();
+    let of = |poses: &str| {
+        let document = json([
+            "demo",
+            "--json",
+            "--no-ghost",
+            "--scans",
+            "40",
+            "--half-life",
+            "10",
+            "--poses",
+            poses,
+            "--out",
+            arg(&out),
+        ]);
+        assert_eq!((&document["input"]["poses"], &document["poses"]["used"]), (&poses.into(), &poses.into()));
+        assert_eq!(document["ghost"], Value::Null);
+        assert!(!out.join("ghost.png").exists() && !out.join("ghost.json").exists());
+        let html = String::from_utf8(read(&out, "report.html")).unwrap();
+        check_html(&html);
+        assert!(html.contains("Where the poses come from") && !html.contains("The ghost of the chair"));
+        // 1 / (2^(1/10) - 1).
+        let settings = &document["settings"];
+        assert!((settings["w_max"].as_f64().unwrap() - 13.932_726).abs() < 1e-4);
+        assert!((settings["half_life"].as_f64().unwrap() - 10.0).abs() < 1e-5);
+        read(&out, "map.portolan")
+    };
+    let maps = ["true", "odometry", "optimised"].map(of);
+    assert!(maps[0] != maps[1] && maps[1] != maps[2] && maps[0] != maps[2]);
+    let clash = ["demo", "--w-max", "4", "--half-life", "3", "--out", arg(&out)];
+    assert!(fail(2, clash).contains("--half-life"));
+    assert!(fail(2, ["demo", "--half-life", "0", "--out", arg(&out)]).contains("observations"));
+}
+
 #[test]
 fn demo_writes_everything_and_twice_the_same() {
     let folder = tempfile::tempdir().unwrap();
@@ -63,7 +140,7 @@ fn demo_writes_everything_and_twice_the_same() {
     assert_eq!(listed, FILES);
 
     // Every file is what its name says.
-    for name in ["gallery.png", "map.png"] {
+    for name in ["gallery.png", "map.png", "pose_graph.png", "ghost.png"] {
         assert!(read(&first, name).starts_with(b"\x89PNG"), "{name}");
     }
     assert!(read(&first, "map.pgm").starts_with(b"P5"));
@@ -76,6 +153,15 @@ fn demo_writes_everything_and_twice_the_same() {
     assert!(!html.contains("<script") && !html.contains("src=\"http"), "the report needs nothing else");
     assert!(succeed(["info", arg(&first.join("map.portolan"))]).contains("Apartment"));
 
+    for section in ["Where the poses come from", "The ghost of the chair"] {
+        assert!(html.contains(section), "{section}");
+    }
+    check_poses(&document["poses"]);
+    check_graph(&String::from_utf8(read(&first, "pose_graph.g2o")).unwrap());
+    let ghost = parsed(&first, "ghost.json");
+    check_ghost(&ghost);
+    assert_eq!(ghost, document["ghost"]);
+
     // The gallery of the document is that of the file, and answers what it must.
     let gallery = parsed(&first, "gallery.json");
     assert_eq!(gallery, document["gallery"]);
@@ -86,7 +172,8 @@ fn demo_writes_everything_and_twice_the_same() {
     assert!(gallery["gradient_norm"]["esdf"].as_f64().unwrap() > 0.9);
 
     assert_eq!(succeed(["demo", "-q", "--out", arg(&second)]), "");
-    for name in ["map.portolan", "esdf.bin", "contour.geojson", "contour.svg", "map.pgm", "map.png"] {
+    let same = ["map.portolan", "esdf.bin", "contour.geojson", "contour.svg", "map.pgm", "map.png"];
+    for name in same.into_iter().chain(["pose_graph.g2o", "pose_graph.png", "ghost.json", "ghost.png"]) {
         assert!(read(&first, name) == read(&second, name), "{name} differs between two runs");
     }
 }

@@ -50,8 +50,19 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Source::Map(file) => convert_map(file, target, args)?,
         Source::Server(map) => convert_server(map, target, args)?,
         Source::Esdf(EsdfFile::Two(field)) => {
-            let esdf = Esdf::from_samples(field.grid, field.distances.clone())?;
-            convert_esdf(&esdf, target, args)?
+            if target == Target::Esdf {
+                field.write(&args.out)?; // the same file, its status plane included
+                true
+            } else {
+                let mut samples = field.distances.clone();
+                let status = field.status.iter().flatten();
+                samples
+                    .iter_mut()
+                    .zip(status)
+                    .filter(|(_, s)| **s == portolan_io::EsdfBin::<2>::UNKNOWN)
+                    .for_each(|(d, _)| *d = f32::NAN);
+                convert_esdf(&Esdf::from_samples(field.grid, samples)?, target, args)?
+            }
         }
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
         _ => false,
@@ -114,11 +125,11 @@ fn convert_map(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<bo
             write_map_server(yaml(&args.out), &grid, &cells)?;
         }
         (Target::Esdf, Some(tsdf)) => {
-            let EsdfSettings { min_weight, band_cells } = EsdfSettings::default();
+            let EsdfSettings { min_weight, band_cells } = EsdfSettings::of(tsdf);
             write_field(&esdf_from_tsdf(tsdf, min_weight, band_cells), args)?;
         }
         (Target::Contour, Some(tsdf)) => {
-            return write_lines(&marching_squares(tsdf, &ContourSettings::default()), args);
+            return write_lines(&marching_squares(tsdf, &ContourSettings::of(tsdf)), args);
         }
         (Target::Esdf | Target::Contour, None) => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
@@ -198,7 +209,7 @@ fn contour_of(esdf: &Esdf<2>) -> anyhow::Result<Contour> {
     let store = planes.and_then(|p| Dense::from_planes(*esdf.grid(), p));
     let Some(store) = store else { bail!("the distance field has values that are not finite") };
     let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
-    Ok(marching_squares(&tsdf, &ContourSettings::default()))
+    Ok(marching_squares(&tsdf, &ContourSettings::of(&tsdf)))
 }
 
 /// The cells as an occupancy grid whose cells are as sure as they can be.

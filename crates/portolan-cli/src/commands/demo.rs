@@ -1,26 +1,29 @@
 //! `demo`: the chapter's experiment on the simulated Apartment.
 
+mod found;
+
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use portolan::gallery::{ErrorSummary, Gallery};
 use portolan::geom::{Grid, Pose};
 use portolan::map::SweepKind;
 use portolan::scan::{RangeLimits, Scan, ScanStats};
 use portolan::sweep::WeightModel;
 use portolan_io::{MapFile, write_atomic};
-use portolan_sim::{LapConfig, Lidar, SEED, World};
-use serde_json::{Value, json};
+use portolan_sim::{LapConfig, Lidar, SEED};
 
+use self::found::Found;
 use super::gallery;
+use crate::arguments::ForgettingArgs;
+use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::json;
 use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, fuse};
 use crate::output::Output;
-use crate::pictures::Scene;
+use crate::pictures::{self, Scene};
 use crate::progress::Progress;
 use crate::report::{self, Facts};
 
@@ -37,6 +40,14 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     #[arg(default_value = "200")]
     scans: u32,
+    /// Poses that the maps are made with
+    #[arg(long, value_enum, default_value = "optimised")]
+    poses: PoseSet,
+    #[command(flatten)]
+    forgetting: ForgettingArgs,
+    /// Leave out the experiment with the moved chair
+    #[arg(long)]
+    no_ghost: bool,
     #[command(flatten)]
     output: Output,
 }
@@ -60,36 +71,71 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     if args.out.exists() && !args.out.is_dir() {
         bail!("{}: is a file, not a folder; name a folder for the results", args.out.display());
     }
-    let mut run = Run::default();
+    let mut run = Run::start();
     let config =
         LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };
 
     let world = portolan_sim::apartment().world;
-    let scans = run.timed("simulate", || portolan_sim::lap(&world, &config));
-    let settings = settings(&config.lidar);
+    let (mut drift, scans) = run.timed("simulate", || Drift::drive(&world, &config, args.poses))?;
+    let settings = settings(&config.lidar, args.forgetting.w_max());
     let grid = gallery::apartment_grid(RESOLUTION);
     let (mut file, fusion, bytes) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
     describe(&mut file, &settings, &config, &fusion.stats);
     let derived = run.timed("derive", || Derived::of(&file, &settings));
+    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &settings))?;
     let gallery =
-        run.timed("gallery", || gallery::measure(&scans, &grid, TRUNCATION, PROBES, Some(&world)))?;
+        run.timed("gallery", || gallery::measure(&scans, &grid, &settings, PROBES, Some(&world)))?;
 
     gallery::make_folder(&args.out)?;
-    let scene = Scene { gallery: &gallery, log: &scans, world: Some(&world) };
+    let scene = Scene { gallery: &gallery, log: &scans, poses: args.poses.poses(), world: Some(&world) };
     let table = gallery::document(&gallery, "the simulated Apartment", scans.len());
-    let title = gallery::title("the Apartment", RESOLUTION, scans.len());
-    let written = run.timed("gallery_files", || gallery::write_files(&args.out, &scene, &table, &title))?;
-    run.files.extend(written);
-    let title = format!("The Apartment · cells of 5 cm · {} scans", scans.len());
-    let artefacts = Artefacts { file: &file, derived: &derived, title };
-    let (written, _) = run.timed("map_files", || artefacts.write(&args.out))?;
-    run.files.extend(written);
+    // The gallery is measured: from here on nobody minds a busy neighbour.
+    let (ghost, written) = std::thread::scope(|scope| {
+        let ghost = (!args.no_ghost).then(|| scope.spawn(|| seconds_of(|| Forgetting::run(config.seed))));
+        let written = (|| -> anyhow::Result<()> {
+            let title = gallery::title("the Apartment", RESOLUTION, scans.len());
+            let files =
+                run.timed("gallery_files", || gallery::write_files(&args.out, &scene, &table, &title))?;
+            run.files.extend(files);
+            let title = format!("The Apartment · cells of 5 cm · {} scans", scans.len());
+            let artefacts = Artefacts { file: &file, derived: &derived, title };
+            let (files, _) = run.timed("map_files", || artefacts.write(&args.out))?;
+            run.files.extend(files);
+            let files = run.timed("drift_files", || write_drift(&args.out, &drift, &scene))?;
+            run.files.extend(files);
+            Ok(())
+        })();
+        (ghost.map(std::thread::ScopedJoinHandle::join), written)
+    });
+    written?;
+    let forgetting = match ghost {
+        Some(Ok((seconds, forgetting))) => {
+            run.seconds.insert("ghost", seconds);
+            Some(forgetting?)
+        }
+        Some(Err(_)) => bail!("the thread of the moved chair was lost; --no-ghost leaves it out"),
+        None => None,
+    };
+    run.files.extend(write_ghost(&args.out, forgetting.as_ref())?);
     run.files.extend(["report.html", "summary.json"]);
 
-    let found =
-        Found { config, settings, grid, world: &world, fusion, bytes, file, derived, gallery: &gallery };
+    let found = Found {
+        config,
+        settings,
+        grid,
+        world: &world,
+        fusion,
+        bytes,
+        file,
+        derived,
+        gallery: &gallery,
+        drift: &drift,
+        forgetting: forgetting.as_ref(),
+    };
     let facts = Facts {
         scene,
+        drift: &drift,
+        forgetting: forgetting.as_ref(),
         esdf_against_contour: against_contour(&gallery),
         seconds: run.total(),
         warnings: found.warnings(),
@@ -100,6 +146,32 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{summary:#}"))?;
     summary["gallery"] = table;
     args.output.print(&summary, found.report(&run, &args.out.display().to_string()))
+}
+
+/// The graph and its picture; gives their names.
+fn write_drift(folder: &Path, drift: &Drift, scene: &Scene) -> anyhow::Result<[&'static str; 2]> {
+    write_atomic(folder.join("pose_graph.g2o"), |w| portolan_graph::write_g2o(&drift.lap.graph, w))?;
+    let png = pictures::drift(drift, scene);
+    write_atomic(folder.join("pose_graph.png"), |w| w.write_all(&png))?;
+    Ok(["pose_graph.g2o", "pose_graph.png"])
+}
+
+/// The ghost's numbers and picture; gives their names. Without a ghost those of an earlier run are removed.
+fn write_ghost(folder: &Path, forgetting: Option<&Forgetting>) -> anyhow::Result<&'static [&'static str]> {
+    const NAMES: [&str; 2] = ["ghost.json", "ghost.png"];
+    let Some(forgetting) = forgetting else {
+        for path in NAMES.map(|name| folder.join(name)).iter().filter(|path| path.exists()) {
+            let remove = std::fs::remove_file(path);
+            remove.with_context(|| format!("{}: cannot remove what an earlier run left", path.display()))?;
+        }
+        return Ok(&[]);
+    };
+    let [document, png] = NAMES.map(|name| folder.join(name));
+    let numbers = forgetting.to_json();
+    write_atomic(document, |w| writeln!(w, "{numbers:#}"))?;
+    let picture = pictures::ghost(forgetting);
+    write_atomic(png, |w| w.write_all(&picture))?;
+    Ok(&NAMES)
 }
 
 /// The ESDF against the contour: distances at free points beside every eighth cell centre, off it so that the
@@ -117,30 +189,39 @@ fn against_contour(gallery: &Gallery) -> Option<ErrorSummary> {
 }
 
 /// Files written and seconds spent.
-#[derive(Default)]
 struct Run {
+    start: Instant,
     seconds: BTreeMap<&'static str, f64>,
     files: Vec<&'static str>,
 }
 
 impl Run {
+    fn start() -> Self {
+        Self { start: Instant::now(), seconds: BTreeMap::new(), files: Vec::new() }
+    }
+
     fn timed<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
-        let made = work();
-        self.seconds.insert(stage, start.elapsed().as_secs_f64());
+        let (seconds, made) = seconds_of(work);
+        self.seconds.insert(stage, seconds);
         made
     }
 
     fn total(&self) -> f64 {
-        self.seconds.values().sum()
+        self.start.elapsed().as_secs_f64()
     }
 }
 
-fn settings(lidar: &Lidar) -> Settings {
+fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = Instant::now();
+    let made = work();
+    (start.elapsed().as_secs_f64(), made)
+}
+
+fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
     Settings {
         resolution: RESOLUTION,
         truncation: TRUNCATION,
-        w_max: 64.0,
+        w_max: w_max.unwrap_or(64.0),
         weights: WeightModel::default(),
         sweep: SweepKind::default(),
         carve: true,
@@ -178,121 +259,4 @@ fn describe(file: &mut MapFile, settings: &Settings, config: &LapConfig, stats: 
     file.header.scans = stats.scans;
     file.header.settings = settings.to_json();
     file.header.statistics = json::object(json::stats(stats));
-}
-
-/// Everything that a run found out.
-struct Found<'a> {
-    config: LapConfig,
-    settings: Settings,
-    grid: Grid<2>,
-    world: &'a World,
-    fusion: FusionReport,
-    /// Bytes of each map, measured.
-    bytes: BTreeMap<&'static str, usize>,
-    file: MapFile,
-    derived: Derived,
-    gallery: &'a Gallery,
-}
-
-impl Found<'_> {
-    /// `summary.json`, with the fields that `map` writes.
-    fn to_json(&self, run: &Run) -> Value {
-        let stats = json::stats(&self.fusion.stats);
-        let lidar = &self.config.lidar;
-        let mut bytes = self.bytes.clone();
-        bytes.extend(self.derived.bytes());
-        let contour = self.derived.contour.as_ref().map(|c| {
-            json!({
-                "segments": c.segments.len(),
-                "length": c.length(),
-                "doubled_share": self.derived.doubled.share(),
-                "thin_length": self.derived.thin.thin,
-            })
-        });
-        let mut seconds = run.seconds.clone();
-        seconds.extend(self.fusion.seconds.iter());
-        seconds.extend(self.derived.seconds.iter());
-        seconds.insert("total", run.total());
-        json!({
-            "program": concat!("portolan ", env!("CARGO_PKG_VERSION")),
-            "input": {
-                "simulated": "apartment",
-                "seed": self.config.seed,
-                "scans": self.config.scans,
-                "poses": "true",
-                "lidar": {
-                    "beams": lidar.beams, "noise": lidar.noise, "max_range": lidar.max_range,
-                    "no_return_rate": lidar.no_return_rate, "dropped_rate": lidar.dropped_rate,
-                },
-                "wall_length": self.world.wall_length(),
-            },
-            "settings": self.settings.to_json(),
-            "scans": {
-                "in_log": self.config.scans, "held_out": 0, "fused": self.fusion.stats.scans,
-                "refused_poses": self.fusion.stats.refused_poses, "in_map": self.file.header.scans,
-            },
-            "beams": stats["beams"],
-            "refused_beams": stats["refused_beams"],
-            "observations": self.fusion.observations,
-            "extent": json::grid(&self.grid),
-            "contour": contour,
-            "bytes": bytes,
-            "seconds": seconds,
-            "logs": self.file.header.logs,
-            "warnings": self.warnings(),
-            "files": run.files,
-        })
-    }
-
-    /// What should be known before the maps are trusted.
-    fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        let thin = &self.derived.thin;
-        if thin.thin > 0.0 {
-            warnings.push(format!(
-                "{:.1} m of contour ({:.1} %) belong to things thinner than twice the truncation, seen from both \
-                 sides: they are eroded",
-                thin.thin,
-                100.0 * thin.thin / thin.total
-            ));
-        }
-        let esdf = self.gallery.rows.iter().find(|r| r.name.starts_with("ESDF"));
-        if let Some(e) = esdf.and_then(|r| r.distance_error).filter(|e| e.worst_over > 0.0) {
-            warnings.push(format!(
-                "the ESDF's distances are up to {:.0} mm too large (and {:.0} mm too small); median error {:.1} mm, \
-                 p99 {:.1} mm: keep that much margin",
-                1e3 * e.worst_over,
-                1e3 * e.worst_under,
-                1e3 * e.median,
-                1e3 * e.p99
-            ));
-        }
-        warnings
-    }
-
-    /// The summary for people: the table first.
-    fn report(&self, run: &Run, folder: &str) -> String {
-        let stats = &self.fusion.stats;
-        let mut text = format!("{}\n", self.gallery);
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "simulated lap of the Apartment, seed {:#x}: {} scans at their true poses, {} hits, {} without echo, {} lost",
-            self.config.seed, stats.scans, stats.beams.hit, stats.beams.no_return, stats.beams.dropped
-        );
-        for warning in self.warnings() {
-            let _ = writeln!(text, "warning: {warning}");
-        }
-        let s = |name: &str| run.seconds.get(name).copied().unwrap_or(0.0);
-        let _ = writeln!(
-            text,
-            "simulated {:.2} s, fused {:.2} s, measured {:.2} s, written {:.2} s",
-            s("simulate"),
-            s("fuse") + s("derive"),
-            s("gallery"),
-            s("gallery_files") + s("map_files") + s("report")
-        );
-        let _ = writeln!(text, "wrote {} to {folder}", run.files.join(", "));
-        text
-    }
 }

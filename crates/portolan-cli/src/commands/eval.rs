@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use portolan::field::EsdfSettings;
 use portolan::geom::vector::distance;
 use portolan::surface::{
     Contour, ContourSettings, RayCast, RayCastSettings, cast_ray, doubled_length, marching_squares,
@@ -56,7 +57,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let Some(tsdf) = &file.tsdf else {
         bail!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display());
     };
-    let contour = marching_squares(tsdf, &ContourSettings::default());
+    let contour = marching_squares(tsdf, &ContourSettings::of(tsdf));
     let doubled = doubled_length(&contour, 0.15);
     let mut document = json!({
         "map": args.map.display().to_string(),
@@ -108,6 +109,7 @@ fn predict(args: &Args, file: &MapFile, path: &Path) -> anyhow::Result<Value> {
     }
 
     let resolution = tsdf.grid().lattice.resolution;
+    let min_weight = EsdfSettings::of(tsdf).min_weight;
     let mut errors = Vec::new();
     let (mut hits, mut unknown, mut outside, mut free) = (0u64, 0u64, 0u64, 0u64);
     let progress = Progress::new(scans.len(), "predicting", args.output);
@@ -117,7 +119,7 @@ fn predict(args: &Args, file: &MapFile, path: &Path) -> anyhow::Result<Value> {
             hits += 1;
             let direction = world_from_sensor.rotate(beam.direction);
             let settings =
-                RayCastSettings { unknown_tolerance: 2.0 * resolution, ..RayCastSettings::default() };
+                RayCastSettings { min_weight, unknown_tolerance: 2.0 * resolution, ..Default::default() };
             match cast_ray(tsdf, world_from_sensor.translation, direction, &settings) {
                 RayCast::Hit(range) => errors.push(range - beam.range),
                 RayCast::Unknown(_) => unknown += 1,
@@ -127,6 +129,13 @@ fn predict(args: &Args, file: &MapFile, path: &Path) -> anyhow::Result<Value> {
         }
     }
     drop(progress);
+    if errors.is_empty() {
+        return Err(anyhow::Error::msg(format!(
+            "{}: none of {hits} hits of {} scans could be predicted; is this the log of that map?",
+            path.display(),
+            scans.len()
+        )));
+    }
     let within = |cells: f64| errors.iter().filter(|e| e.abs() <= cells * resolution).count() as f64;
     let (predicted, all) = (errors.len() as f64, hits as f64);
     let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };

@@ -96,11 +96,15 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         .map_err(|error| {
             anyhow!("{error} (a gallery holds {COPIES} times that, so a {COPIES}rd of --memory counts)")
         })?;
-    let gallery = measure(&scans, &grid, settings.truncation, args.probes as usize, world.as_ref())?;
+    if scans.iter().all(|(_, scan)| scan.counts().hit == 0) {
+        anyhow::bail!("{name}: no beam of {} scans hit anything; there is nothing to compare", scans.len());
+    }
+    let gallery = measure(&scans, &grid, &settings, args.probes as usize, world.as_ref())?;
     let document = document(&gallery, &name, scans.len());
     if let Some(folder) = &args.out {
         make_folder(folder)?;
-        let scene = Scene { gallery: &gallery, log: &scans, world: world.as_ref() };
+        let poses = if simulated { "true poses" } else { "the log's poses" };
+        let scene = Scene { gallery: &gallery, log: &scans, poses, world: world.as_ref() };
         write_files(folder, &scene, &document, &title(&name, args.resolution, scans.len()))?;
     }
     args.output.print(&document, &gallery)
@@ -137,17 +141,17 @@ pub(crate) fn apartment_grid(resolution: f64) -> Grid<2> {
     Grid::new([0.0; 2], resolution, [cells(12.0), cells(9.0)])
 }
 
-/// Runs the comparison with the wall clock.
+/// Runs the comparison with the wall clock; truncation and clamp are those of the settings.
 pub(crate) fn measure(
     scans: &[(Pose<2>, Scan<2>)],
     grid: &Grid<2>,
-    truncation: f64,
+    made_with: &Settings,
     probes: usize,
     world: Option<&World>,
 ) -> anyhow::Result<Gallery> {
     let settings = GallerySettings {
         grid: *grid,
-        tsdf: Tsdf2Config { truncation, ..Default::default() },
+        tsdf: Tsdf2Config { truncation: made_with.truncation, w_max: made_with.w_max, ..Default::default() },
         model: OccupancyModel::default(),
         contour: ContourSettings::default(),
         esdf: EsdfSettings::default(),
@@ -196,7 +200,10 @@ pub(crate) fn document(gallery: &Gallery, log: &str, scans: usize) -> Value {
     let winners: Vec<_> = gallery
         .winners
         .iter()
-        .map(|w| json!({ "workload": w.workload.name(), "row": name(w.row), "ahead": w.ahead }))
+        .map(|w| {
+            let level: Vec<_> = w.level.iter().map(|&i| name(i)).collect();
+            json!({ "workload": w.workload.name(), "row": name(w.row), "level": level, "ahead": w.ahead })
+        })
         .collect();
     let never: Vec<_> = gallery.never_win.iter().map(|&i| name(i)).collect();
     let trees: Vec<_> = gallery

@@ -13,12 +13,12 @@ use portolan::sweep::WeightModel;
 use portolan_io::{CarmenLog, MapFile, sweep_of, weights_of, write_atomic};
 use serde_json::{Map, Value};
 
-use crate::arguments::{bounds, bytes, length, share, weight};
+use crate::arguments::{ForgettingArgs, bounds, bytes, length, share};
 use crate::json;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::{
     Artefacts, Derived, MapKind, Maps, Settings, Summary, check_memory, fuse, grid_over, grown, report, seen,
-    with_outlier,
+    seen_by_tree, with_outlier,
 };
 use crate::output::Output;
 use crate::progress::Progress;
@@ -60,9 +60,8 @@ pub(crate) struct Args {
     /// Distances are kept within this of a surface (metres); default three cells
     #[arg(long, value_name = "T", value_parser = length, allow_negative_numbers = true)]
     truncation: Option<f64>,
-    /// Clamp of the weight of a cell, inf to never forget; default 64
-    #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
-    w_max: Option<f32>,
+    #[command(flatten)]
+    forgetting: ForgettingArgs,
     /// How much each beam is trusted; default constant
     #[arg(long, value_enum)]
     weights: Option<WeightsArg>,
@@ -246,7 +245,7 @@ impl Args {
         Settings {
             resolution,
             truncation: self.truncation.or(saved.number("truncation")).unwrap_or(three_cells(resolution)),
-            w_max: self.w_max.or(saved_w_max).unwrap_or(64.0),
+            w_max: self.forgetting.w_max().or(saved_w_max).unwrap_or(64.0),
             weights: match self.weights {
                 Some(WeightsArg::Constant) => WeightModel::Constant,
                 Some(WeightsArg::Range) => WeightModel::InverseSquare,
@@ -329,7 +328,9 @@ fn three_cells(resolution: f64) -> f64 {
 /// The grid of a saved map.
 fn grid_of(file: &MapFile) -> Option<Grid<2>> {
     let dense = file.tsdf.as_ref().map(|m| *m.grid());
-    dense.or_else(|| file.grid.as_ref().map(|m| *m.store().grid()))
+    dense
+        .or_else(|| file.grid.as_ref().map(|m| *m.store().grid()))
+        .or_else(|| file.tree.as_ref().and_then(seen_by_tree))
 }
 
 /// Writes into the file's header what it is made of.

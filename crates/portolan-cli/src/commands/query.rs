@@ -124,8 +124,10 @@ impl Fields {
 }
 
 fn of_map(file: MapFile) -> Field<2> {
-    let EsdfSettings { min_weight, band_cells } = EsdfSettings::default();
-    let of_tsdf = file.tsdf.as_ref().map(|t| esdf_from_tsdf(t, min_weight, band_cells));
+    let of_tsdf = file.tsdf.as_ref().map(|t| {
+        let EsdfSettings { min_weight, band_cells } = EsdfSettings::of(t);
+        esdf_from_tsdf(t, min_weight, band_cells)
+    });
     let of_grid = || {
         let map = file.grid.as_ref()?;
         let occupied = |i: usize| map.store().at(i).map(|v| v.0 > 0);

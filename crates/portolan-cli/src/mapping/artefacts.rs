@@ -7,7 +7,8 @@ use std::time::Instant;
 use anyhow::bail;
 use portolan::cell::LogOddsValue;
 use portolan::field::{Esdf, EsdfSettings, esdf_from_tsdf};
-use portolan::map::DerivedField;
+use portolan::geom::Grid;
+use portolan::map::{DerivedField, Quadtree};
 use portolan::surface::{Contour, ContourSettings, DoubledLength, ThinWalls};
 use portolan::surface::{doubled_length, marching_squares, thin_walls};
 use portolan_io::{
@@ -38,7 +39,7 @@ impl Derived {
         let Some(tsdf) = &file.tsdf else { return derived };
         if settings.wants(MapKind::Contour) {
             let start = Instant::now();
-            let contour = marching_squares(tsdf, &ContourSettings::default());
+            let contour = marching_squares(tsdf, &ContourSettings::of(tsdf));
             derived.seconds.insert("contour", start.elapsed().as_secs_f64());
             let start = Instant::now();
             derived.doubled = doubled_length(&contour, DOUBLED_REACH);
@@ -48,7 +49,7 @@ impl Derived {
         }
         if settings.wants(MapKind::Esdf) {
             let start = Instant::now();
-            let EsdfSettings { min_weight, band_cells } = EsdfSettings::default();
+            let EsdfSettings { min_weight, band_cells } = EsdfSettings::of(tsdf);
             derived.esdf = Some(esdf_from_tsdf(tsdf, min_weight, band_cells));
             derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
         }
@@ -160,7 +161,25 @@ const FREE: f64 = 0.25;
 
 /// The cells of a map_server map: from the occupancy grid, else from the tree, else from the signs of the
 /// distances. `None`: the file has no map.
-pub(crate) fn cells_for_map_server(file: &MapFile) -> Option<(portolan::geom::Grid<2>, Vec<MapCell>)> {
+/// A tree may span more than any array can hold: dense files of it stop here.
+const MOST_CELLS: usize = 1 << 28;
+
+/// The box of the observed leaves of a tree: the root may be much larger than what was seen.
+pub(crate) fn seen_by_tree(map: &Quadtree) -> Option<Grid<2>> {
+    let mut low = [i32::MAX; 2];
+    let mut high = [i32::MIN; 2];
+    map.tree().for_each_leaf(|leaf| {
+        for k in 0..2 {
+            low[k] = low[k].min(leaf.cell[k]);
+            high[k] = high[k].max(leaf.cell[k] + (1 << leaf.height));
+        }
+    });
+    let lattice = map.tree().grid().lattice;
+    let shape = [0, 1].map(|k| high[k].saturating_sub(low[k]).max(0) as usize);
+    (low[0] < high[0]).then(|| Grid::new(lattice.corner(low), lattice.resolution, shape))
+}
+
+pub(crate) fn cells_for_map_server(file: &MapFile) -> Option<(Grid<2>, Vec<MapCell>)> {
     let decide = |p: Option<f64>| match p {
         Some(p) if p > OCCUPIED => MapCell::Occupied,
         Some(p) if p < FREE => MapCell::Free,
@@ -183,21 +202,7 @@ pub(crate) fn cells_for_map_server(file: &MapFile) -> Option<(portolan::geom::Gr
         return Some((grid, (0..grid.len()).map(|i| decide(cell(i))).collect()));
     }
     let map = file.tree.as_ref()?;
-    // The root may be much larger than what was seen.
-    let mut low = [i32::MAX; 2];
-    let mut high = [i32::MIN; 2];
-    map.tree().for_each_leaf(|leaf| {
-        for k in 0..2 {
-            low[k] = low[k].min(leaf.cell[k]);
-            high[k] = high[k].max(leaf.cell[k] + (1 << leaf.height));
-        }
-    });
-    if low[0] >= high[0] {
-        return None;
-    }
-    let lattice = map.tree().grid().lattice;
-    let shape = [0, 1].map(|k| (high[k] - low[k]) as usize);
-    let grid = portolan::geom::Grid::new(lattice.corner(low), lattice.resolution, shape);
+    let grid = seen_by_tree(map).filter(|grid| grid.len() <= MOST_CELLS)?;
     let cells = (0..grid.len()).map(|i| decide(map.probability(grid.lattice.center(grid.cell(i))).known()));
     Some((grid, cells.collect()))
 }

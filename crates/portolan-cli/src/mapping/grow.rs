@@ -1,6 +1,6 @@
 //! Maps that were saved, in a larger grid.
 
-use anyhow::anyhow;
+use anyhow::{anyhow, bail};
 use portolan::cell::{LogOdds8, LogOddsValue};
 use portolan::geom::Grid;
 use portolan::map::{OccupancyGrid, Quadtree, Tsdf};
@@ -48,6 +48,12 @@ fn grown_tree(map: Quadtree, grid: &Grid<2>) -> anyhow::Result<Quadtree> {
         }
         records = below_new_root(&records, child);
         depth += 1;
+        if depth > 28 {
+            bail!(
+                "the saved tree and the new scans are too far apart for one tree of {r} m cells (2^28 along each axis); \
+                 write to another folder, or give --bounds"
+            );
+        }
     }
     let tree = Tree::from_records(origin, r, depth, &records)?;
     Ok(Quadtree::from_tree(tree, *map.model())?)

@@ -1,7 +1,7 @@
 //! What the maps of a run are made with.
 
 use anyhow::bail;
-use portolan::cell::OccupancyModel;
+use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Grid};
 use portolan::map::{OccupancyGrid, Quadtree, SweepKind, Tsdf, TsdfConfig};
 use portolan::scan::RangeLimits;
@@ -69,6 +69,23 @@ impl Settings {
         })
     }
 
+    /// Observations of weight 1 after which a saturated cell has lost half the error of a stale estimate.
+    pub(crate) fn half_life(&self) -> f64 {
+        TsdfRule { truncation: self.truncation as f32, w_max: self.w_max }.half_life(1.0)
+    }
+
+    /// How the distances forget, for people.
+    pub(crate) fn forgetting(&self) -> String {
+        match self.w_max.is_finite() {
+            true => format!(
+                "W_max {}: half of a stale distance is left after {:.2} observations",
+                (100.0 * self.w_max).round() / 100.0,
+                self.half_life()
+            ),
+            false => "W_max infinite: nothing is forgotten".to_owned(),
+        }
+    }
+
     /// The settings as they are written into files.
     pub(crate) fn to_json(&self) -> Map<String, Value> {
         let finite = |v: f64| v.is_finite().then_some(v);
@@ -76,6 +93,7 @@ impl Settings {
             "resolution": self.resolution,
             "truncation": self.truncation,
             "w_max": finite(f64::from(self.w_max)),
+            "half_life": finite(self.half_life()),
             "weights": weights_word(self.weights),
             "sweep": sweep_word(self.sweep),
             "carve": self.carve,
@@ -109,7 +127,8 @@ impl Settings {
         for key in SHAPING {
             let (new, old) = (&ours[key], theirs.get(key).unwrap_or(&Value::Null));
             if new != old {
-                let option = key.replace('_', "-");
+                let option =
+                    if key == "w_max" { "w-max or --half-life".into() } else { key.replace('_', "-") };
                 bail!(
                     "{name}: {key} is {old} in the map and {new} in this call; leave --{option} out to go on \
                      with the map's, or write to another folder"

@@ -60,7 +60,7 @@ impl Summary<'_> {
         if thin.thin > 0.0 {
             warnings.push(format!(
                 "{:.1} m of contour ({:.1} %) belong to walls thinner than twice the truncation ({:.3} m), seen from \
-                 both sides: they are eroded; a smaller --truncation helps",
+                 both sides: their faces may be displaced by up to a few centimetres; a smaller --truncation helps",
                 thin.thin,
                 100.0 * thin.thin / thin.total,
                 2.0 * self.settings.truncation
@@ -147,6 +147,7 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     );
     let r = summary.settings.resolution;
     let _ = writeln!(text, "{w:.1} x {h:.1} m, {nx} x {ny} cells of {r} m");
+    let _ = writeln!(text, "{}", summary.settings.forgetting());
     let sizes: Vec<_> =
         summary.bytes.iter().map(|(name, &n)| format!("{name} {}", shown_bytes(n as f64))).collect();
     let _ = writeln!(text, "{}", sizes.join(", "));

@@ -10,6 +10,8 @@ use portolan_sim::World;
 pub(crate) struct Scene<'a> {
     pub(crate) gallery: &'a Gallery,
     pub(crate) log: &'a [(Pose<2>, Scan<2>)],
+    /// Where its poses come from: "true poses".
+    pub(crate) poses: &'static str,
     /// The true world; only the simulator has one.
     pub(crate) world: Option<&'a World>,
 }

@@ -90,8 +90,8 @@ fn lines(layer: Layer, scene: &Scene) -> [String; 2] {
     match layer {
         Layer::Log => {
             let beams: usize = scene.log.iter().map(|(_, scan)| scan.len()).sum();
-            let end = if scene.world.is_some() { "true poses" } else { "the log's poses" };
-            [format!("{} scans, {beams} beams", scene.log.len()), format!("{end}; beams of one scan")]
+            let poses = scene.poses;
+            [format!("{} scans, {beams} beams", scene.log.len()), format!("{poses}; beams of one scan")]
         }
         Layer::Grid => of("occupancy grid", |row| asked("occupancy probe", row.occupancy)),
         Layer::Tree => of("quadtree", |row| asked("occupancy probe", row.occupancy)),

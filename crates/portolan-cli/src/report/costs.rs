@@ -1,14 +1,11 @@
 //! What the maps cost, and who is cheapest for which question.
 
-use portolan::gallery::{Cost, Row, Workload};
+use portolan::gallery::{Cost, LEVEL, Row, Workload};
 
 use super::page::{escaped, table as html_table};
 use super::{Facts, Section};
 use crate::arguments::shown_bytes;
 use crate::pictures::shown_seconds;
-
-/// Costs nearer to each other than this factor are called level: they change places between runs.
-const LEVEL: f64 = 1.25;
 
 /// The rows that answer a question most cheaply, within what runs differ by.
 fn cheapest(rows: &[Row], cost: impl Fn(&Row) -> Option<Cost>) -> Vec<usize> {
@@ -48,29 +45,33 @@ pub(super) fn table(facts: &Facts) -> Section {
          <p>No row wins all columns, and none was ever going to.</p>",
         html_table(&header, &cells.collect::<Vec<_>>(), &[])
     );
-    Section { title: "What everything costs", body, command: "portolan gallery demo" }
+    Section {
+        title: "What everything costs",
+        body,
+        command: "portolan demo --out out   (the table alone, at the true poses: portolan gallery demo)",
+    }
 }
 
 pub(super) fn winners(facts: &Facts) -> Section {
     let rows = &facts.scene.gallery.rows;
-    let mut ever = vec![false; rows.len()];
+    let gallery = facts.scene.gallery;
     let mut items = String::new();
-    for workload in Workload::ALL {
-        let first = cheapest(rows, |r| workload.cost(r));
-        first.iter().for_each(|&i| ever[i] = true);
+    for winner in &gallery.winners {
+        let workload = winner.workload;
+        let first = &winner.level;
         let names: Vec<_> = first.iter().map(|&i| escaped(&rows[i].name)).collect();
-        let best =
-            first.iter().filter_map(|&i| workload.cost(&rows[i])).map(|c| c.seconds).fold(f64::MAX, f64::min);
         let next = (0..rows.len())
             .filter(|i| !first.contains(i))
             .filter_map(|i| Some((workload.cost(&rows[i])?.seconds, i)))
             .min_by(|a, b| a.0.total_cmp(&b.0));
-        let ahead = match next {
-            Some((seconds, i)) if best > 0.0 => {
-                format!("; next is {} at {:.1} times the cost", escaped(&rows[i].name), seconds / best)
+        let ahead = match (next, winner.ahead) {
+            (Some((_, i)), Some(ahead)) => {
+                format!("; next is {} at {ahead:.1} times the cost", escaped(&rows[i].name))
             }
-            Some((seconds, _)) => format!("; every other one first spends {}", shown_seconds(seconds)),
-            None => String::new(),
+            (Some((seconds, _)), None) => {
+                format!("; every other one first spends {}", shown_seconds(seconds))
+            }
+            (None, _) => String::new(),
         };
         let (task, why) = match workload {
             Workload::Occupancy => (
@@ -88,9 +89,9 @@ pub(super) fn winners(facts: &Facts) -> Section {
         };
         items += &format!("<li><b>{task}</b><br>{}{ahead}. {why}</li>", names.join(", level with "));
     }
-    let never: Vec<_> =
-        rows.iter().zip(&ever).filter(|(_, ever)| !**ever).map(|(r, _)| escaped(&r.name)).collect();
-    let trees = rows.iter().zip(&ever).filter(|(r, _)| r.name.starts_with("quadtree")).all(|(_, e)| !e);
+    let never: Vec<_> = gallery.never_win.iter().map(|&i| escaped(&rows[i].name)).collect();
+    let is_tree = |i: usize| rows[i].name.starts_with("quadtree");
+    let trees = (0..rows.len()).filter(|&i| is_tree(i)).all(|i| gallery.never_win.contains(&i));
     let verdict = if trees {
         "<p>Of the text's four panes the <b>quadtree</b> is the one that never takes the frame. A probe descends a level at a \
          time, one dependent load after the other, where an array takes one index; and in the plane, at this resolution, it \
@@ -99,22 +100,25 @@ pub(super) fn winners(facts: &Facts) -> Section {
     } else {
         "<p>In this run a quadtree was level with the cheapest map, which the text's never was.</p>"
     };
-    let cloud = match facts.scene.gallery.cloud_crossover.points {
+    let cloud = match gallery.cloud_crossover.points {
         Some(n) => format!(
-            "<p>The k-d tree over raw end points answers distances faster than the ESDF only up to about {n} points; this \
-             lap has {}. It grows with every scan, forgets nothing, knows nothing of free space: a cloud is the log, not the \
+            "<p>The k-d tree over raw end points answers distances {}; this lap has {}. It grows with every scan, forgets nothing, knows nothing of free space: a cloud is the log, not the \
              map.</p>",
-            facts.scene.gallery.cloud.points().len()
+            match n {
+                0 | 1 => "more slowly than the ESDF from the first points on".to_owned(),
+                n => format!("faster than the ESDF only up to about {n} points"),
+            },
+            gallery.cloud.points().len()
         ),
         None => String::new(),
     };
     Section {
         title: "Who wins which workload",
         body: format!(
-            "<p>The ranking changes with the question. Within a quarter of the best is called level: that much differs \
-             between runs.</p><ul>{items}</ul><p>Never the cheapest: {}.</p>{verdict}{cloud}",
+            "<p>The ranking changes with the question. Within {LEVEL} times the best is called level: that much \
+             differs between runs.</p><ul>{items}</ul><p>Never the cheapest: {}.</p>{verdict}{cloud}",
             never.join("; ")
         ),
-        command: "portolan gallery demo --json",
+        command: "portolan demo --out out   (for machines: out/gallery.json)",
     }
 }

@@ -6,18 +6,23 @@
 mod accuracy;
 mod against_text;
 mod costs;
-mod later;
+mod drift;
+mod ghost;
 mod memory;
 mod page;
 mod pictures;
 
 use portolan::gallery::ErrorSummary;
 
+use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::pictures::Scene;
 
 /// What the sections are made of.
 pub(crate) struct Facts<'a> {
     pub(crate) scene: Scene<'a>,
+    pub(crate) drift: &'a Drift,
+    /// `None`: left out.
+    pub(crate) forgetting: Option<&'a Forgetting>,
     /// The ESDF against the contour it was made with, which is what the text compares it with.
     pub(crate) esdf_against_contour: Option<ErrorSummary>,
     /// Seconds that the whole run took up to here.
@@ -26,7 +31,7 @@ pub(crate) struct Facts<'a> {
     pub(crate) warnings: Vec<String>,
 }
 
-/// A heading, its text in HTML, and the command that gives its numbers.
+/// A heading, its text in HTML, and the command that gives its numbers (after three blanks what is to be said of it).
 struct Section {
     title: &'static str,
     body: String,
@@ -37,12 +42,12 @@ struct Section {
 pub(crate) fn html(facts: &Facts) -> String {
     let sections = [
         Some(pictures::section(facts)),
+        Some(drift::section(facts)),
         Some(costs::table(facts)),
         Some(costs::winners(facts)),
         Some(memory::section(facts)),
         accuracy::section(facts),
-        later::pose_graph(facts),
-        later::ghost(facts),
+        ghost::section(facts),
         Some(against_text::section(facts)),
     ];
     page::page(&introduction(facts), sections.into_iter().flatten())
@@ -56,13 +61,19 @@ fn introduction(facts: &Facts) -> String {
     let warnings = if warnings.is_empty() { warnings } else { format!("<ul class=warn>{warnings}</ul>") };
     format!(
         "<p class=lead>A map is a decision about which question gets to be cheap. Here {scans} scans ({beams} beams) \
-         of one lap through a simulated apartment of 12 m × 9 m, at their true poses, go into every representation at \
-         once: {width} × {height} cells of 5 cm, truncation 15 cm, weights clamped at 64. Then all of them are asked the \
+         of one lap through a simulated apartment of 12 m × 9 m, at {poses}, go into every representation at \
+         once: {width} × {height} cells of 5 cm, truncation 15 cm, weights clamped at {clamp}. Then all of them are asked the \
          same three questions: <em>is this point occupied? how far is the nearest surface? where is the boundary?</em> \
          The simulator knows the truth, so each answer has an error beside its cost.</p>\
          <p>Everything on this page was computed in {seconds:.1} s, on the machine that wrote it, by the command under \
          each section. Times vary from run to run by some ten percent; memory and errors do not.</p>{warnings}",
         scans = facts.scene.log.len(),
+        poses = match facts.drift.chosen {
+            PoseSet::True => "their true poses",
+            PoseSet::Odometry => "the poses that the wheels lead to",
+            PoseSet::Optimised => "the poses that a pose graph made of drifting odometry",
+        },
+        clamp = gallery.tsdf.config().w_max,
         seconds = facts.seconds,
     )
 }

@@ -17,7 +17,7 @@ th,td{padding:.42em .7em;text-align:right;border-bottom:1px solid var(--line);ve
 th:first-child,td:first-child,td.text,th.text{text-align:left}thead th{border-bottom:2px solid var(--ink);white-space:nowrap}
 td b{color:var(--best)}small,figcaption,.command{color:var(--muted)}td small{display:block}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(20rem,1fr));gap:1.3rem;margin:1.2rem 0}
-figure{margin:0}figure.wide{max-width:48rem;margin:1.2rem 0}img{display:block;width:100%;height:auto;background:#fff;border:1px solid var(--line);border-radius:4px}
+figure{margin:0}figure.wide{max-width:48rem;margin:1.2rem 0}figure.full{margin:1.2rem 0}img{display:block;width:100%;height:auto;background:#fff;border:1px solid var(--line);border-radius:4px}
 figcaption{font-size:.88rem;margin-top:.4em}figcaption b{color:var(--ink)}
 .command{font-size:.88rem}code{font:.92em ui-monospace,monospace;background:var(--soft);padding:.12em .4em;border-radius:3px;color:var(--ink)}
 .legend span{display:inline-block;margin-right:1.2em;white-space:nowrap;font-size:.9rem}.legend i{display:inline-block;width:1.1em;height:.75em;margin-right:.4em;border:1px solid var(--line);vertical-align:baseline}
@@ -34,12 +34,15 @@ pub(super) fn page(introduction: &str, sections: impl Iterator<Item = Section>) 
          {introduction}\n"
     );
     for Section { title, body, command } in sections {
+        // What is said about the command stands behind it, three blanks away.
+        let (command, note) = command.split_once("   ").unwrap_or((command, ""));
         // Writing to a string cannot fail.
         let _ = write!(
             html,
-            "<section>\n<h2>{}</h2>\n{body}\n<p class=command>The command: <code>{}</code></p>\n</section>\n",
+            "<section>\n<h2>{}</h2>\n{body}\n<p class=command>The command: <code>{}</code> {}</p>\n</section>\n",
             escaped(title),
-            escaped(command)
+            escaped(command),
+            escaped(note)
         );
     }
     html.push_str("</main>\n</body>\n</html>\n");

@@ -1,5 +1,6 @@
 //! Reading a `map.portolan`.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use portolan::cell::{DistancePlanes, LogOdds8};
@@ -47,7 +48,9 @@ impl MapFile {
     }
 
     fn of_container(container: &Container, path: &Path, memory: u64) -> Result<Self, IoError> {
-        let mut reading = Reading { container, path, memory, used: vec![false; container.chunks().len()] };
+        let chunks = container.chunks();
+        let places = chunks.iter().enumerate().map(|(i, c)| ((c.tag.as_str(), c.name.as_str()), i)).collect();
+        let mut reading = Reading { container, path, memory, used: vec![false; chunks.len()], places };
         let (mut fields, maps) = reading.header()?;
         let mut file = Self::default();
         for map in maps {
@@ -77,6 +80,8 @@ struct Reading<'a> {
     memory: u64,
     /// Which chunks were read.
     used: Vec<bool>,
+    /// Where each chunk stands, by tag and name.
+    places: HashMap<(&'a str, &'a str), usize>,
 }
 
 impl Reading<'_> {
@@ -167,6 +172,7 @@ impl Reading<'_> {
                 file.grid = Some(self.made(&kind, map)?);
             }
             Entry::Quadtree { chunk, origin, resolution, depth, model, .. } => {
+                self.check_place(origin, resolution)?;
                 let length = self.parts(&chunk, "occupancy").map(|i| self.container.chunks()[i].length).sum();
                 let content = self.plane(&chunk, "occupancy", length)?;
                 let Some((&root, rest)) = content.split_first() else {
@@ -228,7 +234,19 @@ impl Reading<'_> {
             let advice = "a dense map has from 1 to 2^31 cells";
             return Err(self.bad("the shape", format!("{:?}", place.shape), advice));
         }
+        self.check_place(place.origin, place.resolution)?;
         Ok(Grid::new(place.origin, place.resolution, place.shape.map(|s| s as usize)))
+    }
+
+    /// Refuses an origin whose cell index is no whole number any more.
+    fn check_place(&self, origin: [f64; 2], resolution: f64) -> Result<(), IoError> {
+        const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
+        // A resolution that is none is refused, with its own words, by the map.
+        if !(resolution > 0.0) || origin.iter().all(|v| (v / resolution).abs() < LARGEST_INDEX) {
+            return Ok(());
+        }
+        let advice = "a map lies within 2^45 cells of zero";
+        Err(self.bad("the origin", format!("{origin:?} at {resolution} m"), advice))
     }
 
     /// The chunks of a plane, in order.
@@ -236,7 +254,7 @@ impl Reading<'_> {
         let (tag, name) = (tag.to_owned(), name.to_owned());
         (0..).map_while(move |part| {
             let name = part_name(&name, part);
-            self.container.chunks().iter().position(|c| c.tag == tag && c.name == name)
+            self.places.get(&(tag.as_str(), name.as_str())).copied()
         })
     }
 

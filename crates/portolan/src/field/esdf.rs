@@ -21,6 +21,15 @@ impl Default for EsdfSettings {
     }
 }
 
+impl EsdfSettings {
+    /// The default with a `W_min` of half of what one ordinary observation of free space weighs in this map, so that
+    /// what was seen free once is known (the chapter's 0.5 where everything weighs 1).
+    pub fn of<const D: usize>(tsdf: &Tsdf<D>) -> Self {
+        let config = tsdf.config();
+        Self { min_weight: 0.5 * config.weights.typical_low() * config.carve_weight, ..Self::default() }
+    }
+}
+
 /// Why distances are no field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

@@ -14,9 +14,9 @@ pub struct TreeCrossover {
     pub resolution: f64,
     /// Resolution at which the tree breaks even (metres), by the formula.
     pub predicted_resolution: f64,
-    /// Tree bytes over dense bytes of 5 cm... of the grid's own resolution, by the formula.
+    /// Tree bytes over dense bytes, both at the tree's own resolution, by the formula.
     pub predicted_ratio: f64,
-    /// The same ratio, of the bytes measured.
+    /// Bytes measured of the tree over those of the dense array, which keeps its own resolution.
     pub measured_ratio: f64,
 }
 

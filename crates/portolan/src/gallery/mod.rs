@@ -12,5 +12,5 @@ mod table;
 pub use accuracy::{ErrorSummary, Truth};
 pub use crossover::{CloudCrossover, TreeCrossover};
 pub use probes::Clock;
-pub use row::{Cost, Row, Winner, Workload};
+pub use row::{Cost, LEVEL, Row, Winner, Workload};
 pub use run::{Gallery, GallerySettings, run};

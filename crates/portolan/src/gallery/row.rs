@@ -83,6 +83,9 @@ impl Workload {
     }
 }
 
+/// Costs within this factor of the best are called level: they change places between runs.
+pub const LEVEL: f64 = 1.3;
+
 /// The cheapest representation for a workload.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Winner {
@@ -90,11 +93,13 @@ pub struct Winner {
     pub workload: Workload,
     /// Index of the row.
     pub row: usize,
-    /// How many times dearer the second is; `None` where the winner costs nothing or is alone.
+    /// All rows whose cost is within [`LEVEL`] times the cheapest one's, that one first, then in the order of their cost.
+    pub level: Vec<usize>,
+    /// How many times dearer the first row is that is not level; `None` where the winner costs nothing or all are level.
     pub ahead: Option<f64>,
 }
 
-/// Who wins each workload, and the rows that win none.
+/// Who wins each workload, and the rows that are not even level with a winner.
 pub(super) fn winners(rows: &[Row]) -> (Vec<Winner>, Vec<usize>) {
     let winners: Vec<Winner> = Workload::ALL
         .into_iter()
@@ -103,10 +108,32 @@ pub(super) fn winners(rows: &[Row]) -> (Vec<Winner>, Vec<usize>) {
                 rows.iter().enumerate().filter_map(|(i, r)| Some((i, workload.cost(r)?.seconds))).collect();
             costs.sort_by(|a, b| a.1.total_cmp(&b.1));
             let (row, best) = *costs.first()?;
-            let ahead = costs.get(1).filter(|_| best > 0.0).map(|second| second.1 / best);
-            Some(Winner { workload, row, ahead })
+            let (level, behind) = costs.split_at(costs.partition_point(|c| c.1 <= LEVEL * best));
+            let ahead = behind.first().filter(|_| best > 0.0).map(|next| next.1 / best);
+            Some(Winner { workload, row, level: level.iter().map(|c| c.0).collect(), ahead })
         })
         .collect();
-    let never = (0..rows.len()).filter(|&i| winners.iter().all(|w| w.row != i)).collect();
+    let never = (0..rows.len()).filter(|i| winners.iter().all(|w| !w.level.contains(i))).collect();
     (winners, never)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(occupancy: f64, surface: Option<f64>) -> Row {
+        let surface = surface.and_then(Cost::direct);
+        Row { occupancy: Cost::direct(occupancy), surface, ..Default::default() }
+    }
+
+    #[test]
+    fn costs_within_what_runs_differ_by_are_level() {
+        let rows = [row(1.2e-9, None), row(5e-9, Some(2.0)), row(1e-9, Some(0.0)), row(1.31e-9, Some(1.0))];
+        let (winners, never) = winners(&rows);
+        assert_eq!((winners[0].row, &winners[0].level[..]), (2, &[2, 0][..]));
+        assert!((winners[0].ahead.unwrap() - 1.31).abs() < 1e-12);
+        assert_eq!((winners[1].workload, winners[1].row), (Workload::Surface, 2));
+        assert_eq!((&winners[1].level[..], winners[1].ahead), (&[2][..], None));
+        assert_eq!((winners.len(), never), (2, vec![1, 3]));
+    }
 }

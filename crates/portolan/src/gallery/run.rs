@@ -141,13 +141,15 @@ pub fn run(
             ..Default::default()
         });
     }
-    let marched_contour = marching_squares(&marched, &settings.contour);
+    let (marched_build, marched_contour) =
+        seconds_of(clock, || marching_squares(&marched, &settings.contour));
     let banded_contour = marching_squares(&banded, &settings.contour);
-    for (name, map, update, extracted, note) in [
+    for (name, map, update, extraction, extracted, note) in [
         (
             "TSDF, f32 D and W",
             &tsdf,
             tsdf_update,
+            contour_build,
             &contour,
             format!(
                 "{} ms without carving, {} segments there",
@@ -159,6 +161,7 @@ pub fn run(
             "TSDF, the chapter's march",
             &marched,
             marched_update,
+            marched_build,
             &marched_contour,
             format!("{} segments", marched_contour.segments.len()),
         ),
@@ -168,13 +171,16 @@ pub fn run(
             memory_bytes: map.memory_bytes(),
             update: Cost::direct(update),
             occupancy: Cost::by(asker.time_occupancy(clock, map), "sign of D"),
-            surface: Cost::by(contour_build, "marching squares"),
+            surface: Cost::by(extraction, "marching squares"),
             occupancy_wrong: asker.occupancy_wrong(map),
             surface_error: asker.surface_error(extracted),
             note,
             ..Default::default()
         });
     }
+    let observed = |i: usize| !distance.samples()[i].is_nan();
+    let (zero_build, zero) =
+        seconds_of(clock, || level_set(&grid, distance.samples(), observed, Ambiguity::Decide));
     let esdf_occupancy = |p| crate::map::DerivedField::occupancy(&distance, p);
     rows.push(Row {
         name: "ESDF, f32".into(),
@@ -188,15 +194,10 @@ pub fn run(
         distance: Cost::direct(seconds_per_probe(clock, &everywhere, |p| {
             distance.distance(p).known().unwrap_or(0.0)
         })),
-        surface: Cost::by(contour_build, "marching squares"),
+        surface: Cost::by(zero_build, "marching squares"),
         occupancy_wrong: asker.wrong(esdf_occupancy),
         distance_error: asker.distance_error(|p| distance.distance(p).known()),
-        surface_error: asker.surface_error(&level_set(
-            &grid,
-            distance.samples(),
-            |i| !distance.samples()[i].is_nan(),
-            Ambiguity::Decide,
-        )),
+        surface_error: asker.surface_error(&zero),
         note: "the chapter's seeding".into(),
     });
     rows.push(Row {

@@ -79,7 +79,8 @@ impl std::fmt::Display for Gallery {
         writeln!(f, "Errors are medians against the true world; distances at observed free points.\n")?;
         for w in &self.winners {
             let ahead = w.ahead.map_or(String::new(), |a| format!(", {a:.1} times ahead of the next"));
-            writeln!(f, "{} probes: {}{ahead}", w.workload.name(), self.rows[w.row].name)?;
+            let level: Vec<&str> = w.level.iter().map(|&i| self.rows[i].name.as_str()).collect();
+            writeln!(f, "{} probes: {}{ahead}", w.workload.name(), level.join(", level with "))?;
         }
         let never: Vec<&str> = self.never_win.iter().map(|&i| self.rows[i].name.as_str()).collect();
         writeln!(f, "never the cheapest: {}\n", never.join("; "))?;

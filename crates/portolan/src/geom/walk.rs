@@ -24,8 +24,9 @@ impl<const D: usize> RayWalk<D> {
         let at = lattice.to_cells(origin);
         let mut walk = Self { cell, step: [0; D], t_next: [f64::INFINITY; D], t_delta: [f64::INFINITY; D] };
         for k in 0..D {
-            if dir[k] != 0.0 {
-                let inverse = lattice.resolution / dir[k].abs();
+            // A component so small that a cell is infinitely far along it is no component.
+            let inverse = lattice.resolution / dir[k].abs();
+            if inverse.is_finite() {
                 let inside = at[k] - f64::from(cell[k]);
                 walk.step[k] = if dir[k] > 0.0 { 1 } else { -1 };
                 walk.t_delta[k] = inverse;
@@ -131,6 +132,15 @@ mod tests {
         #[test]
         fn covers_the_ray_3d(o in prop::array::uniform3(-3.0..3.0f64), t in prop::array::uniform3(-3.0..3.0f64)) {
             covers_the_ray(o, t);
+        }
+    }
+
+    #[test]
+    fn a_direction_too_small_for_its_inverse_does_not_step() {
+        let mut walk = RayWalk::new(&Lattice::new([0.0; 2], 1.0), [0.5, 1.0], [1.0, -1e-320]).unwrap();
+        for x in 1..10 {
+            walk.advance();
+            assert_eq!((walk.cell(), walk.exit()), ([x, 1], f64::from(x) + 0.5));
         }
     }
 

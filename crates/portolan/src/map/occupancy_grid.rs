@@ -83,7 +83,10 @@ impl<const D: usize> OccupancyGrid<D> {
         let p = p_world.into();
         let lattice = &self.store.grid().lattice;
         let centre = lattice.cell_of(p)?;
-        let rings = (limit / lattice.resolution).ceil().min(1e6) as i32;
+        // Beyond the farthest cell of the grid there is nothing to find.
+        let farthest =
+            (0..D).map(|k| centre[k].abs().max((self.store.grid().shape[k] as i32 - centre[k]).abs()));
+        let rings = ((limit / lattice.resolution).ceil().min(1e9) as i32).min(farthest.max().unwrap_or(0));
         let mut best = f64::INFINITY;
         for ring in 0..=rings {
             // Centres on this ring are at least so far away; nothing nearer can follow.

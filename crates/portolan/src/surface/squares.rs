@@ -31,6 +31,14 @@ impl Default for ContourSettings {
     }
 }
 
+impl ContourSettings {
+    /// The default with a `W_min` of half of what one ordinary beam weighs in this map (the chapter's 0.5 where all
+    /// beams weigh 1).
+    pub fn of(tsdf: &Tsdf<2>) -> Self {
+        Self { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..Self::default() }
+    }
+}
+
 const NONE: u32 = u32::MAX;
 
 /// Vertices on the lattice edges around one row of squares; each crossing is made once and shared.

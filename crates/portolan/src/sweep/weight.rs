@@ -18,6 +18,17 @@ pub enum WeightModel {
 }
 
 impl WeightModel {
+    /// What an ordinary distant beam weighs: the scale of thresholds on weights. 1 for equal weights, a tenth where
+    /// the incidence counts, a hundredth (10 m) where the range does.
+    pub fn typical_low(self) -> f32 {
+        match self {
+            Self::Constant => 1.0,
+            Self::CosIncidence => 0.1,
+            Self::InverseSquare => 0.01,
+            Self::InverseSquareCosIncidence => 0.001,
+        }
+    }
+
     /// One weight per beam of the scan, into `weights`; `cosines` is scratch. Incidence comes from neighbouring
     /// beams and is 1 where there are none.
     pub(super) fn weigh<const D: usize>(
