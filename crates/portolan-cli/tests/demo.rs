@@ -1,5 +1,7 @@
 //! `demo` and `gallery`: the whole experiment, from the command line.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
+
 mod support;
 
 use std::path::Path;
@@ -181,7 +183,8 @@ fn demo_writes_everything_and_twice_the_same() {
 fn seeds_and_scans_are_the_callers() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let document = json(["demo", "--json", "--seed", "0x7", "--scans", "1", "--out", arg(&out)]);
+    let document =
+        json(["demo", "--json", "--no-ghost", "--seed", "0x7", "--scans", "1", "--out", arg(&out)]);
     assert_eq!((&document["input"]["seed"], &document["scans"]["fused"]), (&7.into(), &1.into()));
     assert!(fail(2, ["demo", "--scans", "0", "--out", arg(&out)]).contains("0"));
     assert!(fail(2, ["demo", "--seed", "tea", "--out", arg(&out)]).contains("whole number"));
