@@ -7,7 +7,7 @@ mod support;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use support::{arg, json, log_lines, map, portolan, range, room, succeed};
+use support::{arg, fail, json, log_lines, map, portolan, range, room, succeed};
 
 const FILES: [&str; 8] = [
     "contour.geojson",
@@ -193,6 +193,27 @@ fn info_tells_what_files_are() {
         let text = succeed(["info", arg(&out.join(name))]);
         assert!(text.lines().count() >= 2, "{text}");
     }
+}
+
+#[test]
+fn forgetting_is_asked_for_in_half_lives_too() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--half-life", "2"]);
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    // 1 / (2^(1/2) - 1) = 1 + sqrt(2).
+    let settings = &summary["settings"];
+    assert!((settings["w_max"].as_f64().unwrap() - (1.0 + 2f64.sqrt())).abs() < 1e-6);
+    assert!((settings["half_life"].as_f64().unwrap() - 2.0).abs() < 1e-6);
+    // The same number again agrees with the map's; another one does not.
+    let append = |n: &'static str| {
+        ["map", arg(&log), "--append", "--out", arg(&out), "--half-life", n].map(str::to_owned)
+    };
+    assert!(
+        succeed(append("2")).contains("W_max 2.41: half of a stale distance is left after 2.00 observations")
+    );
+    assert!(fail(1, append("3")).contains("--half-life"));
 }
 
 #[test]

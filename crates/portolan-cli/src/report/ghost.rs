@@ -87,11 +87,11 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
          behind one learns with <i>w</i> &lt; 1 (here {weight:.2} in the median), and the half-life grows about as \
          1/<i>w</i>.{gains}</li>\
          <li><b>Cells not yet clamped.</b> Their weight is below <i>W<sub>max</sub></i>, so the gain <i>w</i> / (<i>W</i> + <i>w</i>) \
-         is above the clamp's: they forget faster at first, and come to the predicted rate as they fill up. A cell that was \
-         seen {young:.0} times before the chair left has lost half of its error after {young_half:.0} more.</li>\
+         is above the clamp's: they forget faster at first, and come to the predicted rate as they fill up. A cell that \
+         had the weight of {young:.0} observations when the chair left has lost half of its error after {young_half:.0} more.</li>\
          <li><b>Cells that settle on something else.</b> The distance along a beam is not the distance to the nearest surface. \
          Near the chair's new place, and near walls seen at a slant, the estimate settles on a biased value: the error goes \
-         to a floor instead of zero, and where the floor is above one half it never halves.</li></ul>\
+         to a floor instead of zero, and if the floor is above one half it never halves.</li></ul>\
          <p><b>What forgetting costs.</b> A map that forgets never comes to rest: where nothing moves, its cells keep the standard \
          deviation σ / √(2 <i>W<sub>max</sub></i> + <i>w</i>). The last two columns are the same three maps in a world that stands \
          still. The measured noise lies above the prediction, more so for large clamps: lost beams make the mix of views differ from \

@@ -21,7 +21,7 @@ figure{margin:0}figure.wide{max-width:48rem;margin:1.2rem 0}figure.full{margin:1
 figcaption{font-size:.88rem;margin-top:.4em}figcaption b{color:var(--ink)}
 .command{font-size:.88rem}code{font:.92em ui-monospace,monospace;background:var(--soft);padding:.12em .4em;border-radius:3px;color:var(--ink)}
 .legend span{display:inline-block;margin-right:1.2em;white-space:nowrap;font-size:.9rem}.legend i{display:inline-block;width:1.1em;height:.75em;margin-right:.4em;border:1px solid var(--line);vertical-align:baseline}
-.warn{color:var(--warn)}
+.warn{color:var(--warn)}sub{line-height:0}
 ";
 
 /// The whole file.
