@@ -1,5 +1,4 @@
 //! `demo` and `gallery`: the whole experiment, from the command line.
-#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 #![allow(clippy::unwrap_used, reason = "helpers of tests are tests too")]
 
 mod support;
