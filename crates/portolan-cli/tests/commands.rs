@@ -381,3 +381,14 @@ fn a_subnormal_heading_is_a_heading() {
         succeed(["map", arg(&log), "--resolution", resolution, "--no-return", "50", "--out", arg(&out)]);
     }
 }
+
+/// Appending goes on with the maps that are there.
+#[test]
+fn append_makes_the_maps_of_the_file() {
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--maps", "tsdf"]);
+    let before = files_in(&out);
+    succeed(["map", arg(&log), "--append", "--out", arg(&out)]);
+    assert_eq!(files_in(&out), before);
+}

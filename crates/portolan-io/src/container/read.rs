@@ -4,7 +4,9 @@ use std::collections::HashSet;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{ContainerWriter, ENTRY, HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, VERSION, tag_of};
+use super::{
+    ContainerWriter, ENTRY, HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_of,
+};
 use crate::IoError;
 use crate::bytes::open_file;
 use crate::error::shown;
@@ -188,6 +190,10 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
     let mut chunks = Vec::new();
     let mut names = HashSet::new();
     let (mut at, mut position) = (index, HEADER);
+    if count as usize > MOST_CHUNKS {
+        let advice = "a container has at most 2^20 chunks: the file is damaged";
+        return Err(IoError::binary(path, 12, "the number of chunks", count.to_string(), advice));
+    }
     for _ in 0..count {
         let bad = |offset: usize, field: &str, value: String, advice: &str| {
             Err(IoError::binary(path, (at + offset) as u64, field, value, advice))

@@ -175,7 +175,7 @@ mod tests {
     use super::*;
     use crate::cell::{DistanceObservation, Evidence};
     use crate::geom::block_cells;
-    use crate::scan::RangeLimits;
+    use crate::scan::{Beam, BeamKind, RangeLimits};
     use proptest::prelude::*;
     use std::collections::HashMap;
 
@@ -291,6 +291,37 @@ mod tests {
             let surplus = said.keys().filter(|c| !want.contains_key(*c)).count();
             prop_assert!(surplus * 50 <= said.len() + 50, "{surplus} of {}", said.len());
         }
+    }
+
+    /// What each kind of beam says to the cells of a fan: half a turn of beams of one kind.
+    #[test]
+    fn what_each_kind_of_beam_says() {
+        let bearings: Vec<f64> = (0..181).map(|d| f64::from(d - 90).to_radians()).collect();
+        let directions: Vec<[f64; 2]> = bearings.iter().map(|b| [b.cos(), b.sin()]).collect();
+        let said_by = |kind, carve_weight| {
+            let beams = directions.iter().map(|&direction| Beam { direction, range: 2.0, kind }).collect();
+            let scan = Scan::from_fan(&bearings, beams);
+            let mut sweep = CellCentre::new(0.15, carve_weight, WeightModel::Constant);
+            let pose = Pose::<2>::new(0.0, 0.0, 0.0);
+            sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.05), &Aabb::new([-4.0; 2], [4.0; 2]));
+            said(&sweep)
+        };
+        let cells = |area: f64| (area / 0.05f64.powi(2)) as usize;
+        let half_disc = |radius: f64| 0.5 * std::f64::consts::PI * radius * radius;
+        let hit = said_by(BeamKind::Hit, 1.0);
+        assert!(hit.values().any(|o| o.distance < 0.0));
+        assert!(hit.len().abs_diff(cells(half_disc(2.15))) < cells(0.2));
+        // Free up to the range less the truncation, never a surface; with the weight that free space has.
+        for kind in [BeamKind::MaxRange, BeamKind::NoReturn] {
+            let free = said_by(kind, 0.3);
+            assert!(free.values().all(|o| o.distance == 0.15 && o.weight == 0.3), "{kind:?}");
+            assert!(free.len().abs_diff(cells(half_disc(1.85))) < cells(0.2), "{kind:?}: {}", free.len());
+            assert!(said_by(kind, 0.0).is_empty(), "{kind:?}");
+        }
+        for kind in [BeamKind::Dropped, BeamKind::SelfHit] {
+            assert!(said_by(kind, 1.0).is_empty(), "{kind:?}");
+        }
+        assert!(said_by(BeamKind::Hit, 0.0).values().all(|o| o.distance.abs() <= 0.15 && o.weight > 0.0));
     }
 
     fn unordered_cells_take_the_nearest_beam<const D: usize>() {
