@@ -111,7 +111,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 impl Args {
-    /// As `map` would have them.
+    /// As `demo` has them: free space weighs as much as a surface, as in the chapter (`map` gives it less).
     fn settings(&self) -> Settings {
         Settings {
             resolution: self.resolution,

@@ -78,11 +78,12 @@ impl<const D: usize> OccupancyGrid<D> {
 
     /// Distance from a point to the centre of the nearest occupied cell (metres), found by **searching** ring
     /// by ring up to `limit` metres: the cost grows with the square (in space the cube) of the distance, which
-    /// is why this is not called `distance`. `None` where no occupied cell is within the limit.
+    /// is why this is not called `distance`. `None` where no occupied cell is within the limit, and outside of the grid.
     pub fn search_distance_by_rings(&self, p_world: impl Into<[f64; D]>, limit: f64) -> Option<f64> {
         let p = p_world.into();
         let lattice = &self.store.grid().lattice;
         let centre = lattice.cell_of(p)?;
+        self.store.grid().index(centre)?;
         // Beyond the farthest cell of the grid there is nothing to find.
         let farthest =
             (0..D).map(|k| centre[k].abs().max((self.store.grid().shape[k] as i32 - centre[k]).abs()));
@@ -223,6 +224,7 @@ mod tests {
         let d = map.search_distance_by_rings(at(2.05), 5.0).unwrap();
         assert!((d - 1.0).abs() < 1e-9);
         assert_eq!(map.search_distance_by_rings(at(2.05), 0.9), None);
+        assert_eq!(map.search_distance_by_rings(at(1e6), f64::INFINITY), None);
         assert_eq!(map.abilities(), Abilities { occupancy: true, distance: false });
 
         let tilted = Pose { rotation: [[0.5; D]; D], translation: [1.0; D] };

@@ -4,9 +4,7 @@ use super::error::check_grid;
 use super::integrate::integrate_watched;
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
-use crate::cell::{
-    Cell, DistanceObservation, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
-};
+use crate::cell::{Cell, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule};
 use crate::geom::{Aabb, BlockKey, Grid, Pose, block_cells};
 use crate::scan::{Scan, ScanStats};
 use crate::store::{Dense, Store};
@@ -220,11 +218,6 @@ impl<const D: usize> Tsdf<D> {
     /// [`Cell::fuse`] from the same evidence, so that it is what happened. In the order of blocks.
     pub fn events(&self) -> &[([i32; D], FusionEvent)] {
         &self.watched.events
-    }
-
-    /// What the filter of a cell would do with an observation, without doing it; for inspectors.
-    pub fn preview(&self, cell: [i32; D], observation: DistanceObservation) -> FusionEvent {
-        SignedDistance::fuse(self.store.cell(cell), observation, &self.rule).1
     }
 
     /// The estimate of the cell that holds a point; saturated at the truncation, where the field is a constant.

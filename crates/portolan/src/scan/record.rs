@@ -129,11 +129,6 @@ impl<const D: usize> Scan<D> {
         (0..self.len()).map(|i| self.beam(i))
     }
 
-    /// Unit vectors in the sensor's frame, one per beam.
-    pub fn directions(&self) -> &[[f64; D]] {
-        &self.directions
-    }
-
     /// What is known about which beams are neighbours.
     pub fn order(&self) -> BeamOrder {
         self.order
