@@ -1,7 +1,7 @@
 //! Occupancy as clamped log odds, in a byte or in an `f32`.
 
 use super::model::logit;
-use super::{Cell, Endpoint, HitMiss, OccupancyModel, OccupancyModelError, Planes};
+use super::{Cell, Endpoint, HitMiss, LogOddsBrick, OccupancyModel, OccupancyModelError, Planes};
 
 /// The clamped log-odds filter: `l <- clamp(l + delta, min, max)`
 /// (Moravec & Elfes 1985; the clamp: Yguel et al. 2007, Hornung et al. 2013).
@@ -105,7 +105,9 @@ pub struct LogOdds8(pub i8);
 pub struct LogOdds32(pub f32);
 
 /// What the two log-odds cells share; lets trees hold either.
-pub trait LogOddsValue: Cell<Planes = Vec<Self>, Evidence = HitMiss> + PartialOrd {
+pub trait LogOddsValue:
+    Cell<Planes = Vec<Self>, Brick = LogOddsBrick<Self>, Evidence = HitMiss> + PartialOrd
+{
     /// Marks a cell that was never observed. Not a value.
     const UNOBSERVED: Self;
 
@@ -189,6 +191,7 @@ macro_rules! log_odds_cell {
         impl Cell for $cell {
             type Rule = LogOddsRule<$scalar>;
             type Planes = Vec<Self>;
+            type Brick = LogOddsBrick<Self>;
             type Evidence = HitMiss;
             type Event = LogOddsEvent<$scalar>;
 
@@ -208,7 +211,19 @@ macro_rules! log_odds_cell {
                 len: usize,
                 rule: &Self::Rule,
             ) {
-                for (row, cells) in planes[start..start + len].chunks_mut(8).enumerate() {
+                Self::fuse_cells(&mut planes[start..start + len], evidence, from, rule);
+            }
+
+            #[inline]
+            fn fuse_brick(brick: &mut LogOddsBrick<Self>, evidence: &HitMiss, rule: &Self::Rule) {
+                Self::fuse_cells(brick.cells_mut(), evidence, 0, rule);
+            }
+        }
+
+        impl $cell {
+            #[inline(always)]
+            fn fuse_cells(cells: &mut [Self], evidence: &HitMiss, from: usize, rule: &LogOddsRule<$scalar>) {
+                for (row, cells) in cells.chunks_mut(8).enumerate() {
                     let (hit, miss) = evidence.row(from + 8 * row);
                     if hit | miss == 0 {
                         continue;

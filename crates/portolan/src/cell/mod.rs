@@ -4,12 +4,16 @@
 //! time; [`Cell::fuse_run`] is the same filter over a run of neighbouring cells, equal to the last bit, and
 //! what the stores call.
 
+mod brick;
+mod color;
 mod distances;
 mod hit_miss;
 mod log_odds;
 mod model;
 mod signed_distance;
 
+pub use brick::{DistanceBrick, LogOddsBrick};
+pub use color::{Color, ColorBrick, ColorObservation, ColorRule, Colors};
 pub use distances::{DistanceObservation, Distances};
 pub use hit_miss::{Endpoint, HitMiss};
 pub use log_odds::{LogOdds8, LogOdds32, LogOddsEvent, LogOddsRule, LogOddsValue, ProbabilityTable};
@@ -63,6 +67,8 @@ pub trait Cell: Copy + PartialEq + std::fmt::Debug + Send + Sync {
     type Rule: Sync;
     /// Many cells.
     type Planes: Planes<Self>;
+    /// The cells of one brick, shared between snapshots until changed.
+    type Brick: Planes<Self>;
     /// One scan's evidence about a block.
     type Evidence: Evidence;
     /// What one step of the filter did.
@@ -84,4 +90,7 @@ pub trait Cell: Copy + PartialEq + std::fmt::Debug + Send + Sync {
         len: usize,
         rule: &Self::Rule,
     );
+
+    /// [`Cell::fuse`] over a whole brick: the same bits. `evidence` is that of a block.
+    fn fuse_brick(brick: &mut Self::Brick, evidence: &Self::Evidence, rule: &Self::Rule);
 }

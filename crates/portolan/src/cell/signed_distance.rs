@@ -1,6 +1,6 @@
 //! Truncated signed distance: a scalar information filter per cell.
 
-use super::{Cell, DistanceObservation, Distances, Planes};
+use super::{Cell, DistanceBrick, DistanceObservation, Distances, Planes};
 
 /// Settings of the fusion filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,6 +155,7 @@ impl Planes<SignedDistance> for DistancePlanes {
 impl Cell for SignedDistance {
     type Rule = TsdfRule;
     type Planes = DistancePlanes;
+    type Brick = DistanceBrick;
     type Evidence = Distances;
     type Event = FusionEvent;
 
@@ -174,29 +175,43 @@ impl Cell for SignedDistance {
         len: usize,
         rule: &TsdfRule,
     ) {
-        let distance = &mut planes.distance[start..start + len];
-        let weight = &mut planes.weight[start..start + len];
-        let observed = &evidence.distances()[from..from + len];
-        let gained = &evidence.weights()[from..from + len];
-        // Rows of blocks inside a map are eight long: the fixed length lets the compiler use whole vectors.
-        if len.is_multiple_of(8) {
-            let rows = distance.chunks_exact_mut(8).zip(weight.chunks_exact_mut(8));
-            for ((d, w), (o, g)) in rows.zip(observed.chunks_exact(8).zip(gained.chunks_exact(8))) {
-                // Near surfaces most rows of a block say nothing.
-                if g.iter().fold(0.0, |most: f32, &g| most.max(g)) <= 0.0 {
-                    continue;
-                }
-                if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into())
-                {
-                    fuse_lanes::<8>(d, w, o, g, rule);
-                }
+        fuse_slices(
+            (&mut planes.distance[start..start + len], &mut planes.weight[start..start + len]),
+            (&evidence.distances()[from..from + len], &evidence.weights()[from..from + len]),
+            rule,
+        );
+    }
+
+    #[inline]
+    fn fuse_brick(brick: &mut DistanceBrick, evidence: &Distances, rule: &TsdfRule) {
+        fuse_slices(brick.planes_mut(), (evidence.distances(), evidence.weights()), rule);
+    }
+}
+
+/// The filter over slices of the same length: states against observations.
+#[inline(always)]
+fn fuse_slices(
+    (distance, weight): (&mut [f32], &mut [f32]),
+    (observed, gained): (&[f32], &[f32]),
+    rule: &TsdfRule,
+) {
+    // Rows of blocks inside a map are eight long: the fixed length lets the compiler use whole vectors.
+    if distance.len().is_multiple_of(8) {
+        let rows = distance.chunks_exact_mut(8).zip(weight.chunks_exact_mut(8));
+        for ((d, w), (o, g)) in rows.zip(observed.chunks_exact(8).zip(gained.chunks_exact(8))) {
+            // Near surfaces most rows of a block say nothing.
+            if g.iter().fold(0.0, |most: f32, &g| most.max(g)) <= 0.0 {
+                continue;
             }
-        } else {
-            for i in 0..len {
-                let (mut d, mut w) = ([distance[i]], [weight[i]]);
-                fuse_lanes::<1>(&mut d, &mut w, &[observed[i]], &[gained[i]], rule);
-                (distance[i], weight[i]) = (d[0], w[0]);
+            if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into()) {
+                fuse_lanes::<8>(d, w, o, g, rule);
             }
+        }
+    } else {
+        for i in 0..distance.len() {
+            let (mut d, mut w) = ([distance[i]], [weight[i]]);
+            fuse_lanes::<1>(&mut d, &mut w, &[observed[i]], &[gained[i]], rule);
+            (distance[i], weight[i]) = (d[0], w[0]);
         }
     }
 }

@@ -10,7 +10,7 @@ pub const fn block_cells<const D: usize>() -> usize {
 
 /// Index of a block: cell index divided by eight, rounded down. Ordered along the last axis first, so
 /// that sorted keys run through memory in the order of a dense array.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockKey<const D: usize>(pub [i32; D]);
 
 impl<const D: usize> BlockKey<D> {
@@ -40,6 +40,18 @@ impl<const D: usize> BlockKey<D> {
     #[inline(always)]
     pub fn cell(self, i: usize) -> [i32; D] {
         std::array::from_fn(|k| (self.0[k] << 3) + ((i >> (3 * k)) & 7) as i32)
+    }
+}
+
+/// One word for the hasher, where the derived implementation writes a length and every index by itself.
+impl<const D: usize> std::hash::Hash for BlockKey<D> {
+    #[inline(always)]
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        let mut word = 0u64;
+        for k in 0..D {
+            word = word.rotate_left(21) ^ u64::from(self.0[k] as u32);
+        }
+        state.write_u64(word);
     }
 }
 

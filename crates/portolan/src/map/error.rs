@@ -2,6 +2,7 @@
 
 use crate::cell::{OccupancyModelError, TsdfRuleError};
 use crate::geom::Grid;
+use crate::store::BricksFull;
 
 /// What is wrong with a map's settings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -27,6 +28,9 @@ pub enum MapError {
     /// The weight of free space is not between 0 and 1.
     #[error("carve_weight must be above 0 and at most 1, got {0}")]
     CarveWeight(f32),
+    /// Bricks would need more memory than they may have.
+    #[error(transparent)]
+    Full(#[from] BricksFull),
     /// The occupancy model is not valid.
     #[error(transparent)]
     Model(#[from] OccupancyModelError),

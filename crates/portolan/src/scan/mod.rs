@@ -13,6 +13,8 @@
 mod beam;
 mod incidence;
 mod laser;
+mod point_scan;
+mod range_image;
 mod record;
 mod stats;
 
@@ -20,5 +22,7 @@ pub use beam::{Beam, BeamKind};
 pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, connected};
 pub use laser::RangeLimits;
+pub use point_scan::{Frame, Origin, PointScan};
+pub use range_image::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
 pub use record::{BeamOrder, Scan};
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};

@@ -1,11 +1,13 @@
 //! Where cells live. A store takes a block's evidence in and knows nothing of sensors.
 
 mod arena;
+mod bricks;
 mod dense;
 mod tree;
 mod tree_build;
 mod tree_records;
 
+pub use bricks::{Bricks, BricksFull};
 pub use dense::Dense;
 pub use tree::{Leaf, Tree};
 pub use tree_records::{TreeRecords, TreeRecordsError};

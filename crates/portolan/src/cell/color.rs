@@ -1,0 +1,185 @@
+//! Colour beside distance: a weighted mean per channel.
+
+use super::brick::ARC_HEADER;
+use super::{Cell, Evidence, Planes};
+use std::sync::Arc;
+
+/// An estimated colour. 16 bits a channel: with 8, a mean of many scans no longer moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Color {
+    /// Red, green, blue; 65535 is full.
+    pub rgb: [u16; 3],
+    /// Accumulated weight in units of 1/256, up to the rule's limit. Positive.
+    pub weight: u16,
+}
+
+impl Color {
+    /// The colour in bytes, rounded.
+    pub fn rgb8(self) -> [u8; 3] {
+        self.rgb.map(|v| ((u32::from(v) + 128) / 257) as u8)
+    }
+}
+
+/// Settings of the colour filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColorRule {
+    /// Clamp of the weight, at most 255.
+    pub w_max: f32,
+}
+
+/// One scan's colour of one cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColorObservation {
+    /// Red, green, blue in bytes.
+    pub rgb: [u8; 3],
+    /// Weight. Positive.
+    pub weight: f32,
+}
+
+/// Colours of a block; weight 0: nothing is said about the cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Colors {
+    rgb: Box<[[u8; 3]]>,
+    weight: Box<[f32]>,
+}
+
+impl Colors {
+    /// Sets the observation of cell `i`.
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, o: ColorObservation) {
+        self.rgb[i] = o.rgb;
+        self.weight[i] = o.weight;
+    }
+}
+
+impl Evidence for Colors {
+    type One = ColorObservation;
+
+    fn silent(cells: usize) -> Self {
+        Self { rgb: vec![[0; 3]; cells].into(), weight: vec![0.0; cells].into() }
+    }
+
+    fn clear(&mut self) {
+        self.weight.fill(0.0);
+    }
+
+    #[inline(always)]
+    fn one(&self, i: usize) -> Option<ColorObservation> {
+        let weight = self.weight[i];
+        (weight > 0.0).then(|| ColorObservation { rgb: self.rgb[i], weight })
+    }
+
+    fn observed(&self) -> usize {
+        self.weight.iter().map(|&w| u32::from(w > 0.0)).sum::<u32>() as usize
+    }
+}
+
+/// Colours of a brick's cells: four words each, red, green, blue, weight; weight 0: never observed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColorBrick(Arc<[[u16; 4]]>);
+
+impl ColorBrick {
+    /// A brick from its words, x fastest.
+    pub fn from_words(words: &[[u16; 4]]) -> Self {
+        Self(words.into())
+    }
+
+    /// Red, green, blue, weight of every cell.
+    pub fn words(&self) -> &[[u16; 4]] {
+        &self.0
+    }
+}
+
+impl Planes<Color> for ColorBrick {
+    fn unobserved(n: usize) -> Self {
+        Self(std::iter::repeat_n([0; 4], n).collect())
+    }
+
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    fn get(&self, i: usize) -> Option<Color> {
+        let [r, g, b, weight] = self.0[i];
+        (weight > 0).then_some(Color { rgb: [r, g, b], weight })
+    }
+
+    fn set(&mut self, i: usize, cell: Option<Color>) {
+        Arc::make_mut(&mut self.0)[i] = cell.map_or([0; 4], |c| [c.rgb[0], c.rgb[1], c.rgb[2], c.weight]);
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&*self.0) + ARC_HEADER
+    }
+}
+
+impl Cell for Color {
+    type Rule = ColorRule;
+    type Planes = ColorBrick;
+    type Brick = ColorBrick;
+    type Evidence = Colors;
+    type Event = ();
+
+    /// The weighted mean, as of a distance: `K = w / (W + w)`, `C <- C + K (c - C)`, `W <- min(W + w, W_max)`, in words
+    /// of 16 bits, rounded to nearest.
+    #[inline]
+    fn fuse(cell: Option<Self>, o: ColorObservation, rule: &ColorRule) -> (Self, ()) {
+        let (before, weight) = cell.map_or(([0; 3], 0.0), |c| (c.rgb, f32::from(c.weight) / 256.0));
+        let total = weight + o.weight;
+        let gain = o.weight / total;
+        let rgb = std::array::from_fn(|k| {
+            let (prior, seen) = (f32::from(before[k]), f32::from(o.rgb[k]) * 257.0);
+            (prior + gain * (seen - prior)).round() as u16
+        });
+        let kept = total.min(rule.w_max).min(255.0) * 256.0;
+        (Self { rgb, weight: (kept.round() as u16).max(1) }, ())
+    }
+
+    fn fuse_run(
+        planes: &mut ColorBrick,
+        start: usize,
+        evidence: &Colors,
+        from: usize,
+        len: usize,
+        rule: &ColorRule,
+    ) {
+        for i in 0..len {
+            if let Some(o) = evidence.one(from + i) {
+                let fused = Self::fuse(planes.get(start + i), o, rule).0;
+                planes.set(start + i, Some(fused));
+            }
+        }
+    }
+
+    fn fuse_brick(brick: &mut ColorBrick, evidence: &Colors, rule: &ColorRule) {
+        let cells = brick.len();
+        Self::fuse_run(brick, 0, evidence, 0, cells, rule);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_of_many_scans_still_moves() {
+        let rule = ColorRule { w_max: 64.0 };
+        let mut cell = None;
+        for _ in 0..200 {
+            cell = Some(Color::fuse(cell, ColorObservation { rgb: [200, 10, 0], weight: 1.0 }, &rule).0);
+        }
+        assert_eq!(cell.map(Color::rgb8), Some([200, 10, 0]));
+        for _ in 0..2000 {
+            cell = Some(Color::fuse(cell, ColorObservation { rgb: [100, 10, 255], weight: 1.0 }, &rule).0);
+        }
+        assert_eq!(cell.map(Color::rgb8), Some([100, 10, 255]));
+    }
+
+    #[test]
+    fn small_weights_count() {
+        let rule = ColorRule { w_max: 64.0 };
+        let (first, ()) = Color::fuse(None, ColorObservation { rgb: [50; 3], weight: 1e-4 }, &rule);
+        assert!(first.weight > 0 && first.rgb8() == [50; 3]);
+    }
+}

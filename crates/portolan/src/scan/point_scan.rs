@@ -1,0 +1,110 @@
+//! Scans of space as end points: what a lidar's driver delivers.
+
+use super::{RangeImage, RefusedBeams};
+
+/// Where the rays of a [`PointScan`] begin, in the frame of its points.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Origin {
+    /// All in one point (metres).
+    Common([f64; 3]),
+    /// Each in its own point (metres): a sensor that moved while it scanned, or parallel rays.
+    PerPoint(Vec<[f32; 3]>),
+}
+
+/// End points of rays in one frame, as `f32`, which is what sensors deliver.
+///
+/// The frame is the sensor's or any other that is near (for points in the world's frame give the identity as the pose and
+/// the sensor's position as the origin): far from its zero an `f32` loses millimetres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointScan {
+    /// Where rays begin.
+    pub origin: Origin,
+    /// Surfaces (metres).
+    pub points: Vec<[f32; 3]>,
+    /// Ends of rays that met no surface up to there (metres); their origin is the common one.
+    pub free_ends: Vec<[f32; 3]>,
+    /// Seconds since the scan began, one per point, if the sensor tells. Empty: it does not.
+    pub times: Vec<f32>,
+    /// Red, green, blue, one per point, if the sensor sees colour. Empty: it does not.
+    pub colors: Vec<[u8; 3]>,
+    /// The same readings as rows and columns, where they have them.
+    pub image: Option<RangeImage>,
+    /// Readings that were refused when the scan was built, by cause.
+    pub refused: RefusedBeams,
+}
+
+impl PointScan {
+    /// A scan of points about a common origin, both in one frame. Points that are not finite, or that lie on the
+    /// origin itself, are refused and counted.
+    pub fn new(points: impl IntoIterator<Item = [f32; 3]>, origin: [f64; 3]) -> Self {
+        let mut refused = RefusedBeams::default();
+        let mut kept = Vec::new();
+        for p in points {
+            if !p.iter().all(|v| v.is_finite()) {
+                refused.not_finite += 1;
+            } else if (0..3).all(|k| f64::from(p[k]) == origin[k]) {
+                refused.too_near += 1;
+            } else {
+                kept.push(p);
+            }
+        }
+        Self {
+            origin: Origin::Common(origin),
+            points: kept,
+            free_ends: Vec::new(),
+            times: Vec::new(),
+            colors: Vec::new(),
+            image: None,
+            refused,
+        }
+    }
+
+    /// The origin of point `i`.
+    #[inline(always)]
+    pub fn origin_of(&self, i: usize) -> [f64; 3] {
+        match &self.origin {
+            Origin::Common(o) => *o,
+            Origin::PerPoint(all) => all[i].map(f64::from),
+        }
+    }
+}
+
+/// One scan of space, in its own form.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Frame {
+    /// Rows and columns only: a depth camera, a range scanner.
+    Image(RangeImage),
+    /// End points, perhaps with rows and columns beside them.
+    Points(PointScan),
+}
+
+impl Frame {
+    /// Number of surfaces.
+    pub fn hits(&self) -> usize {
+        match self {
+            Self::Image(image) => image.hits(),
+            Self::Points(scan) => scan.points.len(),
+        }
+    }
+
+    /// Readings that were refused when the scan was built, by cause.
+    pub fn refused(&self) -> RefusedBeams {
+        match self {
+            Self::Image(image) => image.refused,
+            Self::Points(scan) => scan.refused,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_a_point_is_counted() {
+        let scan = PointScan::new([[1.0, 2.0, 3.0], [f32::NAN, 0.0, 0.0], [0.5, 0.0, 0.0]], [0.5, 0.0, 0.0]);
+        assert_eq!(scan.points, [[1.0, 2.0, 3.0]]);
+        assert_eq!((scan.refused.not_finite, scan.refused.too_near), (1, 1));
+        assert_eq!(Frame::Points(scan).hits(), 1);
+    }
+}
