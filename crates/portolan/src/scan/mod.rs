@@ -11,6 +11,7 @@
 //! | [`BeamKind::SelfHit`] | the robot's own body | no | never |
 
 mod beam;
+mod frame_filter;
 mod incidence;
 mod laser;
 mod point_scan;
@@ -19,6 +20,7 @@ mod record;
 mod stats;
 
 pub use beam::{Beam, BeamKind};
+pub use frame_filter::{Body, FrameFilter};
 pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, connected};
 pub use laser::RangeLimits;
