@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | CARMEN log (plain, gzip, bzip2) | [`CarmenLog`], [`detect_no_return`] | |
 //! | pose files (`x y theta`, `t x y theta`, TUM) | [`read_poses_2d`] | |
-//! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
+//! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
@@ -45,7 +45,10 @@ pub use detect::{FileKind, detect};
 pub use error::IoError;
 pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
 pub use geojson::{parse_geojson, read_geojson, write_geojson};
-pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
+pub use map_file::{
+    AnyMapFile, ColorBricks, MapFile, MapHeader, OccupancyBricks, SpaceMapFile, TsdfBricks, sweep_of,
+    sweep_word, weights_of, weights_word,
+};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use pgm::Pgm;
 pub use points_csv::{AnswerRow, AnswerStatus, QueryPoints, write_answer, write_answer_header};

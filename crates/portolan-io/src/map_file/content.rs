@@ -1,12 +1,12 @@
-//! What a `map.portolan` holds.
+//! What a `map.portolan` of the plane holds.
 
 use portolan::geom::Pose;
 use portolan::map::{OccupancyGrid, Quadtree, Tsdf};
 use serde_json::Value;
 
-use super::MapHeader;
+use super::{MapHeader, UnknownChunk};
 
-/// The content of a `map.portolan`.
+/// The content of a `map.portolan` of the plane.
 #[derive(Clone, Debug, Default)]
 pub struct MapFile {
     /// What the writer says about it.
@@ -21,13 +21,6 @@ pub struct MapFile {
     pub poses: Vec<Pose<2>>,
     pub(super) unknown_maps: Vec<Value>,
     pub(super) unknown_chunks: Vec<UnknownChunk>,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct UnknownChunk {
-    pub(super) tag: String,
-    pub(super) name: String,
-    pub(super) content: Vec<u8>,
 }
 
 #[cfg(test)]

@@ -1,15 +1,11 @@
-//! Writing a `map.portolan`.
+//! Writing a `map.portolan` of the plane.
 
 use std::path::Path;
 
-use serde_json::{Value, json};
-
 use super::header::{Entry, LOG_ODDS, Model, Place, SIGNED_DISTANCE};
-use super::{MapFile, VERSION, part_name, sweep_word, weights_word};
+use super::writing::{begin, finish, floats_to_bytes, write_plane};
+use super::{MapFile, sweep_word, weights_word};
 use crate::{ContainerWriter, IoError};
-
-/// A plane is cut into chunks of this many bytes.
-const CHUNK: usize = 1 << 30;
 
 impl MapFile {
     /// Writes the file. The same maps make the same bytes.
@@ -29,8 +25,7 @@ impl MapFile {
     }
 
     fn writer(&self) -> Result<ContainerWriter, IoError> {
-        let mut writer = ContainerWriter::new();
-        writer.chunk("HEAD", "", self.header_json()?.as_bytes())?;
+        let mut writer = begin(&self.header, 2, self.entries(), &self.unknown_maps)?;
         if let Some(grid) = &self.grid {
             let plane: Vec<u8> = grid.store().planes().iter().map(|v| v.0 as u8).collect();
             write_plane(&mut writer, "GRID", "occupancy", &plane)?;
@@ -47,34 +42,8 @@ impl MapFile {
             write_plane(&mut writer, "TSDF", "distance", &floats_to_bytes(planes.distances()))?;
             write_plane(&mut writer, "TSDF", "weight", &floats_to_bytes(planes.weights()))?;
         }
-        if !self.poses.is_empty() {
-            let numbers = self.poses.iter().flat_map(|p| {
-                let [[a, b], [c, d]] = p.rotation;
-                [a, b, c, d, p.translation[0], p.translation[1]]
-            });
-            let content: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
-            write_plane(&mut writer, "POSES", "sensor", &content)?;
-        }
-        for chunk in &self.unknown_chunks {
-            writer.chunk(&chunk.tag, &chunk.name, &chunk.content)?;
-        }
+        finish(&mut writer, &self.poses, &self.unknown_chunks)?;
         Ok(writer)
-    }
-
-    fn header_json(&self) -> Result<String, IoError> {
-        let failed = |e: serde_json::Error| {
-            IoError::unwritable("map.portolan".as_ref(), "the header", e.to_string(), "give finite numbers")
-        };
-        let mut maps = Vec::new();
-        for entry in self.entries() {
-            maps.push(serde_json::to_value(entry).map_err(failed)?);
-        }
-        maps.extend(self.unknown_maps.iter().cloned());
-        let mut header = serde_json::to_value(&self.header).map_err(failed)?;
-        header["version"] = json!(VERSION);
-        header["dimension"] = json!(2);
-        header["maps"] = Value::Array(maps);
-        serde_json::to_string(&header).map_err(failed)
     }
 
     fn entries(&self) -> Vec<Entry> {
@@ -113,15 +82,4 @@ impl MapFile {
         }
         entries
     }
-}
-
-fn floats_to_bytes(values: &[f32]) -> Vec<u8> {
-    values.iter().flat_map(|v| v.to_le_bytes()).collect()
-}
-
-fn write_plane(writer: &mut ContainerWriter, tag: &str, name: &str, bytes: &[u8]) -> Result<(), IoError> {
-    if bytes.is_empty() {
-        return writer.chunk(tag, name, bytes);
-    }
-    bytes.chunks(CHUNK).enumerate().try_for_each(|(i, part)| writer.chunk(tag, &part_name(name, i), part))
 }
