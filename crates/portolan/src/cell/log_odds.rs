@@ -117,6 +117,9 @@ pub trait LogOddsValue:
     /// P(occupied) of a value.
     fn probability(self, rule: &Self::Rule) -> f64;
 
+    /// The value as a number, in units of the rule's quantum; meaningless for the mark of a never-observed cell.
+    fn units(self) -> f64;
+
     /// The same value, bit for bit, marks included.
     fn same(self, other: Self) -> bool;
 }
@@ -137,6 +140,11 @@ impl LogOddsValue for LogOdds8 {
     }
 
     #[inline(always)]
+    fn units(self) -> f64 {
+        f64::from(self.0)
+    }
+
+    #[inline(always)]
     fn same(self, other: Self) -> bool {
         self.0 == other.0
     }
@@ -153,6 +161,11 @@ impl LogOddsValue for LogOdds32 {
     #[inline(always)]
     fn probability(self, _: &LogOddsRule<f32>) -> f64 {
         1.0 / (1.0 + (-f64::from(self.0)).exp())
+    }
+
+    #[inline(always)]
+    fn units(self) -> f64 {
+        f64::from(self.0)
     }
 
     #[inline(always)]
