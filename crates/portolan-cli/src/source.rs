@@ -3,16 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
 use portolan_io::{
-    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, Pgm, Polyline, detect, read_geojson,
+    AnyMapFile, CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, Pgm, Polyline, SpaceMapFile, detect,
+    read_geojson,
 };
 
 use crate::log::describe;
 
 /// What a file holds.
 pub(crate) enum Source {
-    /// `map.portolan`
+    /// `map.portolan` of the plane
     Map(Box<MapFile>),
+    /// `map.portolan` of space
+    SpaceMap(Box<SpaceMapFile>),
     /// `esdf.bin`
     Esdf(EsdfFile),
     /// A map_server map
@@ -23,13 +27,15 @@ pub(crate) enum Source {
     Contour(Vec<Polyline>),
     /// A log
     Log(Box<CarmenLog>),
+    /// A log of scans of space
+    SpaceLog(Box<SpaceLog>),
 }
 
 /// Opens a file or a folder.
 pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
     Ok(match detect(path)? {
-        FileKind::Portolan => Source::Map(Box::new(MapFile::read(path)?)),
-        FileKind::PortolanFolder => Source::Map(Box::new(MapFile::read(path.join("map.portolan"))?)),
+        FileKind::Portolan => of_map(AnyMapFile::read(path)?),
+        FileKind::PortolanFolder => of_map(AnyMapFile::read(path.join("map.portolan"))?),
         FileKind::EsdfBin => Source::Esdf(EsdfFile::read(path)?),
         FileKind::MapServerYaml => Source::Server(MapServerMap::read(path)?),
         FileKind::Pgm => match yaml_beside(path) {
@@ -38,12 +44,22 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         },
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
         FileKind::CarmenLog => Source::Log(Box::new(CarmenLog::read(path)?)),
+        FileKind::SpaceLog(_) => {
+            Source::SpaceLog(Box::new(SpaceLog::open(path, &SpaceLogOptions::default())?))
+        }
         FileKind::Unknown(what) => bail!("{}: not recognised: {what}", path.display()),
         kind => bail!("{}: is {}, which is not read yet", path.display(), describe(&kind)),
     })
 }
 
-/// Opens a map made by `map`; `what` is to be done with it.
+fn of_map(file: AnyMapFile) -> Source {
+    match file {
+        AnyMapFile::Plane(file) => Source::Map(file),
+        AnyMapFile::Space(file) => Source::SpaceMap(file),
+    }
+}
+
+/// Opens a map of the plane made by `map`; `what` is to be done with it.
 pub(crate) fn open_map(path: &Path, what: &str) -> anyhow::Result<MapFile> {
     match open(path)? {
         Source::Map(file) => Ok(*file),
@@ -75,11 +91,13 @@ impl Source {
     pub(crate) fn describe(&self) -> &'static str {
         match self {
             Self::Map(_) => "a portolan map",
+            Self::SpaceMap(_) => "a portolan map of space",
             Self::Esdf(_) => "a distance field (esdf.bin)",
             Self::Server(_) => "a map_server map",
             Self::Image(_) => "a PGM image without its yaml file",
             Self::Contour(_) => "a contour (GeoJSON)",
             Self::Log(_) => "a CARMEN log",
+            Self::SpaceLog(log) => log.kind().label(),
         }
     }
 }

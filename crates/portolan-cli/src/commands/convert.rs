@@ -102,7 +102,8 @@ fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
         Source::Esdf(EsdfFile::Three(_)) => "nothing yet: it is in space",
         Source::Contour(_) => ".geojson or .svg",
         Source::Image(_) => "nothing without its yaml file",
-        Source::Log(_) => "nothing here: `portolan map` makes maps of logs",
+        Source::SpaceMap(_) => ".portolan",
+        Source::Log(_) | Source::SpaceLog(_) => "nothing here: `portolan map` makes maps of logs",
     };
     let (input, out) = (args.input.display(), args.out.display());
     anyhow::anyhow!("{input}: {} cannot become {out}; it can become {possible}", source.describe())

@@ -14,6 +14,8 @@ use crate::log::{describe, path_length};
 use crate::output::Output;
 use crate::source::{Source, open};
 
+mod space;
+
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan info intel.log.gz")]
 pub(crate) struct Args {
@@ -83,6 +85,8 @@ fn about(source: &Source) -> Value {
         }),
         Source::Contour(contour) => of_contour(contour),
         Source::Log(log) => of_log(log),
+        Source::SpaceMap(file) => space::of_map(file),
+        Source::SpaceLog(log) => space::of_log(log),
     }
 }
 
