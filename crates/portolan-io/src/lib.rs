@@ -9,6 +9,8 @@
 //! | KITTI velodyne `.bin` | [`read_kitti_bin`] | [`write_kitti_bin`] |
 //! | XYZ, CSV, PTS | [`read_xyz`] | |
 //! | OctoMap scan graph | [`read_scan_graph`] | |
+//! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
+//! | logs of scans of space with poses | [`space_log::SpaceLog`] | |
 //! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
@@ -40,7 +42,9 @@ mod ply;
 mod points;
 mod points_csv;
 mod poses;
+pub mod poses3;
 mod scan_graph;
+pub mod space_log;
 mod svg;
 #[cfg(test)]
 mod testing;
