@@ -7,6 +7,7 @@
 //! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
+//! | OctoMap `.bt`, `.ot` | [`OctomapTree`] | [`write_octomap_bt`], [`write_octomap_ot`] |
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
 //! | SVG contours | | [`write_svg`] |
@@ -28,6 +29,7 @@ mod esdf_bin;
 mod geojson;
 mod map_file;
 mod map_server;
+mod octomap;
 mod pgm;
 mod points_csv;
 mod poses;
@@ -47,6 +49,7 @@ pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
 pub use geojson::{parse_geojson, read_geojson, write_geojson};
 pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
+pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
 pub use pgm::Pgm;
 pub use points_csv::{AnswerRow, AnswerStatus, QueryPoints, write_answer, write_answer_header};
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};
