@@ -29,9 +29,9 @@ pub enum FileKind {
     GeoJson,
     /// A picture of contours; not read.
     Svg,
-    /// OctoMap's binary tree; not read yet.
+    /// OctoMap's tree of free and occupied: [`crate::OctomapTree`].
     OctomapBt,
-    /// OctoMap's full tree; not read yet.
+    /// OctoMap's tree of log odds: [`crate::OctomapTree`].
     OctomapOt,
     /// Scans of space with poses: [`crate::space_log::SpaceLog`].
     SpaceLog(SpaceLogKind),
@@ -145,7 +145,7 @@ fn unknown(head: &[u8]) -> FileKind {
         [0x89, b'P', b'N', b'G', ..] => "it is a PNG picture (convert it to PGM)".to_owned(),
         _ => format!("it starts with {}", crate::error::shown(&head[..head.len().min(16)])),
     };
-    let known = "known are CARMEN logs, map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON";
+    let known = "known are CARMEN logs, map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON, OctoMap";
     FileKind::Unknown(format!("{seen}; {known}"))
 }
 

@@ -14,6 +14,7 @@
 //! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
+//! | OctoMap `.bt`, `.ot` | [`OctomapTree`] | [`write_octomap_bt`], [`write_octomap_ot`] |
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
 //! | SVG contours | | [`write_svg`] |
@@ -37,6 +38,7 @@ mod kitti_bin;
 mod map_file;
 mod map_server;
 mod pcd;
+mod octomap;
 mod pgm;
 mod ply;
 mod points;
@@ -68,6 +70,7 @@ pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use pcd::{read_pcd, write_pcd};
+pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
 pub use pgm::Pgm;
 pub use ply::{PlyMesh, read_ply_cloud, read_ply_mesh, write_ply_cloud};
 pub use points::{

@@ -177,10 +177,10 @@ pub(super) mod tests {
             let mut cells = vec![V::UNOBSERVED; 1 << (3 * D)];
             for (i, cell) in cells.iter_mut().enumerate() {
                 // One value per 4^D corner with even seeds, single cells with odd ones.
-                let part = if seed % 2 == 0 { i >> 2 & 1 | i >> 4 & 2 } else { i };
+                let part = if seed & 1 == 0 { i >> 2 & 1 | i >> 4 & 2 } else { i };
                 let noise = (seed ^ part as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
-                if noise % 4 != 0 {
-                    *cell = value(noise % 4);
+                if noise & 3 != 0 {
+                    *cell = value(noise & 3);
                 }
             }
             tree.set_block(key, &cells);
