@@ -4,6 +4,8 @@
 //! |---|---|---|
 //! | CARMEN log (plain, gzip, bzip2) | [`CarmenLog`], [`detect_no_return`] | |
 //! | pose files (`x y theta`, `t x y theta`, TUM) | [`read_poses_2d`] | |
+//! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
+//! | logs of scans of space with poses | [`space_log::SpaceLog`] | |
 //! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
@@ -31,6 +33,8 @@ mod map_server;
 mod pgm;
 mod points_csv;
 mod poses;
+pub mod poses3;
+pub mod space_log;
 mod svg;
 #[cfg(test)]
 mod testing;
