@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::bytes::open;
+use crate::space_log::SpaceLogKind;
 use crate::{IoError, container, esdf_bin};
 
 /// So much of a file is looked at (unpacked bytes).
@@ -32,6 +33,8 @@ pub enum FileKind {
     OctomapBt,
     /// OctoMap's tree of log odds: [`crate::OctomapTree`].
     OctomapOt,
+    /// Scans of space with poses: [`crate::space_log::SpaceLog`].
+    SpaceLog(SpaceLogKind),
     /// None of these; the text says what was seen and what would be known.
     Unknown(String),
 }
@@ -46,10 +49,16 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
         if path.join("map.portolan").is_file() {
             return Ok(FileKind::PortolanFolder);
         }
-        return Ok(FileKind::Unknown("a folder without map.portolan; name a file inside it".into()));
+        if let Some(kind) = SpaceLogKind::recognise(path) {
+            return Ok(FileKind::SpaceLog(kind));
+        }
+        let what = "a folder without map.portolan and without scans of a known layout; name a file inside it";
+        return Ok(FileKind::Unknown(what.into()));
     }
     let head = open(path)?.read_up_to(HEAD)?;
-    Ok(by_content(&head).or_else(|| by_name(path, &head)).unwrap_or_else(|| unknown(&head)))
+    let as_log = || SpaceLogKind::recognise(path).map(FileKind::SpaceLog);
+    let kind = by_content(&head).or_else(as_log).or_else(|| by_name(path, &head));
+    Ok(kind.unwrap_or_else(|| unknown(&head)))
 }
 
 fn by_content(head: &[u8]) -> Option<FileKind> {
@@ -205,6 +214,7 @@ mod tests {
             ("maps_2d/depot.yaml", MapServerYaml),
             ("maps_2d/willow-full.pgm", Pgm),
             ("maps_octomap/geb079.bt", OctomapBt),
+            ("rgbd_redkitchen", SpaceLog(SpaceLogKind::SevenScenes)),
         ] {
             let Some(path) = real_data(name) else { continue };
             assert_eq!(detect(path).unwrap(), kind);

@@ -1,0 +1,30 @@
+//! Logs of scans of space with the pose of every scan: one interface for depth cameras and lidars.
+//!
+//! | kind | layout | poses |
+//! |---|---|---|
+//! | [`SevenScenes`](SpaceLogKind::SevenScenes) | `frame-NNNNNN.depth.png`, `.color.jpg` or `.color.png` | `frame-NNNNNN.pose.txt` |
+//!
+//! [`SpaceLog::open`] finds the files, reads the poses and says in [`SpaceLogStats`] what does not fit together; the scans
+//! themselves are read when they are asked for, by index and from any thread.
+//!
+//! To add a format: a file here with a function `fn(&Path, &SpaceLogOptions) -> Result<Parts, IoError>`, which finds the
+//! scans and where their poses are, and a kind in `kind.rs`. Matching poses with scans, conventions, mending and refusing
+//! happen once, in `log.rs`.
+
+mod depth_frames;
+mod depth_png;
+mod files;
+mod intrinsics;
+mod kind;
+mod log;
+mod matching;
+mod options;
+mod parts;
+mod seven_scenes;
+mod stats;
+
+pub use intrinsics::{Camera, CameraFrom, Intrinsics};
+pub use kind::SpaceLogKind;
+pub use log::SpaceLog;
+pub use options::SpaceLogOptions;
+pub use stats::{RefusedPose, SpaceLogStats};
