@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
 use portolan_io::{
-    AnyMapFile, CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, Pgm, Polyline, SpaceMapFile, detect,
-    read_geojson,
+    AnyMapFile, CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline,
+    SpaceMapFile, detect, read_geojson,
 };
 
 use crate::log::describe;
@@ -25,6 +25,8 @@ pub(crate) enum Source {
     Image(Pgm),
     /// A contour
     Contour(Vec<Polyline>),
+    /// A `.bt` or `.ot`
+    Octomap(Box<OctomapTree>),
     /// A log
     Log(Box<CarmenLog>),
     /// A log of scans of space
@@ -43,6 +45,7 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
             None => Source::Image(Pgm::read(path)?),
         },
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
+        FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
         FileKind::CarmenLog => Source::Log(Box::new(CarmenLog::read(path)?)),
         FileKind::SpaceLog(_) => {
             Source::SpaceLog(Box::new(SpaceLog::open(path, &SpaceLogOptions::default())?))
@@ -77,6 +80,10 @@ fn yaml_beside(path: &Path) -> Option<PathBuf> {
 impl Source {
     /// What the user should know before he trusts it.
     pub(crate) fn warning(&self) -> Option<String> {
+        if let Self::Octomap(file) = self {
+            let colors = "it has colours, which are passed over: what is written from it has none";
+            return file.colors_left_out().then(|| colors.into());
+        }
         let Self::Server(map) = self else { return None };
         let cells = map.unknown_grey_taken_for_free;
         (cells > 0).then(|| {
@@ -96,6 +103,8 @@ impl Source {
             Self::Server(_) => "a map_server map",
             Self::Image(_) => "a PGM image without its yaml file",
             Self::Contour(_) => "a contour (GeoJSON)",
+            Self::Octomap(file) if file.is_binary() => "an OctoMap tree of free and occupied (.bt)",
+            Self::Octomap(_) => "an OctoMap tree of log odds (.ot)",
             Self::Log(_) => "a CARMEN log",
             Self::SpaceLog(log) => log.kind().label(),
         }

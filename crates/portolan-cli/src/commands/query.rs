@@ -8,9 +8,10 @@ use portolan::Answer;
 use portolan::field::{Esdf, EsdfSettings, esdf_from_tsdf};
 use portolan::geom::Pose;
 use portolan::map::MapRepr;
+use portolan::store::Store;
 use portolan_io::{
-    AnswerRow, AnswerStatus, EsdfBin, EsdfFile, Input, MapCell, MapFile, MapServerMap, QueryPoints,
-    write_answer, write_answer_header,
+    AnswerRow, AnswerStatus, EsdfBin, EsdfFile, Input, MapCell, MapFile, MapServerMap, OctomapTree,
+    QueryPoints, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
@@ -20,7 +21,7 @@ use crate::source::{Source, open};
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echo 1.5,2.0 | portolan query intel --points -")]
 pub(crate) struct Args {
-    /// A folder that `map` wrote, a map.portolan, an esdf.bin, or a map_server yaml
+    /// A folder that `map` wrote, a map.portolan, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot
     map: PathBuf,
     /// CSV of x,y or x,y,z in metres; - reads standard input
     #[arg(long, value_name = "FILE")]
@@ -114,8 +115,9 @@ impl Fields {
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
             Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
             Source::Server(map) => Self::Two(of_server(map)),
+            Source::Octomap(file) => Self::Three(of_octomap(*file)),
             other => bail!(
-                "{}: is {}; give a map.portolan or its folder, an esdf.bin, or a map_server yaml",
+                "{}: is {}; give a map.portolan or its folder, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot",
                 path.display(),
                 other.describe()
             ),
@@ -163,6 +165,23 @@ fn of_server(map: MapServerMap) -> Field<2> {
         Some(i) => Answer::Known(f64::from(map.occupancy[i])),
     });
     Field { distance, status: None, occupancy, world_from_field }
+}
+
+/// Occupancy alone: a tree holds no distances.
+fn of_octomap(file: OctomapTree) -> Field<3> {
+    let tree = file.into_tree();
+    let bounds = tree.grid().aabb();
+    let occupancy: Occupancy<3> =
+        Box::new(move |p| match tree.lattice().cell_of(p).filter(|_| bounds.contains(p)) {
+            None => Answer::Outside,
+            Some(cell) => tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(logistic(v.0))),
+        });
+    Field { distance: None, status: None, occupancy, world_from_field: Pose::IDENTITY }
+}
+
+/// P(occupied) of log odds.
+fn logistic(log_odds: f32) -> f64 {
+    1.0 / (1.0 + (-f64::from(log_odds)).exp())
 }
 
 /// The distance field of a map_server map, in its own frame.
