@@ -6,6 +6,7 @@
 //! | pose files (`x y theta`, `t x y theta`, TUM) | [`read_poses_2d`] | |
 //! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
 //! | logs of scans of space with poses | [`space_log::SpaceLog`] | |
+//! | the same as KITTI, TUM RGB-D, 7-Scenes | | [`LogWriter`] |
 //! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
@@ -28,6 +29,7 @@ mod detect;
 mod error;
 mod esdf_bin;
 mod geojson;
+mod log_writer;
 mod map_file;
 mod map_server;
 mod pgm;
@@ -49,6 +51,7 @@ pub use detect::{FileKind, detect};
 pub use error::IoError;
 pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
 pub use geojson::{parse_geojson, read_geojson, write_geojson};
+pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use pgm::Pgm;
