@@ -12,6 +12,8 @@
 //! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
 //! | logs of scans of space with poses | [`space_log::SpaceLog`] | |
 //! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
+//! | the same as KITTI, TUM RGB-D, 7-Scenes | | [`LogWriter`] |
+//! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | OctoMap `.bt`, `.ot` | [`OctomapTree`] | [`write_octomap_bt`], [`write_octomap_ot`] |
@@ -35,6 +37,7 @@ mod error;
 mod esdf_bin;
 mod geojson;
 mod kitti_bin;
+mod log_writer;
 mod map_file;
 mod map_server;
 mod octomap;
@@ -67,6 +70,8 @@ pub use map_file::{
     AnyMapFile, ColorBricks, MapFile, MapHeader, OccupancyBricks, SpaceMapFile, TsdfBricks, sweep_of,
     sweep_word, weights_of, weights_word,
 };
+pub use log_writer::{LogLayout, LogWriter};
+pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
 pub use pcd::{read_pcd, write_pcd};
