@@ -2,6 +2,7 @@
 
 mod common;
 mod plane;
+mod space;
 
 use std::path::PathBuf;
 
@@ -129,7 +130,7 @@ pub(crate) struct Args {
 
 /// Fuses the log.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    plane::run(args)
+    if args.source.is_space(&args.log)? { space::run(args) } else { plane::run(args) }
 }
 
 impl Args {

@@ -6,12 +6,9 @@ use std::time::Instant;
 
 use anyhow::bail;
 use portolan::cell::LogOddsRule;
-use portolan::geom::Pose;
-use portolan_io::{
-    EsdfBin, IoError, SpaceMapFile, write_atomic, write_esdf, write_octomap_bt, write_octomap_ot, write_ply_mesh,
-};
+use portolan_io::{IoError, SpaceMapFile, write_atomic, write_octomap_bt, write_octomap_ot};
 
-use super::{Derived, preview};
+use super::Derived;
 
 /// A dense distance field is written up to this size (bytes of distances and states).
 pub(crate) const LARGEST_DENSE: u64 = 256 << 20;
@@ -43,25 +40,17 @@ impl Artefacts<'_> {
     pub(crate) fn write(&self, folder: &Path) -> anyhow::Result<Written> {
         let mut written = Written::default();
         let start = Instant::now();
-        if let Some(mesh) = &self.derived.mesh {
-            write_ply_mesh(folder.join("mesh.ply"), mesh)?;
-            written.files.push("mesh.ply");
-        }
         self.write_octree(folder, &mut written)?;
-        self.write_esdf(folder, &mut written)?;
         self.file.write(folder.join("map.portolan"))?;
         written.files.push("map.portolan");
         written.seconds.insert("write", start.elapsed().as_secs_f64());
-        let start = Instant::now();
-        if let Some(png) = self.derived.mesh.as_ref().and_then(|m| preview::of_mesh(m, &self.file.poses, &self.title)) {
-            write_atomic(folder.join("preview.png"), |w| std::io::Write::write_all(w, &png))?;
-            written.files.push("preview.png");
-        }
-        written.seconds.insert("preview", start.elapsed().as_secs_f64());
         for stale in NAMES.iter().filter(|n| !written.files.contains(n) && **n != "summary.json") {
             match std::fs::remove_file(folder.join(stale)) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                    bail!("{}: cannot remove what an earlier run left: {e}; remove it", folder.join(stale).display())
+                    bail!(
+                        "{}: cannot remove what an earlier run left: {e}; remove it",
+                        folder.join(stale).display()
+                    )
                 }
                 _ => {}
             }
@@ -72,8 +61,8 @@ impl Artefacts<'_> {
     fn write_octree(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
         let (Some(tree), Some(map)) = (&self.derived.tree, &self.file.occupancy) else { return Ok(()) };
         let rule = LogOddsRule::<i8>::new(&map.model)?;
-        let bt = write_octomap_bt(folder.join("octree.bt"), tree, &rule);
-        let ot = write_octomap_ot(folder.join("octree.ot"), tree, &rule);
+        let bt = write_octomap_bt(folder.join("octree.bt"), tree);
+        let ot = write_octomap_ot(folder.join("octree.ot"), tree, rule.quantum);
         for (name, result) in [("octree.bt", bt), ("octree.ot", ot)] {
             match result {
                 Ok(()) => written.files.push(name),
@@ -82,14 +71,6 @@ impl Artefacts<'_> {
                 Err(error) => return Err(error.into()),
             }
         }
-        Ok(())
-    }
-
-    fn write_esdf(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
-        let (Some(esdf), Some(bounds)) = (&self.derived.esdf, self.derived.dense) else { return Ok(()) };
-        let dense: EsdfBin<3> = bounds;
-        write_esdf(folder.join("esdf.bin"), &dense.grid, &dense.distances, dense.status.as_deref())?;
-        written.files.push("esdf.bin");
         Ok(())
     }
 }

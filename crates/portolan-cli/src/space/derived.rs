@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use portolan::cell::LogOdds8;
-use portolan::field::{SparseEsdf, SparseEsdfSettings};
 use portolan::store::{Store, Tree};
-use portolan::surface::{Mesh, MeshSettings, marching_cubes};
 
 use super::{Settings, SpaceMaps};
 use crate::mapping::MapKind;
@@ -15,8 +13,6 @@ use crate::mapping::MapKind;
 #[derive(Default)]
 pub(crate) struct Derived {
     pub(crate) tree: Option<Tree<LogOdds8, 3>>,
-    pub(crate) mesh: Option<Mesh>,
-    pub(crate) esdf: Option<SparseEsdf>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
 }
 
@@ -28,31 +24,12 @@ impl Derived {
             derived.tree = Tree::from_bricks(map.store());
             derived.seconds.insert("octree", start.elapsed().as_secs_f64());
         }
-        let Some(tsdf) = &maps.tsdf else { return Ok(derived) };
-        let one_beam = settings.weights.typical_low();
-        if settings.wants(MapKind::Mesh) {
-            let start = Instant::now();
-            let how = MeshSettings { min_weight: 0.5 * one_beam, ..MeshSettings::default() };
-            derived.mesh = Some(marching_cubes(tsdf.store(), tsdf.colors(), &how));
-            derived.seconds.insert("mesh", start.elapsed().as_secs_f64());
-        }
-        if settings.wants(MapKind::Esdf) {
-            let start = Instant::now();
-            let how = SparseEsdfSettings {
-                min_weight: 0.5 * one_beam * settings.carve_weight,
-                max_distance: settings.max_distance,
-                ..SparseEsdfSettings::default()
-            };
-            derived.esdf = Some(SparseEsdf::from_tsdf(tsdf.store(), &how));
-            derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
-        }
         Ok(derived)
     }
 
     /// Bytes of each derived field, measured.
     pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
         let tree = self.tree.iter().map(|t| ("octree", t.memory_bytes()));
-        let mesh = self.mesh.iter().map(|m| ("mesh", m.memory_bytes()));
-        tree.chain(mesh).chain(self.esdf.iter().map(|e| ("esdf", e.memory_bytes()))).collect()
+        tree.collect()
     }
 }

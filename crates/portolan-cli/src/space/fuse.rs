@@ -5,63 +5,15 @@ use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
 use portolan::geom::Pose;
-use portolan::map::{MapError, MapRepr, SparseOccupancy, SparseTsdf};
 use portolan::scan::{BeamCounts, Frame, FrameFilter, ScanStats};
-use portolan_io::{IoError, SpaceLog};
+use portolan_io::IoError;
+use portolan_io::space_log::SpaceLog;
 
+use super::SpaceMaps;
 use crate::progress::Progress;
 
 /// Frames that are read ahead.
 const AHEAD: usize = 3;
-
-/// The maps that frames are fused into.
-#[derive(Default)]
-pub(crate) struct SpaceMaps {
-    pub(crate) occupancy: Option<SparseOccupancy>,
-    pub(crate) tsdf: Option<SparseTsdf>,
-}
-
-impl SpaceMaps {
-    /// Bytes of each map, measured.
-    pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
-        let occupancy = self.occupancy.iter().map(|m| ("tree", m.memory_bytes()));
-        occupancy.chain(self.tsdf.iter().map(|m| ("tsdf", m.memory_bytes()))).collect()
-    }
-
-    fn total(&self) -> usize {
-        self.bytes().values().sum()
-    }
-
-    /// One frame into every map; together they may take `memory` bytes.
-    fn integrate(
-        &mut self,
-        pose: &Pose<3>,
-        frame: &Frame,
-        memory: usize,
-        report: &mut Fusion,
-    ) -> Result<ScanStats, MapError> {
-        let mut stats = ScanStats::default();
-        let start = Instant::now();
-        if self.occupancy.is_some() {
-            let others = self.tsdf.as_ref().map_or(0, MapRepr::memory_bytes);
-            if let Some(map) = &mut self.occupancy {
-                map.set_limit(memory.saturating_sub(others));
-                stats = map.integrate(pose, frame)?;
-                report.add("tree", start, &stats);
-            }
-        }
-        let start = Instant::now();
-        if self.tsdf.is_some() {
-            let others = self.occupancy.as_ref().map_or(0, MapRepr::memory_bytes);
-            if let Some(map) = &mut self.tsdf {
-                map.set_limit(memory.saturating_sub(others));
-                stats = map.integrate(pose, frame)?;
-                report.add("tsdf", start, &stats);
-            }
-        }
-        Ok(stats)
-    }
-}
 
 /// What fusing did.
 #[derive(Debug, Default)]
@@ -81,7 +33,8 @@ pub(crate) struct Fusion {
 }
 
 impl Fusion {
-    fn add(&mut self, map: &'static str, start: Instant, stats: &ScanStats) {
+    /// A map has taken a frame since `start`.
+    pub(super) fn add(&mut self, map: &'static str, start: Instant, stats: &ScanStats) {
         *self.seconds.entry(map).or_default() += start.elapsed().as_secs_f64();
         *self.observations.entry(map).or_default() += stats.cells;
     }

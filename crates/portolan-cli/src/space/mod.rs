@@ -2,12 +2,18 @@
 
 mod artefacts;
 mod derived;
+mod extent;
 mod fuse;
+mod maps;
+mod memory;
 mod settings;
 mod words;
 
 pub(crate) use artefacts::Artefacts;
 pub(crate) use derived::Derived;
-pub(crate) use fuse::{Fusion, SpaceMaps, fuse};
-pub(crate) use settings::Settings;
+pub(crate) use extent::brick_extent;
+pub(crate) use fuse::{Fusion, fuse};
+pub(crate) use maps::SpaceMaps;
+pub(crate) use memory::peak_memory;
+pub(crate) use settings::{Settings, sweep_of};
 pub(crate) use words::{Summary, report};

@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use portolan::cell::{OccupancyModel, TsdfRule};
-use portolan::geom::Aabb;
+use portolan::geom::{Aabb, Lattice};
 use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
 use portolan::scan::{Body, FrameFilter};
 use portolan::sweep::WeightModel;
@@ -55,9 +55,10 @@ impl Settings {
 
     /// Empty maps about a lattice's origin.
     pub(crate) fn empty_maps(&self, origin: [f64; 3]) -> anyhow::Result<SpaceMaps> {
+        let lattice = Lattice::new(origin, self.resolution);
         let occupancy = self
             .wants(MapKind::Tree)
-            .then(|| SparseOccupancy::new(origin, self.resolution, OccupancyModel::default(), self.sweep));
+            .then(|| SparseOccupancy::new(lattice, OccupancyModel::default(), self.sweep));
         let tsdf = self.wants(MapKind::Tsdf).then(|| SparseTsdf::new(self.tsdf_config(origin)));
         Ok(SpaceMaps { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()? })
     }
@@ -131,12 +132,17 @@ pub(crate) fn sweep_word(sweep: OccupancySweep) -> &'static str {
     match sweep {
         OccupancySweep::Auto => "auto",
         OccupancySweep::Exact => "exact",
-        OccupancySweep::Projective => "projective",
+        other => unreachable_sweep(other),
     }
 }
 
 /// The sweep of a word.
 pub(crate) fn sweep_of(word: &str) -> Option<OccupancySweep> {
-    let all = [OccupancySweep::Auto, OccupancySweep::Exact, OccupancySweep::Projective];
+    let all = [OccupancySweep::Auto, OccupancySweep::Exact];
     all.into_iter().find(|&s| sweep_word(s) == word)
+}
+
+/// Sweeps that have no word yet.
+fn unreachable_sweep(_: OccupancySweep) -> &'static str {
+    "projective"
 }

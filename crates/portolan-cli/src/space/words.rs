@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::geom::Aabb;
-use portolan::geom::vector::distance;
-use portolan_io::{SpaceLog, SpaceMapFile};
+use portolan_io::SpaceMapFile;
+use portolan_io::space_log::{SpaceLog, SpaceLogStats};
 use serde_json::{Value, json};
 
-use super::{Derived, Fusion, Settings};
+use super::{Derived, Fusion, Settings, brick_extent};
 use crate::arguments::shown_bytes;
 use crate::json;
 
@@ -30,7 +30,7 @@ pub(crate) struct Summary<'a> {
 impl Summary<'_> {
     /// What the user should know before he trusts the map.
     fn warnings(&self) -> Vec<String> {
-        let mut warnings = self.log.stats().warnings();
+        let mut warnings = log_warnings(self.log.stats());
         let stats = &self.fusion.stats;
         if stats.refused_poses > 0 {
             warnings.push(format!(
@@ -54,9 +54,6 @@ impl Summary<'_> {
         if stats.hits_outside > 0 {
             warnings.push(format!("{} hits lie outside of --bounds", stats.hits_outside));
         }
-        if self.derived.mesh.as_ref().is_some_and(|m| m.triangles.is_empty()) {
-            warnings.push("no surface was found".to_owned());
-        }
         if let Some(full) = &self.fusion.full {
             warnings.push(format!("fusing ended early: {full}"));
         }
@@ -66,34 +63,29 @@ impl Summary<'_> {
 
     /// Box of what was seen: of the bricks that hold it.
     fn extent(&self) -> Aabb<3> {
-        self.file.extent()
-    }
-
-    fn path_length(&self) -> f64 {
-        let at = |i: usize| self.log.pose(i).translation;
-        (1..self.log.len()).map(|i| distance(at(i - 1), at(i))).sum()
+        let mut extent = Aabb::EMPTY;
+        if let Some(map) = &self.file.occupancy {
+            extent = extent.union(brick_extent(&map.store));
+        }
+        if let Some(map) = &self.file.tsdf {
+            extent = extent.union(brick_extent(&map.store));
+        }
+        extent
     }
 
     /// `summary.json`.
     pub(crate) fn to_json(&self) -> Value {
         let stats = json::stats(&self.fusion.stats);
-        let mesh = self.derived.mesh.as_ref().map(|m| {
-            json!({
-                "vertices": m.vertices.len(),
-                "triangles": m.triangles.len(),
-                "area": m.area(),
-                "colors": !m.colors.is_empty(),
-            })
-        });
-        let tree = self.derived.tree.as_ref().map(|t| json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }));
+        let tree =
+            self.derived.tree.as_ref().map(|t| json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }));
         json!({
             "program": concat!("portolan ", env!("CARGO_PKG_VERSION")),
             "input": {
                 "name": self.log.name(),
                 "format": self.log.kind().word(),
                 "scans": self.log.len(),
-                "path_length": self.path_length(),
-                "poses": self.log.stats().to_json(),
+                "path_length": self.log.path_length(),
+                "poses": json::space_log_stats(self.log.stats()),
                 "unreadable_scans": self.fusion.unreadable.0,
             },
             "dimension": 3,
@@ -109,10 +101,9 @@ impl Summary<'_> {
             "refused_beams": stats["refused_beams"],
             "observations": self.fusion.observations,
             "extent": json::aabb(&self.extent()),
-            "mesh": mesh,
             "octree": tree,
             "bytes": self.bytes,
-            "peak_memory": crate::space::peak_memory(),
+            "peak_memory": super::peak_memory(),
             "seconds": self.seconds,
             "scans_per_second": self.scans_per_second(),
             "logs": self.file.header.logs,
@@ -143,14 +134,10 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     );
     let [x, y, z] = summary.extent().extent();
     let r = summary.settings.resolution;
-    let _ = writeln!(text, "{x:.2} x {y:.2} x {z:.2} m in cells of {r} m, about {}", summary.file.counts());
+    let _ = writeln!(text, "{x:.2} x {y:.2} x {z:.2} m in cells of {r} m");
     let sizes: Vec<_> =
         summary.bytes.iter().map(|(name, &n)| format!("{name} {}", shown_bytes(n as f64))).collect();
     let _ = writeln!(text, "{}", sizes.join(", "));
-    if let Some(mesh) = &summary.derived.mesh {
-        let (n, area) = (mesh.triangles.len(), mesh.area());
-        let _ = writeln!(text, "mesh of {n} triangles, {area:.2} m²");
-    }
     let per_scan: Vec<_> = ["tree", "tsdf"]
         .iter()
         .filter(|name| summary.seconds.contains_key(*name))
@@ -170,4 +157,23 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     }
     let _ = writeln!(text, "wrote {} to {folder}", summary.files.join(", "));
     text
+}
+
+fn log_warnings(stats: &SpaceLogStats) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let mut say = |n: u64, what: &str| {
+        if n > 0 {
+            warnings.push(format!("{n} {what}"));
+        }
+    };
+    say(stats.scans_without_pose, "scans have no pose and were left out");
+    say(stats.unmatched_times, "scans have no pose near in time and were left out");
+    say(stats.scans_without_color, "scans have no colour picture");
+    if let Some(first) = stats.refused_poses.first() {
+        warnings.push(format!("{} poses could not be used (first: {first})", stats.refused_poses.len()));
+    }
+    if let Some(why) = &stats.colors_left_out {
+        warnings.push(format!("colours were left out: {why}"));
+    }
+    warnings
 }

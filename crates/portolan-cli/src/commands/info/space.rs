@@ -1,13 +1,13 @@
 //! `info` of what has three dimensions.
 
 use portolan::cell::{Cell, Planes};
-use portolan::geom::{Aabb, BLOCK_EDGE};
 use portolan::store::{Bricks, Store};
 use portolan_io::SpaceMapFile;
 use portolan_io::space_log::{CameraFrom, SpaceLog};
 use serde_json::{Value, json};
 
 use crate::json;
+use crate::space::brick_extent;
 
 pub(super) fn of_map(file: &SpaceMapFile) -> Value {
     let header = &file.header;
@@ -38,7 +38,7 @@ pub(super) fn of_map(file: &SpaceMapFile) -> Value {
 
 fn of_bricks<C: Cell>(cell: &str, store: &Bricks<C, 3>) -> Value {
     let observed = |brick: &C::Brick| (0..brick.len()).filter(|&i| brick.get(i).is_some()).count();
-    let extent = extent(store);
+    let extent = brick_extent(store);
     json!({
         "cell": cell,
         "resolution": store.lattice().resolution,
@@ -47,17 +47,6 @@ fn of_bricks<C: Cell>(cell: &str, store: &Bricks<C, 3>) -> Value {
         "observed": store.bricks_by_age().map(|(_, brick)| observed(brick)).sum::<usize>(),
         "bytes": store.memory_bytes(),
     })
-}
-
-/// The box of all bricks (metres).
-pub(crate) fn extent<C: Cell>(store: &Bricks<C, 3>) -> Aabb<3> {
-    let mut extent = Aabb::EMPTY;
-    for (key, _) in store.bricks_by_age() {
-        let first = key.first_cell();
-        extent.include(store.lattice().corner(first));
-        extent.include(store.lattice().corner(first.map(|c| c + BLOCK_EDGE as i32)));
-    }
-    extent
 }
 
 pub(super) fn of_log(log: &SpaceLog) -> Value {

@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use clap::ValueEnum;
+use portolan::scan::Body;
 use serde_json::{Map, Value};
 
+use crate::arguments::body;
 use crate::mapping::MapKind;
 
 /// Seconds per stage.
@@ -62,6 +64,18 @@ impl Saved<'_> {
     pub(super) fn maps(&self) -> Option<Vec<MapKind>> {
         let words = self.0?.get("maps")?.as_array()?;
         words.iter().map(|word| MapKind::from_str(word.as_str()?, false).ok()).collect()
+    }
+
+    /// The parts of the sensor's frame that a saved map left out.
+    pub(super) fn bodies(&self) -> anyhow::Result<Vec<Body>> {
+        let Some(list) = self.0.and_then(|s| s.get("self_filter")).and_then(Value::as_array) else {
+            return Ok(Vec::new());
+        };
+        let text = |numbers: &Value| {
+            let numbers = numbers.as_array().map(Vec::as_slice).unwrap_or_default();
+            numbers.iter().map(Value::to_string).collect::<Vec<_>>().join(",")
+        };
+        list.iter().map(|b| body(&text(b)).map_err(|e| anyhow!("the map's self_filter: {e}"))).collect()
     }
 
     pub(super) fn flag(&self, key: &str) -> Option<bool> {

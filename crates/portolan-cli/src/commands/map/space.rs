@@ -3,10 +3,11 @@
 use std::io::Write;
 
 use anyhow::{Context, bail};
-use portolan::geom::{Aabb, Pose};
+use portolan::geom::Aabb;
 use portolan::map::OccupancySweep;
 use portolan::scan::{FrameFilter, ScanStats};
-use portolan_io::{SpaceLog, SpaceMapFile, weights_of, write_atomic};
+use portolan_io::space_log::SpaceLog;
+use portolan_io::{SpaceMapFile, weights_of, write_atomic};
 
 use super::common::{CARVE_WEIGHT, Saved, Watch, start_threads, three_cells, title};
 use super::{Args, SweepArg};
@@ -27,7 +28,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut watch = Watch::start();
     let threads = start_threads(args.threads)?;
     let before = args.saved_space_map()?;
-    let log = log::read_space(&args.log, &args.source)?;
+    let log = log::read_space(&args.log, &args.source, !args.no_color)?;
     watch.stage("read");
 
     let settings = args.space_settings(before.as_ref(), bounds)?;
@@ -53,7 +54,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     file.poses.extend(&fusion.poses);
     describe(&mut file, &settings, &log, &fusion.stats);
 
-    let derived = Derived::of(&maps, &settings, args.dense)?;
+    let derived = Derived::of(&maps, &settings)?;
     bytes.extend(derived.bytes());
     let mut seconds = watch.total();
     std::fs::create_dir_all(&args.out).with_context(|| {
@@ -61,8 +62,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     })?;
     let title = title(&file.header.logs, settings.resolution, file.header.scans);
     maps.store_into(&mut file);
-    let artefacts = Artefacts { file: &file, derived: &derived, title, poses: &fusion.poses };
-    let (mut files, written) = artefacts.write(&args.out)?;
+    let written = Artefacts { file: &file, derived: &derived, title }.write(&args.out)?;
+    let mut files = written.files;
     files.push("summary.json");
     seconds.extend(fusion.seconds.iter().chain(&derived.seconds).chain(&written.seconds));
     let summary = Summary {
@@ -96,14 +97,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 /// programs could not hold them anyway; then the multiple of the resolution next to the first pose.
 fn anchor(log: &SpaceLog, resolution: f64) -> [f64; 3] {
     const FAR: f64 = 1e6;
-    let first = if log.is_empty() { [0.0; 3] } else { log.pose(0).translation };
-    first.map(|v| if (v / resolution).abs() < FAR { 0.0 } else { (v / resolution).round() * resolution })
+    log.pose(0)
+        .translation
+        .map(|v| if (v / resolution).abs() < FAR { 0.0 } else { (v / resolution).round() * resolution })
 }
 
 impl Args {
     /// Refuses what a log of space cannot have; gives the box.
     fn check_space(&self) -> anyhow::Result<Option<Aabb<3>>> {
-        let refused = |what: &str| Err(bad_call(format!("{what} is for planar scans; the log has three dimensions")));
+        let refused =
+            |what: &str| Err(bad_call(format!("{what} is for planar scans; the log has three dimensions")));
         let planar = |m: &MapKind| matches!(m, MapKind::Grid | MapKind::Contour);
         match self.sweep {
             Some(SweepArg::CellCentre | SweepArg::March) => return refused("this --sweep"),
@@ -113,7 +116,9 @@ impl Args {
             _ => {}
         }
         match self.bounds {
-            Some(Bounds::Plane(_)) => Err(bad_call("--bounds of a log of space has six numbers x0,y0,z0,x1,y1,z1")),
+            Some(Bounds::Plane(_)) => {
+                Err(bad_call("--bounds of a log of space has six numbers x0,y0,z0,x1,y1,z1"))
+            }
             Some(Bounds::Space(bounds)) => Ok(Some(bounds)),
             None => Ok(None),
         }
@@ -155,7 +160,6 @@ impl Args {
             },
             sweep: match self.sweep {
                 Some(SweepArg::Exact) => OccupancySweep::Exact,
-                Some(SweepArg::Projective) => OccupancySweep::Projective,
                 Some(_) => OccupancySweep::Auto,
                 None => saved.word("sweep").and_then(sweep_of).unwrap_or_default(),
             },
