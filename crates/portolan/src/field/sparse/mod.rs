@@ -1,0 +1,14 @@
+//! The Euclidean distance transform over bricks, and the field that it makes.
+//!
+//! The passes of the separable transform run over lines of bricks: a pass fills only bricks that a later pass
+//! looks at, no further than an upper bound of what will be found. Nothing is computed twice, as it is where tiles
+//! with a halo are solved one by one.
+
+mod min_plus;
+mod pass;
+mod reach;
+mod seeds;
+mod sparse_esdf;
+mod transform;
+
+pub use sparse_esdf::{SparseEsdf, SparseEsdfSettings};
