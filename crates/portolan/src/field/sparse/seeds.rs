@@ -2,14 +2,14 @@
 
 use rustc_hash::FxHashMap;
 
-use super::pass::{Level, for_each, layout};
+use super::kernels::{CellRule, seeds, survey};
+use super::pass::{Source, for_each, layout};
 use super::reach::Reach;
-use super::sparse_esdf::SparseEsdfSettings;
 use crate::cell::{DistanceBrick, SignedDistance};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
-use crate::store::{Bricks, Store};
+use crate::store::Bricks;
 
-/// A seed of a brick: from any cell there is no more than the way to it.
+/// A seed of a brick: no cell is further from a seed than from this one.
 #[derive(Clone, Copy)]
 struct Anchor<const D: usize> {
     cell: [i32; D],
@@ -17,105 +17,111 @@ struct Anchor<const D: usize> {
 }
 
 impl<const D: usize> Anchor<D> {
-    /// The largest of the least squared distances in a brick is at most this.
+    /// No least squared distance in a brick exceeds this.
     fn bound(&self, key: BlockKey<D>) -> f32 {
         let first = key.first_cell();
-        let mut sum = self.value;
-        for k in 0..D {
-            let low = self.cell[k] - first[k];
-            let far = low.abs().max((BLOCK_EDGE as i32 - 1 - low).abs()) as f32;
-            sum += far * far;
-        }
-        sum
+        self.value + furthest_sq(std::array::from_fn::<_, D, _>(|k| self.cell[k] - first[k]))
     }
 }
 
-/// The bricks with an observed cell, ascending; the seeds in those that have any, in the layout of the first pass;
-/// and how far each brick must look, in squared cells and not beyond `limit`.
-pub(super) struct Seeds<const D: usize> {
-    pub(super) seeds: Level<D>,
+/// Squared distance to the cell of the brick at 0 that is the furthest from `cell`.
+fn furthest_sq<const D: usize>(cell: [i32; D]) -> f32 {
+    let far = cell.map(|c| c.abs().max((BLOCK_EDGE as i32 - 1 - c).abs()) as f32);
+    far.iter().map(|f| f * f).sum()
+}
+
+/// The seeds of one brick of the map, read when they are needed.
+#[derive(Clone, Copy)]
+pub(super) struct Seeds<'a> {
+    brick: &'a DistanceBrick,
+    rule: &'a CellRule,
+    /// Place of every cell in the layout of the first pass.
+    places: &'a [u16],
+}
+
+impl Source for Seeds<'_> {
+    fn values<'s>(&'s self, scratch: &'s mut [Vec<f32>; 2]) -> &'s [f32] {
+        let [plain, laid_out] = scratch;
+        plain.resize(self.places.len(), 0.0);
+        laid_out.resize(self.places.len(), 0.0);
+        seeds(self.brick.distances(), self.brick.weights(), self.rule, plain);
+        for (&value, &place) in plain.iter().zip(self.places) {
+            laid_out[place as usize] = value;
+        }
+        laid_out
+    }
+}
+
+/// Every observed cell within the band is a seed, `f = (D / r)^2`.
+pub(super) struct Survey<'a, const D: usize> {
+    store: &'a Bricks<SignedDistance, D>,
+    rule: &'a CellRule,
+    places: Vec<u16>,
+    /// The bricks with a seed, ascending.
+    seeded: Vec<BlockKey<D>>,
+    /// The bricks with an observed cell, ascending, and how far each must look, in squared cells.
     pub(super) bricks: Vec<Reach<D>>,
 }
 
-impl<const D: usize> Seeds<D> {
-    /// Every observed cell within the band is a seed, `f = (D / r)^2`.
-    pub(super) fn of(store: &Bricks<SignedDistance, D>, settings: &SparseEsdfSettings, limit: f32) -> Self {
-        let cells = block_cells::<D>();
-        let places: Vec<usize> = (0..cells).map(|i| layout::<D>(0, i)).collect();
-        let inverse = (1.0 / store.lattice().resolution) as f32;
+impl<'a, const D: usize> Survey<'a, D> {
+    pub(super) fn of(store: &'a Bricks<SignedDistance, D>, rule: &'a CellRule) -> Self {
+        let places = (0..block_cells::<D>()).map(|i| layout::<D>(0, i) as u16).collect();
+        let at_zero = |i| furthest_sq(BlockKey([0; D]).cell(i));
+        let furthest: Vec<f32> = (0..block_cells::<D>()).map(at_zero).collect();
         let keys = store.keys();
-        let mut found: Vec<Found<D>> = keys.iter().map(|_| Found::default()).collect();
+        let mut found: Vec<(bool, Option<Anchor<D>>)> = vec![(false, None); keys.len()];
+        // A brick is too little for a task.
+        let tasks = keys.chunks(SURVEYED).zip(found.chunks_mut(SURVEYED)).collect();
         for_each(
-            keys.iter().zip(&mut found).collect(),
+            tasks,
             || (),
-            |(&key, found), ()| {
-                if let Some(brick) = store.brick(key) {
-                    *found = Found::of(key, brick, settings, inverse, &places);
+            |(keys, found), ()| {
+                for (&key, found) in keys.iter().zip(found) {
+                    if let Some(brick) = store.brick(key) {
+                        *found = look(key, brick, &furthest, rule);
+                    }
                 }
             },
         );
-        let mut seeds = Level { keys: Vec::new(), values: Vec::new() };
-        let (mut observed, mut anchors) = (Vec::new(), Vec::new());
-        for (key, found) in keys.into_iter().zip(found).filter(|(_, found)| found.observed) {
+        let (mut observed, mut anchors, mut seeded) = (Vec::new(), Vec::new(), Vec::new());
+        for (key, (_, anchor)) in keys.into_iter().zip(found).filter(|(_, found)| found.0) {
             observed.push(key);
-            anchors.push(found.anchor);
-            if !found.values.is_empty() {
-                seeds.keys.push(key);
-                seeds.values.extend(found.values);
-            }
+            seeded.extend(anchor.map(|_| key));
+            anchors.push(anchor);
         }
-        let bounds = bounds(&observed, anchors, limit);
+        let bounds = bounds(&observed, anchors, rule.limit);
         let bricks = observed.into_iter().zip(bounds).map(|(key, budget)| Reach { key, budget });
-        Self { seeds, bricks: bricks.collect() }
+        let bricks = bricks.collect();
+        Self { store, rule, places, seeded, bricks }
+    }
+
+    /// The bricks with a seed, ascending: sorted by lines along x.
+    pub(super) fn seeds(&self) -> impl Iterator<Item = (BlockKey<D>, Seeds<'_>)> {
+        self.seeded.iter().filter_map(|&key| {
+            let brick = self.store.brick(key)?;
+            Some((key, Seeds { brick, rule: self.rule, places: &self.places }))
+        })
     }
 }
 
-/// What one brick holds.
-struct Found<const D: usize> {
-    observed: bool,
-    anchor: Option<Anchor<D>>,
-    /// Its seeds; empty: none.
-    values: Vec<f32>,
-}
+/// Bricks looked at in one task.
+const SURVEYED: usize = 256;
 
-impl<const D: usize> Default for Found<D> {
-    fn default() -> Self {
-        Self { observed: false, anchor: None, values: Vec::new() }
+/// Whether a brick has an observed cell, and the seed of it that is the least far from all of its cells.
+fn look<const D: usize>(
+    key: BlockKey<D>,
+    brick: &DistanceBrick,
+    furthest: &[f32],
+    rule: &CellRule,
+) -> (bool, Option<Anchor<D>>) {
+    let (observed, best) = survey(brick.distances(), brick.weights(), furthest, rule);
+    if best == f32::INFINITY {
+        return (observed, None);
     }
-}
-
-impl<const D: usize> Found<D> {
-    fn of(
-        key: BlockKey<D>,
-        brick: &DistanceBrick,
-        settings: &SparseEsdfSettings,
-        inverse: f32,
-        places: &[usize],
-    ) -> Self {
-        let mut found = Self::default();
-        let mut best = f32::INFINITY;
-        let cells = brick.distances().iter().zip(brick.weights());
-        for (i, (&distance, &weight)) in cells.enumerate() {
-            if !settings.observed(weight) {
-                continue;
-            }
-            found.observed = true;
-            let offset = distance * inverse;
-            if !(offset.abs() <= settings.band_cells) {
-                continue;
-            }
-            if found.values.is_empty() {
-                found.values.resize(places.len(), f32::INFINITY);
-            }
-            let anchor = Anchor { cell: key.cell(i), value: offset * offset };
-            found.values[places[i]] = anchor.value;
-            let bound = anchor.bound(key);
-            if bound < best {
-                (best, found.anchor) = (bound, Some(anchor));
-            }
-        }
-        found
-    }
+    let mut values = vec![0.0; furthest.len()];
+    seeds(brick.distances(), brick.weights(), rule, &mut values);
+    let at = values.iter().zip(furthest).position(|(value, far)| value + far == best);
+    (observed, at.map(|i| Anchor { cell: key.cell(i), value: values[i] }))
 }
 
 /// For each brick, what no least squared distance in it exceeds: by a seed of its own, or by one that its neighbours
@@ -123,7 +129,7 @@ impl<const D: usize> Found<D> {
 fn bounds<const D: usize>(keys: &[BlockKey<D>], mut anchors: Vec<Option<Anchor<D>>>, limit: f32) -> Vec<f32> {
     let slots: FxHashMap<BlockKey<D>, usize> = keys.iter().enumerate().map(|(i, &key)| (key, i)).collect();
     let bound = |anchor: &Option<Anchor<D>>, i: usize| {
-        // A cell more than rounding could take away.
+        // A little more, for what rounding takes away.
         anchor.as_ref().map_or(limit, |a| (a.bound(keys[i]) * 1.001 + 0.01).min(limit))
     };
     let mut bounds: Vec<f32> = anchors.iter().enumerate().map(|(i, a)| bound(a, i)).collect();

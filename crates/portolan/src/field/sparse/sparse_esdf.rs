@@ -2,8 +2,8 @@
 
 use rustc_hash::FxHashMap;
 
-use super::pass::for_each;
-use super::seeds::Seeds;
+use super::kernels::{CellRule, sign};
+use super::seeds::Survey;
 use super::transform::squared_distances;
 use crate::answer::Answer;
 use crate::cell::SignedDistance;
@@ -25,13 +25,6 @@ impl Default for SparseEsdfSettings {
     /// The chapter's `W_min` 0.5 and band of 1.5 cells; one metre.
     fn default() -> Self {
         Self { min_weight: 0.5, band_cells: 1.5, max_distance: 1.0 }
-    }
-}
-
-impl SparseEsdfSettings {
-    #[inline(always)]
-    pub(super) fn observed(&self, weight: f32) -> bool {
-        weight > 0.0 && weight >= self.min_weight
     }
 }
 
@@ -67,28 +60,20 @@ impl<const D: usize> SparseEsdf<D> {
         assert!(settings.max_distance > 0.0, "distances are maintained up to a positive length");
         let lattice = *store.lattice();
         let limit = ((settings.max_distance / lattice.resolution).powi(2) as f32).min(LARGEST_SQ);
-        let level = squared_distances(Seeds::of(store, settings, limit));
-        let mut distance = level.values;
-        let bricks = level.keys.iter().zip(distance.chunks_exact_mut(block_cells::<D>()));
-        for_each(
-            bricks.collect(),
-            || (),
-            |(&key, values), ()| {
-                let Some(brick) = store.brick(key) else { return };
-                let cells = brick.distances().iter().zip(brick.weights());
-                for (value, (&d, &weight)) in values.iter_mut().zip(cells) {
-                    let length = if *value <= limit {
-                        value.sqrt() * lattice.resolution as f32
-                    } else {
-                        f32::INFINITY
-                    };
-                    *value = if settings.observed(weight) { length.copysign(side(d)) } else { f32::NAN };
-                }
-            },
-        );
+        let rule = CellRule {
+            min_weight: settings.min_weight,
+            band_cells: settings.band_cells,
+            resolution: lattice.resolution as f32,
+            limit,
+        };
+        let level = squared_distances(&Survey::of(store, &rule), |key, values| {
+            if let Some(brick) = store.brick(key) {
+                sign(values, brick.distances(), brick.weights(), &rule);
+            }
+        });
         let slots = level.keys.iter().enumerate().map(|(i, &key)| (key, i as u32)).collect();
         let max_distance = limit.sqrt() * lattice.resolution as f32;
-        Self { lattice, max_distance, slots, keys: level.keys, distance }
+        Self { lattice, max_distance, slots, keys: level.keys, distance: level.values }
     }
 
     /// Index to metres.
@@ -211,11 +196,6 @@ impl<const D: usize> SparseEsdf<D> {
 /// Squares of whole numbers up to this are exact in `f32`.
 const LARGEST_SQ: f32 = 4096.0 * 4096.0;
 
-/// Zero counts as free, whatever its sign.
-fn side(distance: f32) -> f32 {
-    if distance < 0.0 { -1.0 } else { 1.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -226,8 +206,11 @@ mod tests {
 
     const R: f64 = 0.1;
 
+    /// Key, and cells: place, distance, weight.
+    type RandomBrick = ([i32; 3], Vec<(usize, f32, f32)>);
+
     /// Random cells of random bricks: mostly free or unobserved, some within the band.
-    fn store<const D: usize>(bricks: &[([i32; 3], Vec<(usize, f32, f32)>)]) -> Bricks<SignedDistance, D> {
+    fn store<const D: usize>(bricks: &[RandomBrick]) -> Bricks<SignedDistance, D> {
         let mut store = Bricks::new(Lattice::new([500_000.0; D], R));
         for (key, cells) in bricks {
             let key = BlockKey(std::array::from_fn(|k| key[k]));
@@ -242,17 +225,14 @@ mod tests {
         store
     }
 
-    fn bricks() -> impl Strategy<Value = Vec<([i32; 3], Vec<(usize, f32, f32)>)>> {
+    fn bricks() -> impl Strategy<Value = Vec<RandomBrick>> {
         let distance = prop_oneof![4 => 0.2f32..0.3, 1 => -0.3f32..-0.2, 1 => -0.16f32..0.16];
         let cell = (any::<usize>(), distance, prop_oneof![Just(0.0f32), 0.2f32..4.0]);
         let at = prop_oneof![3 => -2..3i32, 1 => Just(40_000_000)];
         prop::collection::vec((prop::array::uniform3(at), prop::collection::vec(cell, 1..60)), 0..12)
     }
 
-    fn matches_brute_force<const D: usize>(
-        bricks: &[([i32; 3], Vec<(usize, f32, f32)>)],
-        settings: &SparseEsdfSettings,
-    ) {
+    fn matches_brute_force<const D: usize>(bricks: &[RandomBrick], settings: &SparseEsdfSettings) {
         let store = store::<D>(bricks);
         let esdf = SparseEsdf::of(&store, settings);
         let observed: Vec<([i32; D], f32)> = store
@@ -260,7 +240,7 @@ mod tests {
             .iter()
             .flat_map(|&key| (0..block_cells::<D>()).map(move |i| key.cell(i)))
             .filter_map(|cell| {
-                store.cell(cell).filter(|c| settings.observed(c.weight)).map(|c| (cell, c.distance))
+                store.cell(cell).filter(|c| c.weight >= settings.min_weight).map(|c| (cell, c.distance))
             })
             .collect();
         let seeds: Vec<_> =
