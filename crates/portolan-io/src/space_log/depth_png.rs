@@ -95,3 +95,63 @@ pub(super) fn size_within_limits(
     }
     Ok([width as usize, height as usize])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space_log::testing::{grey_png, png_of, write};
+    use crate::testing::bad_bytes;
+
+    fn read(bytes: &[u8]) -> Result<Depth, IoError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("d.png");
+        write(&path, bytes);
+        read_depth(&path, 1000.0)
+    }
+
+    #[test]
+    fn units_become_metres_and_what_is_no_reading_is_zero() {
+        let depth = read(&grey_png([3, 2], &[0, 1, 1500, u16::MAX, 65534, 40_001])).unwrap();
+        assert_eq!((depth.columns, depth.rows), (3, 2));
+        assert_eq!(depth.values, [0.0, 0.001, 1.5, 0.0, 65.534, 40.001]);
+    }
+
+    #[test]
+    fn other_pictures_are_refused() {
+        let eight = png_of([2, 1], ColorType::Grayscale, BitDepth::Eight, &[1, 2]);
+        let colored = png_of([1, 1], ColorType::Rgb, BitDepth::Sixteen, &[1; 6]);
+        let whole = grey_png([9, 9], &[7; 81]);
+        // A size that the bytes cannot hold: 30000 x 30000.
+        let mut vast = whole.clone();
+        vast[16..24].copy_from_slice(&[0, 0, 0x75, 0x30, 0, 0, 0x75, 0x30]);
+        let crc = crc_of_header(&vast);
+        vast[29..33].copy_from_slice(&crc);
+        for (bytes, part) in [
+            (&eight[..], "d.png: the depth image is Grayscale of 8 bits; give 16-bit grey"),
+            (&colored, "the depth image is Rgb of 16 bits"),
+            (&vast, "the size of the picture is 30000 x 30000 in"),
+            (b"P5", "the picture is damaged"),
+            (&whole[..whole.len() - 20], "the picture is damaged"),
+        ] {
+            let Err(error) = read(bytes) else { panic!("read what should be: {part}") };
+            assert!(error.to_string().contains(part), "{error}");
+        }
+        for bytes in bad_bytes(&whole, 6, 2000) {
+            if let Err(e) = read(&bytes) {
+                assert!(!e.to_string().contains('\n'), "{e}");
+            }
+        }
+    }
+
+    /// CRC-32 of the header chunk of a PNG, bit by bit.
+    fn crc_of_header(png: &[u8]) -> [u8; 4] {
+        let mut crc = u32::MAX;
+        for byte in &png[12..29] {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg());
+            }
+        }
+        (!crc).to_be_bytes()
+    }
+}

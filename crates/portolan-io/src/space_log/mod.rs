@@ -3,6 +3,9 @@
 //! | kind | layout | poses |
 //! |---|---|---|
 //! | [`SevenScenes`](SpaceLogKind::SevenScenes) | `frame-NNNNNN.depth.png`, `.color.jpg` or `.color.png` | `frame-NNNNNN.pose.txt` |
+//! | [`TumRgbd`](SpaceLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
+//! | [`Redwood`](SpaceLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
+//! | [`BigBird`](SpaceLogKind::BigBird) | `masked_depth/frameF_camC.png` | `pose/poses.txt` |
 //!
 //! [`SpaceLog::open`] finds the files, reads the poses and says in [`SpaceLogStats`] what does not fit together; the scans
 //! themselves are read when they are asked for, by index and from any thread.
@@ -11,6 +14,8 @@
 //! scans and where their poses are, and a kind in `kind.rs`. Matching poses with scans, conventions, mending and refusing
 //! happen once, in `log.rs`.
 
+mod bigbird;
+mod color;
 mod depth_frames;
 mod depth_png;
 mod files;
@@ -20,8 +25,12 @@ mod log;
 mod matching;
 mod options;
 mod parts;
+mod redwood;
 mod seven_scenes;
 mod stats;
+#[cfg(test)]
+mod testing;
+mod tum_rgbd;
 
 pub use intrinsics::{Camera, CameraFrom, Intrinsics};
 pub use kind::SpaceLogKind;
