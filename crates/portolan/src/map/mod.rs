@@ -5,6 +5,7 @@ mod error;
 mod integrate;
 mod occupancy_grid;
 mod repr;
+mod sparse_occupancy;
 mod tree_map;
 mod tsdf;
 
@@ -12,6 +13,7 @@ pub use cloud::Cloud;
 pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
+pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
 pub use tree_map::{Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 

@@ -11,6 +11,7 @@ mod fan;
 mod fan_plan;
 mod march;
 mod nearest_ray;
+pub(crate) mod occupancy;
 mod rays;
 mod touched;
 mod weight;
