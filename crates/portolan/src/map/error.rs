@@ -28,6 +28,24 @@ pub enum MapError {
     /// The weight of free space is not between 0 and 1.
     #[error("carve_weight must be above 0 and at most 1, got {0}")]
     CarveWeight(f32),
+    /// The ranges that are used are none, or reach further than a scan is searched.
+    #[error(
+        "ranges from {min} to {max} m are not possible: need 0 <= min < max, and max below {most} m at this resolution"
+    )]
+    Ranges {
+        /// Smallest range used (metres).
+        min: f64,
+        /// Largest range used (metres).
+        max: f64,
+        /// Limit at this resolution (metres).
+        most: f64,
+    },
+    /// A range image contradicts itself.
+    #[error("a range image cannot be used: {0}")]
+    Image(&'static str),
+    /// Distances and colours lie on different lattices.
+    #[error("the lattices of distances and colours differ")]
+    Lattices,
     /// Bricks would need more memory than they may have.
     #[error(transparent)]
     Full(#[from] BricksFull),

@@ -6,6 +6,8 @@ mod integrate;
 mod occupancy_grid;
 mod repr;
 mod sparse_occupancy;
+mod sparse_error;
+mod sparse_tsdf;
 mod tree_map;
 mod tsdf;
 
@@ -14,6 +16,7 @@ pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
+pub use sparse_tsdf::{PointSweep, SparseTsdf, SparseTsdfConfig};
 pub use tree_map::{Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 

@@ -23,7 +23,7 @@ mod stats;
 
 pub use beam::{Beam, BeamKind};
 pub use incidence::cos_incidence;
-pub(crate) use incidence::{MAX_OPENING, connected};
+pub(crate) use incidence::{MAX_OPENING, MAX_SLOPE, connected};
 pub use laser::RangeLimits;
 pub use point_scan::{Frame, Origin, PointScan};
 pub use range_image::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
