@@ -36,8 +36,8 @@ mod detect;
 mod error;
 mod esdf_bin;
 mod geojson;
-mod log_writer;
 mod kitti_bin;
+mod log_writer;
 mod map_file;
 mod map_server;
 mod octomap;
@@ -65,13 +65,12 @@ pub use detect::{FileKind, detect};
 pub use error::IoError;
 pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
 pub use geojson::{parse_geojson, read_geojson, write_geojson};
+pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{
     AnyMapFile, ColorBricks, MapFile, MapHeader, OccupancyBricks, SpaceMapFile, TsdfBricks, sweep_of,
     sweep_word, weights_of, weights_word,
 };
-pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
-pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
 pub use pcd::{read_pcd, write_pcd};

@@ -54,6 +54,9 @@ impl Summary<'_> {
         if stats.hits_outside > 0 {
             warnings.push(format!("{} hits lie outside of --bounds", stats.hits_outside));
         }
+        if self.derived.mesh.as_ref().is_some_and(|m| m.triangles.is_empty()) {
+            warnings.push("no surface was found".to_owned());
+        }
         if let Some(full) = &self.fusion.full {
             warnings.push(format!("fusing ended early: {full}"));
         }
@@ -101,6 +104,7 @@ impl Summary<'_> {
             "refused_beams": stats["refused_beams"],
             "observations": self.fusion.observations,
             "extent": json::aabb(&self.extent()),
+            "mesh": mesh,
             "octree": tree,
             "bytes": self.bytes,
             "peak_memory": super::peak_memory(),
@@ -138,6 +142,10 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     let sizes: Vec<_> =
         summary.bytes.iter().map(|(name, &n)| format!("{name} {}", shown_bytes(n as f64))).collect();
     let _ = writeln!(text, "{}", sizes.join(", "));
+    if let Some(mesh) = &summary.derived.mesh {
+        let (n, area) = (mesh.triangles.len(), mesh.area());
+        let _ = writeln!(text, "mesh of {n} triangles, {area:.2} m²");
+    }
     let per_scan: Vec<_> = ["tree", "tsdf"]
         .iter()
         .filter(|name| summary.seconds.contains_key(*name))

@@ -54,7 +54,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     file.poses.extend(&fusion.poses);
     describe(&mut file, &settings, &log, &fusion.stats);
 
-    let derived = Derived::of(&maps, &settings)?;
+    let derived = Derived::of(&maps, &settings);
     bytes.extend(derived.bytes());
     let mut seconds = watch.total();
     std::fs::create_dir_all(&args.out).with_context(|| {
