@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::bail;
 use portolan::cell::LogOddsRule;
-use portolan_io::{IoError, SpaceMapFile, write_atomic, write_octomap_bt, write_octomap_ot};
+use portolan_io::{IoError, SpaceMapFile, write_octomap_bt, write_octomap_ot};
 
 use super::Derived;
 

@@ -79,6 +79,14 @@ impl Summary<'_> {
     /// `summary.json`.
     pub(crate) fn to_json(&self) -> Value {
         let stats = json::stats(&self.fusion.stats);
+        let mesh = self.derived.mesh.as_ref().map(|m| {
+            json!({
+                "vertices": m.vertices.len(),
+                "triangles": m.triangles.len(),
+                "area": m.area(),
+                "colors": !m.colors.is_empty(),
+            })
+        });
         let tree =
             self.derived.tree.as_ref().map(|t| json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }));
         json!({
