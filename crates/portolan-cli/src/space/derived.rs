@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use portolan::cell::LogOdds8;
 use portolan::field::{SparseEsdf, SparseEsdfSettings};
-use portolan::map::SparseTsdfConfig;
 use portolan::store::{Store, Tree};
 use portolan::surface::{Mesh, MeshSettings, marching_cubes};
 use portolan::sweep::WeightModel;
@@ -39,7 +38,7 @@ impl Derived {
         }
         if settings.wants(MapKind::Esdf) {
             let start = Instant::now();
-            let how = esdf_settings(tsdf.config(), settings.max_distance);
+            let how = esdf_settings(settings.weights, settings.carve_weight, settings.max_distance);
             derived.esdf = Some(SparseEsdf::of(tsdf.store(), &how));
             derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
         }
@@ -60,7 +59,11 @@ pub(crate) fn mesh_settings(weights: WeightModel) -> MeshSettings {
 }
 
 /// A `W_min` of half of what one ordinary observation of free space weighs: what was seen free once is known.
-pub(crate) fn esdf_settings(config: &SparseTsdfConfig, max_distance: f64) -> SparseEsdfSettings {
-    let min_weight = 0.5 * config.weights.typical_low() * config.carve_weight;
+pub(crate) fn esdf_settings(
+    weights: WeightModel,
+    carve_weight: f32,
+    max_distance: f64,
+) -> SparseEsdfSettings {
+    let min_weight = 0.5 * weights.typical_low() * carve_weight;
     SparseEsdfSettings { min_weight, max_distance, ..SparseEsdfSettings::default() }
 }

@@ -10,7 +10,7 @@ mod settings;
 mod words;
 
 pub(crate) use artefacts::Artefacts;
-pub(crate) use derived::Derived;
+pub(crate) use derived::{Derived, esdf_settings, mesh_settings};
 pub(crate) use extent::brick_extent;
 pub(crate) use fuse::{Fusion, fuse};
 pub(crate) use maps::SpaceMaps;
