@@ -40,7 +40,6 @@ pub(crate) fn has_name(folder: &Path, wanted: impl Fn(&str) -> bool) -> bool {
 }
 
 /// Whether a name ends like this, in capitals or not.
-#[allow(dead_code)] // the formats that come next need it
 pub(crate) fn has_extension(name: &str, extension: &str) -> bool {
     let at = name.len().checked_sub(extension.len() + 1);
     at.and_then(|at| name.get(at..))

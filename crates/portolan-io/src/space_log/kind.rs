@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::parts::Parts;
-use super::{SpaceLogOptions, seven_scenes};
+use super::{SpaceLogOptions, clouds, graph, kitti, seven_scenes, stanford};
 use crate::IoError;
 
 /// A kind of log of scans of space.
@@ -12,6 +12,14 @@ use crate::IoError;
 pub enum SpaceLogKind {
     /// A folder of `frame-NNNNNN.depth.png` with `frame-NNNNNN.pose.txt` (7-Scenes, 3DMatch).
     SevenScenes,
+    /// A folder `velodyne` of `.bin` scans with `poses.txt` and `calib.txt` (KITTI, SemanticKITTI).
+    Kitti,
+    /// A `.conf` file with range scans in PLY files (Stanford), or its folder.
+    Stanford,
+    /// A scan graph of OctoMap.
+    ScanGraph,
+    /// A folder of PCD, PLY, `.bin` or text files with a file of poses, or of PCD files in the world's frame; a single cloud.
+    Clouds,
 }
 
 /// What the crate knows of a kind.
@@ -25,7 +33,8 @@ struct Format {
 
 impl SpaceLogKind {
     /// All kinds, in the order in which they are tried.
-    pub const ALL: [Self; 1] = [Self::SevenScenes];
+    pub const ALL: [Self; 5] =
+        [Self::SevenScenes, Self::Kitti, Self::Stanford, Self::ScanGraph, Self::Clouds];
 
     fn format(self) -> Format {
         match self {
@@ -35,6 +44,27 @@ impl SpaceLogKind {
                 is_it: seven_scenes::is_it,
                 open: seven_scenes::open,
             },
+            Self::Kitti => Format {
+                word: "kitti",
+                label: "lidar scans with poses (KITTI)",
+                is_it: kitti::is_it,
+                open: kitti::open,
+            },
+            Self::Stanford => Format {
+                word: "stanford",
+                label: "range scans with a .conf file (Stanford)",
+                is_it: stanford::is_it,
+                open: stanford::open,
+            },
+            Self::ScanGraph => Format {
+                word: "scan-graph",
+                label: "scan graph (OctoMap)",
+                is_it: graph::is_it,
+                open: graph::open,
+            },
+            Self::Clouds => {
+                Format { word: "clouds", label: "clouds of points", is_it: clouds::is_it, open: clouds::open }
+            }
         }
     }
 

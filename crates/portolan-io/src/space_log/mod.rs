@@ -3,6 +3,10 @@
 //! | kind | layout | poses |
 //! |---|---|---|
 //! | [`SevenScenes`](SpaceLogKind::SevenScenes) | `frame-NNNNNN.depth.png`, `.color.jpg` or `.color.png` | `frame-NNNNNN.pose.txt` |
+//! | [`Kitti`](SpaceLogKind::Kitti) | `velodyne/*.bin`, `times.txt` | `poses.txt` of the camera, `Tr` of `calib.txt` |
+//! | [`Stanford`](SpaceLogKind::Stanford) | PLY files with a `range_grid` | `.conf`: conjugated quaternions |
+//! | [`ScanGraph`](SpaceLogKind::ScanGraph) | a `.graph` file | in the file |
+//! | [`Clouds`](SpaceLogKind::Clouds) | `*.pcd`, `*.ply`, `*.bin` or `*.xyz`; one such file | a file like `*pose*.csv`, or none: PCD viewpoints |
 //!
 //! [`SpaceLog::open`] finds the files, reads the poses and says in [`SpaceLogStats`] what does not fit together; the scans
 //! themselves are read when they are asked for, by index and from any thread.
@@ -11,16 +15,24 @@
 //! scans and where their poses are, and a kind in `kind.rs`. Matching poses with scans, conventions, mending and refusing
 //! happen once, in `log.rs`.
 
+mod agreement;
+mod cloud_frames;
+mod clouds;
 mod depth_frames;
 mod depth_png;
 mod files;
+mod graph;
 mod intrinsics;
 mod kind;
+mod kitti;
+#[cfg(test)]
+mod lidar_tests;
 mod log;
 mod matching;
 mod options;
 mod parts;
 mod seven_scenes;
+mod stanford;
 mod stats;
 
 pub use intrinsics::{Camera, CameraFrom, Intrinsics};

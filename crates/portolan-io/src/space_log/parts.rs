@@ -13,6 +13,11 @@ use crate::poses3::{PoseConvention, PoseFile, RawPose};
 pub(crate) trait FrameSource: Send + Sync {
     /// Scan `i` of those that the format found.
     fn frame(&self, i: usize) -> Result<Frame, IoError>;
+
+    /// Where the sensor stood in the frame of scan `i` (metres): not in its zero where clouds are in the world's frame.
+    fn origin(&self, _i: usize) -> [f64; 3] {
+        [0.0; 3]
+    }
 }
 
 /// A scan that was found but not read.
@@ -29,7 +34,6 @@ pub(crate) struct ScanId {
 /// Where the poses of a layout are.
 pub(crate) enum LayoutPoses {
     /// Nowhere: the text says what was looked for. `--poses` must tell.
-    #[allow(dead_code)] // the formats that come next need it
     Missing(String),
     /// One per scan, with the file that holds it.
     PerScan(Vec<Option<(PathBuf, RawPose)>>),

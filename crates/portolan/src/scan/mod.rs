@@ -15,6 +15,7 @@ mod incidence;
 mod laser;
 mod point_scan;
 mod range_image;
+mod range_surface;
 mod record;
 mod stats;
 
@@ -24,5 +25,6 @@ pub(crate) use incidence::{MAX_OPENING, connected};
 pub use laser::RangeLimits;
 pub use point_scan::{Frame, Origin, PointScan};
 pub use range_image::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
+pub use range_surface::orthographic_image;
 pub use record::{BeamOrder, Scan};
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};
