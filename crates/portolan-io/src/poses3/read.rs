@@ -245,3 +245,131 @@ fn stamps_out_of_corners(poses: &mut [RawPose]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::poses3::{PoseConvention, PoseFault};
+    use crate::testing::{bad_bytes, real_data};
+    use portolan::geom::Pose;
+    use portolan::geom::vector::distance;
+
+    fn parse(text: impl Into<Vec<u8>>) -> Result<PoseFile, IoError> {
+        parse_poses_3d(Input::from_reader(std::io::Cursor::new(text.into()), "p.txt".as_ref())?)
+    }
+
+    /// A turn of 0.6 about z.
+    const TURN: &str = "0.825335615 -0.564642473 0";
+    const ROWS: [&str; 3] = ["0.825335615 -0.564642473 0 1", "0.564642473 0.825335615 0 -2", "0 0 1 3"];
+    const QUATERNION: &str = "0 0 0.295520207 0.955336489";
+
+    #[test]
+    fn every_layout_is_the_same_pose() {
+        let [a, b, c] = ROWS;
+        let expected =
+            Pose::<3>::from_quaternion([1.0, -2.0, 3.0], [0.0, 0.0, 0.3f64.sin(), 0.3f64.cos()]).unwrap();
+        let commas = |row: &str| row.replace(' ', ",") + ",";
+        for (text, layout, count) in [
+            (format!("{a}\n{b}\n{c}\n0 0 0 1\n"), PoseLayout::Matrices, 1),
+            (format!("{a}\n{b}\n{c}"), PoseLayout::Matrices, 1),
+            (format!("\n{a}\n{b}\n{c}\n0 0 0 1\n\n{a}\n{b}\n{c}\n0 0 0 1\n"), PoseLayout::Matrices, 2),
+            ([a, b, c, "0 0 0 1\n"].map(commas).join("\n"), PoseLayout::Matrices, 1),
+            (format!("0 0 1\n{a}\n{b}\n{c}\n0 0 0 1\n").repeat(3), PoseLayout::RedwoodLog, 3),
+            (format!("1 -2 3 {QUATERNION}"), PoseLayout::Quaternions, 1),
+            (format!("# t\n7.5 1 -2 3 {QUATERNION} # here\n"), PoseLayout::Tum, 1),
+            (format!("{a} {b} {c}\n"), PoseLayout::Kitti, 1),
+            (format!("{a};{b};{c};0;0;0;1").replace(' ', ";"), PoseLayout::MatrixRows, 1),
+        ] {
+            let file = parse(text.clone()).unwrap();
+            assert_eq!((file.layout, file.poses.len()), (layout, count), "{text}");
+            for raw in &file.poses {
+                let (pose, off) = raw.resolve(PoseConvention::WorldFromSensor).unwrap();
+                assert!(off < 1e-8, "{off}");
+                assert_eq!(raw.time, (layout == PoseLayout::Tum).then_some(7.5));
+                assert_eq!(raw.number, (layout == PoseLayout::RedwoodLog).then_some(0));
+                let p = [0.2, 0.7, -0.4];
+                assert!(distance(pose.transform_point(p), expected.transform_point(p)) < 1e-8, "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn corners_that_are_not_one_are_stamps() {
+        let block = |stamp: &str| format!("1,0,0,1,\n0,1,0,2,\n0,0,1,3,\n0,0,0,{stamp},\n");
+        let file = parse(block("1630577758.569490") + &block("1") + &block("0.5")).unwrap();
+        let times: Vec<_> = file.poses.iter().map(|p| p.time.unwrap()).collect();
+        assert_eq!(times, [1_630_577_758.569_49, 1.0, 0.5]);
+        assert!(file.poses.iter().all(|p| p.resolve(PoseConvention::WorldFromSensor).is_ok()));
+        assert_eq!(parse(block("1") + &block("1.000000")).unwrap().poses[1].time, None);
+        let lost = parse(block("5") + &block("nan")).unwrap();
+        assert_eq!(lost.poses[1].resolve(PoseConvention::default()), Err(PoseFault::NotFinite));
+    }
+
+    #[test]
+    fn what_is_no_pose_is_refused_when_it_is_resolved() {
+        let fault =
+            |text: &str| parse(text).unwrap().poses[0].resolve(PoseConvention::default()).unwrap_err();
+        assert!(matches!(fault("2 0 0 0 0 2 0 0 0 0 2 0"), PoseFault::NotRigid(off) if off == 3.0));
+        assert!(matches!(fault("1 0 0 0 0 1 0 0 0 0 -1 0"), PoseFault::NotRigid(2.0)));
+        assert_eq!(fault("1 0 0 inf 0 1 0 0 0 0 1 0"), PoseFault::NotFinite);
+        assert_eq!(fault("1 0 0 3e12 0 1 0 0 0 0 1 0"), PoseFault::TooFar(3e12));
+        assert_eq!(fault("1 0 0 0 0 1 0 0 0 0 1 0 1 2 3 1"), PoseFault::LastRow([1.0, 2.0, 3.0, 1.0]));
+        assert!(matches!(fault("0 0 0 0 0 0 0"), PoseFault::NotRigid(1.0)));
+        assert!(matches!(fault("0 0 0 0 0 0 0.9"), PoseFault::NotRigid(_)));
+        let rounded = parse("0 0 0 0 0 0 0.9995").unwrap();
+        let (pose, off) = rounded.poses[0].resolve(PoseConvention::default()).unwrap();
+        assert!(pose.is_rigid() && (off - 2e-3).abs() < 1e-5);
+    }
+
+    #[test]
+    fn errors_name_the_place() {
+        let row = format!("{TURN} 1\n");
+        for (text, part) in [
+            ("1 2\n".to_owned(), "p.txt: line 1: the number of columns is 2; write 4"),
+            ("1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18".into(), "the number of columns is 17"),
+            ("# nothing\n\n".into(), "line 2: the number of poses is 0"),
+            ("a b c d\n".into(), "line 1: column 1 is \"a\"; write a number"),
+            (format!("{row}1 2 3\n"), "line 2: the number of columns is 3; give row 2 of a matrix"),
+            (row.repeat(6), "line 5: the number of rows of the last matrix is 2; give all four rows"),
+            (
+                format!("0 0 1\n{row}{row}{row}{row}{row}"),
+                "line 6: the number of columns is 4; give three integers",
+            ),
+            ("0.5 0 1\n".into(), "line 1: column 1 is 0.5; write three integers"),
+            ("0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0\n".into(), "line 2: the number of columns is 7; give 8 columns"),
+            ("nan 1 2 3 0 0 0 1\n".into(), "line 1: the time is NaN"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        let [a, b, c] = ROWS;
+        for good in [
+            format!("0 0 1\n{a}\n{b}\n{c}\n0 0 0 1\n"),
+            format!("{a}\n{b}\n{c}\n0 0 0 1630577758.5\n"),
+            format!("7.5 1 -2 3 {QUATERNION}\n8 1 -2 3 {QUATERNION}\n"),
+        ] {
+            for bytes in bad_bytes(good.as_bytes(), 5, 2000) {
+                for raw in parse(bytes).iter().flat_map(|file| &file.poses) {
+                    for convention in PoseConvention::ALL {
+                        assert!(raw.resolve(convention).map_or(true, |(pose, _)| pose.is_rigid()));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_stamps_of_the_real_hall_are_in_the_corner() {
+        let Some(path) = real_data("lidar3d_balm_hall/alidarPose.csv") else { return };
+        let file = read_poses_3d(path).unwrap();
+        assert_eq!((file.layout, file.poses.len()), (PoseLayout::Matrices, 96));
+        let times: Vec<f64> = file.poses.iter().map(|p| p.time.unwrap()).collect();
+        assert!(times.windows(2).all(|w| (w[1] - w[0] - 0.5).abs() < 0.01));
+        assert_eq!(times[0], 1_630_577_758.569_49);
+        assert!(file.poses.iter().all(|p| p.resolve(PoseConvention::default()).unwrap().1 < 1e-5));
+    }
+}

@@ -99,3 +99,63 @@ fn quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
     q[3] = r[k][j] - r[j][k];
     unit(q).unwrap_or(q)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Random;
+    use portolan::geom::vector::distance;
+
+    fn track(poses: &[(f64, Option<Pose<3>>)]) -> Vec<TrackPose> {
+        poses.iter().map(|(time, pose)| TrackPose { pose: *pose, time: Some(*time), number: None }).collect()
+    }
+
+    fn about_z(x: f64, angle: f64) -> Pose<3> {
+        Pose::<3>::from_quaternion([x, 0.0, 0.0], [0.0, 0.0, (angle / 2.0).sin(), (angle / 2.0).cos()])
+            .unwrap()
+    }
+
+    #[test]
+    fn between_poses_the_way_is_straight_and_the_turn_even() {
+        // Out of order, one refused, then a gap.
+        let poses = [
+            (0.10, Some(about_z(1.0, 1.0))),
+            (0.00, Some(about_z(0.0, 0.0))),
+            (0.05, None),
+            (9.00, Some(about_z(5.0, -2.0))),
+        ];
+        let poses = TimedPoses::new(&track(&poses)).unwrap();
+        assert_eq!(poses.span(), Some((0.0, 9.0)));
+        let near = |time: f64, tolerance: f64, x: f64, angle: f64| {
+            let (found, expected) = (poses.at(time, tolerance).unwrap(), about_z(x, angle));
+            let off = distance(found.transform_point([1.0; 3]), expected.transform_point([1.0; 3]));
+            assert!(off < 1e-12 && found.is_rigid(), "{time}: {found:?}");
+        };
+        near(0.0, 0.02, 0.0, 0.0);
+        near(0.1, 0.0, 1.0, 1.0);
+        near(0.02, 0.02, 0.2, 0.2);
+        near(0.085, 0.02, 0.85, 0.85);
+        assert_eq!(poses.at(0.05, 0.02), None, "too far from both");
+        near(0.05, 0.05, 0.5, 0.5);
+        near(-0.01, 0.02, 0.0, 0.0);
+        near(0.11, 0.02, 1.0, 1.0); // the gap after it is too long to interpolate
+        near(9.02, 0.021, 5.0, -2.0);
+        assert_eq!(poses.at(f64::NAN, 1.0), None);
+        assert!(TimedPoses::new(&track(&[(0.0, Some(Pose::IDENTITY)); 3])).is_none(), "zero is no time");
+    }
+
+    #[test]
+    fn quaternions_of_rotations_give_the_rotation_again() {
+        let mut random = Random(3);
+        for k in 0..2000 {
+            let mut q = [0; 4].map(|_| 2.0 * random.unit() - 1.0);
+            // Half turns are where a trace alone would cancel.
+            q[3] *= [1.0, 1e-9, 0.0][k % 3];
+            let Some(pose) = Pose::<3>::from_quaternion([0.0; 3], q) else { continue };
+            let again = Pose::<3>::from_quaternion([0.0; 3], quaternion(&pose.rotation)).unwrap();
+            for p in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+                assert!(distance(pose.transform_point(p), again.transform_point(p)) < 1e-12);
+            }
+        }
+    }
+}

@@ -27,8 +27,11 @@ pub(super) struct Depth {
 
 /// Reads a depth image of so many units per metre. The values 0 and 65535 are no reading.
 pub(super) fn read_depth(path: &Path, units_per_metre: f64) -> Result<Depth, IoError> {
-    let bytes = read_picture(path)?;
-    let mut reader = png_reader(path, &bytes)?;
+    decode_depth(path, &read_picture(path)?, units_per_metre)
+}
+
+fn decode_depth(path: &Path, bytes: &[u8], units_per_metre: f64) -> Result<Depth, IoError> {
+    let mut reader = png_reader(path, bytes)?;
     let [columns, rows] = depth_size(path, reader.info(), bytes.len())?;
     let mut raw = vec![0; columns * rows * 2];
     reader.next_frame(&mut raw).map_err(|e| damaged(path, &e.to_string()))?;
@@ -94,4 +97,61 @@ pub(super) fn size_within_limits(
         return Err(IoError::layout(path, "the size of the picture", value, advice));
     }
     Ok([width as usize, height as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space_log::testing::{grey_png, png_of};
+    use crate::testing::bad_bytes;
+
+    fn read(bytes: &[u8]) -> Result<Depth, IoError> {
+        decode_depth("d.png".as_ref(), bytes, 1000.0)
+    }
+
+    #[test]
+    fn units_become_metres_and_what_is_no_reading_is_zero() {
+        let depth = read(&grey_png([3, 2], &[0, 1, 1500, u16::MAX, 65534, 40_001])).unwrap();
+        assert_eq!((depth.columns, depth.rows), (3, 2));
+        assert_eq!(depth.values, [0.0, 0.001, 1.5, 0.0, 65.534, 40.001]);
+    }
+
+    #[test]
+    fn other_pictures_are_refused() {
+        let eight = png_of([2, 1], ColorType::Grayscale, BitDepth::Eight, &[1, 2]);
+        let colored = png_of([1, 1], ColorType::Rgb, BitDepth::Sixteen, &[1; 6]);
+        let whole = grey_png([9, 9], &[7; 81]);
+        // A size that the bytes cannot hold: 30000 x 30000.
+        let mut vast = whole.clone();
+        vast[16..24].copy_from_slice(&[0, 0, 0x75, 0x30, 0, 0, 0x75, 0x30]);
+        let crc = crc_of_header(&vast);
+        vast[29..33].copy_from_slice(&crc);
+        for (bytes, part) in [
+            (&eight[..], "d.png: the depth image is Grayscale of 8 bits; give 16-bit grey"),
+            (&colored, "the depth image is Rgb of 16 bits"),
+            (&vast, "the size of the picture is 30000 x 30000 in"),
+            (b"P5", "the picture is damaged"),
+            (&whole[..whole.len() - 20], "the picture is damaged"),
+        ] {
+            let Err(error) = read(bytes) else { panic!("read what should be: {part}") };
+            assert!(error.to_string().contains(part), "{error}");
+        }
+        for bytes in bad_bytes(&whole, 6, 2000) {
+            if let Err(e) = read(&bytes) {
+                assert!(!e.to_string().contains('\n'), "{e}");
+            }
+        }
+    }
+
+    /// CRC-32 of the header chunk of a PNG, bit by bit.
+    fn crc_of_header(png: &[u8]) -> [u8; 4] {
+        let mut crc = u32::MAX;
+        for byte in &png[12..29] {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg());
+            }
+        }
+        (!crc).to_be_bytes()
+    }
 }

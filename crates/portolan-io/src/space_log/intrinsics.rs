@@ -1,10 +1,12 @@
 //! The numbers of a camera, and where they come from.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use portolan::scan::Pinhole;
 use serde_json::Value;
 
+use super::SpaceLogOptions;
 use crate::IoError;
 use crate::bytes::{open, parse_f64};
 
@@ -27,7 +29,7 @@ impl Intrinsics {
         }
     }
 
-    pub(super) fn camera(&self) -> Result<Camera, IoError> {
+    fn camera(&self) -> Result<Camera, IoError> {
         match self {
             Self::File(path) => read_intrinsics(path),
             Self::Pinhole(pinhole) => {
@@ -49,6 +51,16 @@ pub enum CameraFrom {
     DataSet(&'static str),
 }
 
+impl fmt::Display for CameraFrom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Caller => write!(f, "given"),
+            Self::File(path) => write!(f, "{}", path.display()),
+            Self::DataSet(name) => write!(f, "published for {name}"),
+        }
+    }
+}
+
 /// The camera of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
@@ -61,10 +73,6 @@ pub struct Camera {
 }
 
 impl Camera {
-    pub(super) fn of_data_set(name: &'static str, [fx, fy, cx, cy]: [f64; 4]) -> Self {
-        Self { pinhole: Pinhole { fx, fy, cx, cy }, from: CameraFrom::DataSet(name), size: None }
-    }
-
     /// # Errors
     /// [`IoError::Layout`] where the camera is not one of pictures of this size: a common mix-up.
     pub(super) fn check_size(&self, picture: &Path, size: [usize; 2]) -> Result<(), IoError> {
@@ -89,9 +97,33 @@ impl Camera {
     }
 }
 
+/// The camera of a log: what the caller gave, else the first of these files that is there, else what the data set's makers
+/// publish.
+///
+/// # Errors
+/// [`IoError::Layout`] where there is none of them, and the errors of reading.
+pub(super) fn find_camera(
+    folder: &Path,
+    files: &[&str],
+    published: Option<(&'static str, [f64; 4])>,
+    options: &SpaceLogOptions,
+) -> Result<Camera, IoError> {
+    if let Some(given) = &options.intrinsics {
+        return given.camera();
+    }
+    if let Some(file) = files.iter().map(|name| folder.join(name)).find(|file| file.is_file()) {
+        return read_intrinsics(&file);
+    }
+    let Some((name, [fx, fy, cx, cy])) = published else {
+        let advice = format!("give fx,fy,cx,cy or a file with --intrinsics, or put it at {}", files[0]);
+        return Err(IoError::layout(folder, "the camera", "not known", advice));
+    };
+    Ok(Camera { pinhole: Pinhole { fx, fy, cx, cy }, from: CameraFrom::DataSet(name), size: None })
+}
+
 /// Reads the numbers of a camera: nine numbers of a 3x3 matrix, sixteen of a 4x4 one, four (`fx fy cx cy`), or json
 /// (`intrinsic_matrix` of Open3D, which is column by column, or `fx`, `fy`, `cx`, `cy`).
-pub(super) fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
+fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
     const LIMIT: u64 = 1 << 20;
     let bytes = open(path)?.read_all(LIMIT)?;
     let text = String::from_utf8_lossy(&bytes);

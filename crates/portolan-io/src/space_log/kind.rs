@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::parts::Parts;
-use super::{SpaceLogOptions, clouds, graph, kitti, seven_scenes, stanford};
+use super::{SpaceLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
 use crate::IoError;
 
 /// A kind of log of scans of space.
@@ -12,6 +12,12 @@ use crate::IoError;
 pub enum SpaceLogKind {
     /// A folder of `frame-NNNNNN.depth.png` with `frame-NNNNNN.pose.txt` (7-Scenes, 3DMatch).
     SevenScenes,
+    /// A folder with `depth.txt`, `rgb.txt` and `groundtruth.txt` (TUM RGB-D, ETH3D SLAM).
+    TumRgbd,
+    /// A folder `masked_depth` with `pose/poses.txt` (BigBIRD as the GPIS tools store it).
+    BigBird,
+    /// A folder `depth` of pictures with a trajectory (Redwood, Open3D) or with poses in a folder `pose` (ScanNet).
+    Redwood,
     /// A folder `velodyne` of `.bin` scans with `poses.txt` and `calib.txt` (KITTI, SemanticKITTI).
     Kitti,
     /// A `.conf` file with range scans in PLY files (Stanford), or its folder.
@@ -33,8 +39,16 @@ struct Format {
 
 impl SpaceLogKind {
     /// All kinds, in the order in which they are tried.
-    pub const ALL: [Self; 5] =
-        [Self::SevenScenes, Self::Kitti, Self::Stanford, Self::ScanGraph, Self::Clouds];
+    pub const ALL: [Self; 8] = [
+        Self::SevenScenes,
+        Self::TumRgbd,
+        Self::BigBird,
+        Self::Redwood,
+        Self::Kitti,
+        Self::Stanford,
+        Self::ScanGraph,
+        Self::Clouds,
+    ];
 
     fn format(self) -> Format {
         match self {
@@ -43,6 +57,24 @@ impl SpaceLogKind {
                 label: "depth images with poses (7-Scenes)",
                 is_it: seven_scenes::is_it,
                 open: seven_scenes::open,
+            },
+            Self::TumRgbd => Format {
+                word: "tum",
+                label: "depth images with times (TUM RGB-D)",
+                is_it: tum_rgbd::is_it,
+                open: tum_rgbd::open,
+            },
+            Self::BigBird => Format {
+                word: "bigbird",
+                label: "masked depth images of an object (BigBIRD)",
+                is_it: bigbird::is_it,
+                open: bigbird::open,
+            },
+            Self::Redwood => Format {
+                word: "redwood",
+                label: "depth images with a trajectory (Redwood)",
+                is_it: redwood::is_it,
+                open: redwood::open,
             },
             Self::Kitti => Format {
                 word: "kitti",
@@ -90,5 +122,31 @@ impl SpaceLogKind {
 
     pub(super) fn parts(self, path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
         (self.format().open)(path, options)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_has_a_word_of_its_own() {
+        for (i, kind) in SpaceLogKind::ALL.into_iter().enumerate() {
+            assert_eq!(SpaceLogKind::from_word(kind.word()), Some(kind));
+            assert!(SpaceLogKind::ALL[..i].iter().all(|other| other.label() != kind.label()));
+        }
+        assert_eq!(SpaceLogKind::from_word("rosbag"), None);
+    }
+
+    #[test]
+    fn other_folders_are_no_logs() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(SpaceLogKind::recognise(folder.path()), None);
+        assert_eq!(SpaceLogKind::recognise(&folder.path().join("missing")), None);
+        std::fs::create_dir(folder.path().join("depth")).unwrap();
+        std::fs::write(folder.path().join("a.log"), "0 0 1\n").unwrap();
+        assert_eq!(SpaceLogKind::recognise(folder.path()), None);
+        std::fs::write(folder.path().join("depth/0.png"), "").unwrap();
+        assert_eq!(SpaceLogKind::recognise(folder.path()), Some(SpaceLogKind::Redwood));
     }
 }

@@ -217,9 +217,11 @@ fn broken_files_of_a_log_make_nothing_panic() {
     assert_eq!(log.len(), 1);
     // Turned by -74 degrees, then moved.
     assert!(distance(world(&log, 0)[0], [1.0 + 0.28 + 1.92, -0.96 + 0.56, 3.0]) < 1e-9);
+    fs::write(&conf, [&good[..], b"bmesh b.ply 0 0 0 0 0 0 1\n"].concat()).unwrap();
+    assert_eq!((open(&conf).len(), open(&conf).stats().missing_files), (1, 1));
     fs::remove_file(folder.path().join("a.ply")).unwrap();
     let error = SpaceLog::open(&conf, &SpaceLogOptions::default()).unwrap_err().to_string();
-    assert!(error.contains("a.conf: line 2") && error.contains("is missing; put it there"), "{error}");
+    assert!(error.contains("a.conf: the number of scans is 0"), "{error}");
 }
 
 #[test]

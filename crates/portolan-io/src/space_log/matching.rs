@@ -68,6 +68,15 @@ pub(super) fn match_poses(
     Ok(matches)
 }
 
+/// Of what is in order of time, the nearest to a time, if it is within the tolerance (seconds).
+pub(super) fn nearest_in_time<T>(sorted: &[(f64, T)], time: f64, tolerance: f64) -> Option<&T> {
+    let after = sorted.partition_point(|(t, _)| *t < time);
+    let around = [after.checked_sub(1), Some(after)].into_iter().flatten().filter_map(|i| sorted.get(i));
+    let off = |entry: &&(f64, T)| (entry.0 - time).abs();
+    let best = around.min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    (off(&best) <= tolerance).then_some(&best.1)
+}
+
 /// The times of the scans, where all have one and they are not all one (zero, in logs that have none).
 fn times_of(scans: &[ScanId]) -> Option<Vec<f64>> {
     let times: Vec<f64> = scans.iter().map(|s| s.time).collect::<Option<_>>()?;
@@ -119,4 +128,85 @@ fn by_scan_number(scans: &[ScanId], poses: usize) -> Option<Vec<Option<usize>>> 
     let ascending = numbers.windows(2).all(|w| w[0] < w[1]);
     let fits = numbers.last().is_some_and(|last| *last < poses as u64);
     (ascending && fits).then(|| numbers.iter().map(|n| Some(*n as usize)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(x: f64) -> Pose<3> {
+        Pose { translation: [x, 0.0, 0.0], ..Pose::IDENTITY }
+    }
+
+    fn scans(numbers: &[u64], times: Option<&[f64]>) -> Vec<ScanId> {
+        let scan = |(i, n): (usize, &u64)| ScanId {
+            number: Some(*n),
+            time: times.map(|t| t[i]),
+            ..ScanId::default()
+        };
+        numbers.iter().enumerate().map(scan).collect()
+    }
+
+    fn track(poses: usize, times: Option<&[f64]>) -> Vec<TrackPose> {
+        let one =
+            |i: usize| TrackPose { pose: Some(pose(i as f64)), time: times.map(|t| t[i]), number: None };
+        (0..poses).map(one).collect()
+    }
+
+    /// The x of each scan's pose, and the counts.
+    fn found(scans: &[ScanId], track: &[TrackPose]) -> Result<(Vec<Option<f64>>, SpaceLogStats), IoError> {
+        let mut stats = SpaceLogStats::default();
+        let matches = match_poses(scans, track, 0.02, "p".as_ref(), &mut stats)?;
+        let x = |m: &Match| match m {
+            Match::Posed(pose, _) => Some(pose.translation[0]),
+            Match::LeftOut => None,
+        };
+        Ok((matches.iter().map(x).collect(), stats))
+    }
+
+    #[test]
+    fn scans_that_are_a_part_find_their_poses_by_number() {
+        let (x, stats) =
+            found(&scans(&[0, 2, 5], None), &track(6, Some(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]))).unwrap();
+        assert_eq!(x, [Some(0.0), Some(2.0), Some(5.0)]);
+        assert_eq!((stats.poses_without_scan, stats.scans_without_pose), (3, 0));
+        // A number beyond the poses, or one twice, says nothing.
+        assert!(found(&scans(&[0, 2, 6], None), &track(6, None)).is_err());
+        assert!(found(&scans(&[0, 2, 2], None), &track(6, None)).is_err());
+        // As many: in order, whatever the numbers.
+        let (x, _) = found(&scans(&[4, 9, 7], None), &track(3, None)).unwrap();
+        assert_eq!(x, [Some(0.0), Some(1.0), Some(2.0)]);
+    }
+
+    #[test]
+    fn times_come_first_unless_they_are_none() {
+        let times = [1.0, 2.0, 3.0];
+        let (x, stats) = found(&scans(&[0, 1, 2], Some(&times)), &track(3, Some(&[3.0, 9.0, 1.01]))).unwrap();
+        assert_eq!((x, stats.unmatched_times), (vec![Some(2.0), None, Some(0.0)], 1));
+        let (x, _) = found(&scans(&[0, 1, 2], Some(&[0.0; 3])), &track(3, Some(&times))).unwrap();
+        assert_eq!(x, [Some(0.0), Some(1.0), Some(2.0)], "zero is no time");
+        let error = found(&scans(&[0, 1, 2], Some(&times)), &track(3, Some(&[7.0, 8.0, 9.0]))).unwrap_err();
+        assert!(error.to_string().contains("the time of the poses is 7.000 to 9.000 s; no pose is within"));
+    }
+
+    #[test]
+    fn refused_poses_keep_their_place() {
+        let mut poses = track(3, None);
+        poses[1].pose = None;
+        let (x, stats) = found(&scans(&[0, 1, 2], None), &poses).unwrap();
+        assert_eq!(x, [Some(0.0), None, Some(2.0)]);
+        assert_eq!((stats.scans_without_pose, stats.poses_without_scan), (0, 0));
+    }
+
+    #[test]
+    fn the_nearest_in_time() {
+        let sorted = [(1.0, 'a'), (2.0, 'b')];
+        for (time, expected) in
+            [(0.0, None), (0.9, Some('a')), (1.4, None), (1.9, Some('b')), (2.1, Some('b'))]
+        {
+            assert_eq!(nearest_in_time(&sorted, time, 0.11).copied(), expected, "{time}");
+        }
+        assert_eq!(nearest_in_time(&sorted, f64::NAN, 1.0), None);
+        assert_eq!(nearest_in_time::<()>(&[], 1.0, 1.0), None);
+    }
 }

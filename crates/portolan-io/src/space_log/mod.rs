@@ -7,6 +7,9 @@
 //! | [`Stanford`](SpaceLogKind::Stanford) | PLY files with a `range_grid` | `.conf`: conjugated quaternions |
 //! | [`ScanGraph`](SpaceLogKind::ScanGraph) | a `.graph` file | in the file |
 //! | [`Clouds`](SpaceLogKind::Clouds) | `*.pcd`, `*.ply`, `*.bin` or `*.xyz`; one such file | a file like `*pose*.csv`, or none: PCD viewpoints |
+//! | [`TumRgbd`](SpaceLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
+//! | [`Redwood`](SpaceLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
+//! | [`BigBird`](SpaceLogKind::BigBird) | `masked_depth/frameF_camC.png` | `pose/poses.txt` |
 //!
 //! [`SpaceLog::open`] finds the files, reads the poses and says in [`SpaceLogStats`] what does not fit together; the scans
 //! themselves are read when they are asked for, by index and from any thread.
@@ -16,8 +19,10 @@
 //! happen once, in `log.rs`.
 
 mod agreement;
+mod bigbird;
 mod cloud_frames;
 mod clouds;
+mod color;
 mod depth_frames;
 mod depth_png;
 mod files;
@@ -31,9 +36,13 @@ mod log;
 mod matching;
 mod options;
 mod parts;
+mod redwood;
 mod seven_scenes;
 mod stanford;
 mod stats;
+#[cfg(test)]
+mod testing;
+mod tum_rgbd;
 
 pub use intrinsics::{Camera, CameraFrom, Intrinsics};
 pub use kind::SpaceLogKind;

@@ -1,13 +1,13 @@
 //! What a format delivers: scans to be read, and where their poses are.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 use portolan::scan::Frame;
 
 use super::{Camera, SpaceLogStats};
 use crate::IoError;
-use crate::poses3::{PoseConvention, PoseFile, RawPose};
+use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
 
 /// Reads scans by index, in any order, from any thread.
 pub(crate) trait FrameSource: Send + Sync {
@@ -59,4 +59,17 @@ pub(crate) struct Parts {
     pub(crate) camera: Option<Camera>,
     /// What the format counted by itself.
     pub(crate) stats: SpaceLogStats,
+}
+
+/// The pose in a file of its own; `None` where there is no such file.
+pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>, IoError> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let mut file = read_poses_3d(path)?;
+    if file.poses.len() != 1 {
+        let value = file.poses.len().to_string();
+        return Err(IoError::layout(path, "the number of poses", value, "give one pose per scan"));
+    }
+    Ok(file.poses.pop().map(|pose| (file.path, pose)))
 }

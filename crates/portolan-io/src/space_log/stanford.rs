@@ -52,13 +52,13 @@ pub(super) fn open(path: &Path, _options: &SpaceLogOptions) -> Result<Parts, IoE
     };
     let lines = read(&conf)?;
     let folder = conf.parent().unwrap_or(Path::new("."));
+    let mut stats = SpaceLogStats::default();
     let (mut files, mut scans, mut poses) = (Vec::new(), Vec::new(), Vec::new());
     for Line { file, pose } in lines {
         let file = folder.join(file);
         if !file.is_file() {
-            let advice = "put it there, or take its line out of the .conf";
-            let line = format!("line {}: {}", pose.line, file.display());
-            return Err(IoError::layout(&conf, line, "missing", advice));
+            stats.missing_files += 1;
+            continue;
         }
         let number = file.file_name().and_then(|n| number_in(n.to_str()?));
         scans.push(ScanId { path: file.clone(), number, time: None });
@@ -74,7 +74,7 @@ pub(super) fn open(path: &Path, _options: &SpaceLogOptions) -> Result<Parts, IoE
         posed_from_sensor: source.files_from_frames(),
         source: Box::new(source),
         camera: None,
-        stats: SpaceLogStats::default(),
+        stats,
     })
 }
 

@@ -28,6 +28,8 @@ impl fmt::Display for RefusedPose {
 pub struct SpaceLogStats {
     /// Scans that were found.
     pub scans: u64,
+    /// Scans that a list names and whose files are not there; they are not among `scans`.
+    pub missing_files: u64,
     /// Poses that were found.
     pub poses: u64,
     /// Scans left out because no pose belongs to them.

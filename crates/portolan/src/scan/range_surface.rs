@@ -257,8 +257,9 @@ mod tests {
     #[test]
     fn crooked_rows_are_sampled_again() {
         // Every other row is half a pixel off, and y creeps.
-        let crooked =
-            |_: usize, row: usize| [if row % 2 == 0 { 0.25 } else { -0.25 }, 0.004 * (row * row) as f64];
+        let crooked = |_: usize, row: usize| {
+            [if row.is_multiple_of(2) { 0.25 } else { -0.25 }, 0.004 * (row * row) as f64]
+        };
         let (points, pixels) = wave(crooked);
         let image = orthographic_image(&points, &pixels, 40, 30).unwrap();
         let mut worst: f64 = 0.0;
