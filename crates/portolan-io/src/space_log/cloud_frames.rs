@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
-use portolan::scan::{Frame, Origin, PointScan, orthographic_image};
+use portolan::scan::{Frame, OrganisedPoints, Origin, PointScan, orthographic_image};
 
 use super::parts::FrameSource;
 use crate::IoError;
-use crate::points::{PointCloudFile, PointFormat, read_points_as};
+use crate::points::{CloudGrid, PointCloudFile, PointFormat, read_points_as};
 
 /// Where the rays of a log's clouds begin.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl FrameSource for CloudFrames {
     fn frame(&self, i: usize) -> Result<Frame, IoError> {
         let cloud = about(read_points_as(&self.files[i], self.format)?, self.base);
         Ok(Frame::Points(match &self.rays {
-            Rays::From(origins) => cloud.into_scan(origins[i]),
+            Rays::From(origins) => scan_from(cloud, origins[i]),
             Rays::Parallel => range_scan(cloud, &self.files[i])?,
         }))
     }
@@ -73,6 +73,18 @@ pub(super) fn about(mut cloud: PointCloudFile, base: [f64; 3]) -> PointCloudFile
         cloud.offset = base;
     }
     cloud
+}
+
+/// A scan of rays from one point (in the file's frame), with an image about that point where the cloud has rows and columns
+/// that a sensor can have.
+fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
+    let image = cloud.grid.as_ref().and_then(|grid| {
+        let about_origin = |i: usize| std::array::from_fn(|k| (cloud.position(i)[k] - origin[k]) as f32);
+        let points: Vec<[f32; 3]> = (0..cloud.points.len()).map(about_origin).collect();
+        let CloudGrid { columns, rows, ref pixels } = *grid;
+        OrganisedPoints { points: &points, pixels, colors: &cloud.colors, columns, rows }.image()
+    });
+    PointScan { image, ..cloud.into_scan(origin) }
 }
 
 /// A range scan of parallel rays: the points as they are, each with its own origin, and the image of them.

@@ -148,6 +148,35 @@ fn clouds_far_away_keep_their_millimetres() {
 }
 
 #[test]
+fn organised_clouds_keep_the_rows_and_columns_of_their_sensor() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.pcd");
+    let sensor = [10.0, -3.0, 1.5];
+    let (mut points, mut pixels) = (Vec::new(), Vec::new());
+    for (row, column) in (0..16u32).flat_map(|r| (0..360u32).map(move |c| (r, c))) {
+        if (row + column) % 11 != 0 {
+            let (e, a) = (0.2 - 0.02 * f64::from(row), f64::from(column).to_radians());
+            let range = 4.0 + (0.05 * f64::from(column)).sin();
+            let ray = [e.cos() * a.cos(), e.cos() * a.sin(), e.sin()];
+            points.push(std::array::from_fn(|k| (sensor[k] + range * ray[k]) as f32));
+            pixels.push(360 * row + column);
+        }
+    }
+    let grid = Some(crate::CloudGrid { columns: 360, rows: 16, pixels: pixels.clone() });
+    let viewpoint = Some(Viewpoint { position: sensor, ..Viewpoint::NONE });
+    let cloud = PointCloudFile { points, grid, viewpoint, ..PointCloudFile::default() };
+    write_pcd(&path, &cloud).unwrap();
+    let scan = self::points(&open(&path), 0);
+    assert_eq!((&scan.origin, &scan.points), (&Origin::Common(sensor), &cloud.points));
+    let image = scan.image.unwrap();
+    assert!(matches!(image.projection, Projection::Spherical(_)));
+    for ((pixel, p), (expected, q)) in image.points().zip(pixels.iter().zip(&cloud.points)) {
+        let q: [f64; 3] = std::array::from_fn(|k| f64::from(q[k]) - sensor[k]);
+        assert!(pixel == *expected as usize && distance(p, q) < 1e-4, "{pixel} {p:?} {q:?}");
+    }
+}
+
+#[test]
 fn what_viewpoints_mean_is_checked_on_the_points() {
     let mut random = Random(6);
     let places = [[0.0, 0.0, 0.0], [2.0, 1.0, 0.5], [-2.0, 2.0, 1.0], [1.0, -3.0, 0.2]];

@@ -13,6 +13,7 @@
 mod beam;
 mod incidence;
 mod laser;
+mod organised;
 mod point_scan;
 mod range_image;
 mod range_surface;
@@ -23,6 +24,7 @@ pub use beam::{Beam, BeamKind};
 pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, connected};
 pub use laser::RangeLimits;
+pub use organised::OrganisedPoints;
 pub use point_scan::{Frame, Origin, PointScan};
 pub use range_image::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
 pub use range_surface::orthographic_image;
