@@ -10,12 +10,15 @@
 //! | [`BeamKind::Dropped`] | nothing at all, or a reading that was refused | no | never |
 //! | [`BeamKind::SelfHit`] | the robot's own body | no | never |
 
+mod angles;
 mod beam;
 mod incidence;
 mod laser;
 mod point_scan;
 mod range_image;
 mod record;
+mod rings;
+mod spherical_layout;
 mod stats;
 
 pub use beam::{Beam, BeamKind};
@@ -25,4 +28,5 @@ pub use laser::RangeLimits;
 pub use point_scan::{Frame, Origin, PointScan};
 pub use range_image::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
 pub use record::{BeamOrder, Scan};
+pub use spherical_layout::SphericalLayout;
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};
