@@ -248,7 +248,7 @@ fn configs(resolution: f64, pose: &Pose<3>, carve: bool, squared: bool) -> Spars
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
     #[test]
     fn depth_images_equal_their_definition(pose in poses(), seed in any::<u64>(), carve in any::<bool>(), squared in any::<bool>()) {

@@ -77,7 +77,8 @@ impl DistanceBrick {
 
 impl Planes<SignedDistance> for DistanceBrick {
     fn unobserved(n: usize) -> Self {
-        Self(std::iter::repeat_n(0.0, 2 * n).collect())
+        // Zeroed memory and one copy: gathering from an iterator goes number by number.
+        Self(vec![0.0; 2 * n].into())
     }
 
     fn len(&self) -> usize {

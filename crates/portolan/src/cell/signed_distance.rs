@@ -1,6 +1,7 @@
 //! Truncated signed distance: a scalar information filter per cell.
 
 use super::{Cell, DistanceBrick, DistanceObservation, Distances, Planes};
+use multiversion::multiversion;
 
 /// Settings of the fusion filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,11 +191,13 @@ impl Cell for SignedDistance {
 
 /// The filter over slices of the same length: states against observations.
 #[inline(always)]
-fn fuse_slices(
-    (distance, weight): (&mut [f32], &mut [f32]),
-    (observed, gained): (&[f32], &[f32]),
-    rule: &TsdfRule,
-) {
+fn fuse_slices(state: (&mut [f32], &mut [f32]), observation: (&[f32], &[f32]), rule: &TsdfRule) {
+    fuse_widest(state.0, state.1, observation.0, observation.1, rule);
+}
+
+/// In the widest vectors that the processor has: every width gives the same bits.
+#[multiversion(targets = "simd")]
+fn fuse_widest(distance: &mut [f32], weight: &mut [f32], observed: &[f32], gained: &[f32], rule: &TsdfRule) {
     // Rows of blocks inside a map are eight long: the fixed length lets the compiler use whole vectors.
     if distance.len().is_multiple_of(8) {
         let rows = distance.chunks_exact_mut(8).zip(weight.chunks_exact_mut(8));

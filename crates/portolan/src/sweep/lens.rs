@@ -3,7 +3,7 @@
 use crate::scan::{Projection, RangeImage};
 use std::f64::consts::TAU;
 
-/// Points that are projected together: a layer of a block.
+/// Points that are projected together: an octant of a block.
 pub(super) const LANES: usize = 64;
 
 /// One number per lane.
@@ -16,6 +16,8 @@ pub(super) struct Lens {
     columns: usize,
     rows: usize,
     kind: Kind,
+    /// See [`Lens::openings`], for each row.
+    openings: Vec<[f32; 2]>,
 }
 
 #[derive(Clone, Debug)]
@@ -58,7 +60,7 @@ impl Lens {
     pub(super) fn of(image: &RangeImage) -> Option<Self> {
         let (columns, rows) = (image.columns, image.rows);
         let cells = columns.checked_mul(rows)?;
-        if cells == 0 || columns.max(rows) > 1 << 20 || image.values.len() != cells {
+        if cells == 0 || columns.max(rows) > 1 << 20 || cells > 1 << 28 || image.values.len() != cells {
             return None;
         }
         if !(image.colors.is_empty() || image.colors.len() == cells) {
@@ -92,7 +94,12 @@ impl Lens {
                 sane.then_some(Kind::Orthographic { first: rays.first, step: rays.step, top: *top })?
             }
         };
-        Some(Self { columns, rows, kind })
+        let mut lens = Self { columns, rows, kind, openings: Vec::new() };
+        let turning = matches!(lens.kind, Kind::Spherical(_));
+        let first = lens.opening(0);
+        lens.openings =
+            (0..rows).map(|row| if turning { lens.opening(row) } else { first }.map(|o| o as f32)).collect();
+        Some(lens)
     }
 
     /// Whether column 0 is the neighbour of the last one.
@@ -106,7 +113,12 @@ impl Lens {
     }
 
     /// How far neighbouring rays are apart: columns, and row `row` from the next; radians, metres where rays are parallel.
-    pub(super) fn openings(&self, row: usize) -> [f64; 2] {
+    #[inline(always)]
+    pub(super) fn openings(&self, row: usize) -> [f32; 2] {
+        self.openings[row.min(self.rows - 1)]
+    }
+
+    fn opening(&self, row: usize) -> [f64; 2] {
         match &self.kind {
             Kind::Pinhole { focal, .. } => focal.map(|f| 1.0 / f.abs()),
             Kind::Orthographic { step, .. } => step.map(f64::abs),
@@ -194,8 +206,9 @@ impl Lens {
     }
 
     /// Distance between a point and the ray of a pixel that is `du`, `dv` pixels away (metres), `length` along the ray.
+    #[inline(always)]
     pub(super) fn aside(&self, du: f32, dv: f32, row: usize, length: f32, scale: f32) -> f32 {
-        let [a, b] = self.openings(row).map(|o| o as f32);
+        let [a, b] = self.openings(row);
         let depth = match self.kind {
             Kind::Pinhole { .. } => length / scale,
             Kind::Spherical(_) => length,
@@ -261,8 +274,9 @@ impl Lens {
 /// Pixels around `low..=high`, on an axis of `n` pixels and a border of one; `None` where none can speak.
 fn clamped(low: f64, high: f64, n: usize) -> Option<[usize; 2]> {
     let last = n as f64 + 1.0;
+    // What is not negative is rounded down by truncation; `floor` is a call on baseline x86-64.
     (high >= 0.5 && low <= last - 0.5)
-        .then(|| [low.floor().clamp(0.0, last) as usize, (high.floor() + 1.0).clamp(0.0, last) as usize])
+        .then(|| [low.clamp(0.0, last) as usize, (high.clamp(0.0, last) as usize + 1).min(n + 1)])
 }
 
 /// What [`Lens::project`] says of 64 points.

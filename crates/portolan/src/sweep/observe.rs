@@ -1,11 +1,15 @@
 //! What a range image says about the centres of a block's cells: 64 lanes at a time.
 //!
-//! Every loop runs over lanes without calls and without branches, so that it stands in the widest vectors that the
+//! Every loop runs over the 64 lanes of an octant without calls and without branches, so that it stands in the widest vectors that the
 //! processor has; no operation depends on the width, so that all versions give the same bits.
 
 use super::lens::{LANES, Lanes, Lens};
 use super::padded_image::PaddedImage;
+use crate::geom::block_cells;
 use multiversion::multiversion;
+
+/// Cells of a block.
+pub(super) const BLOCK: usize = block_cells::<3>();
 
 /// An image and how it is read.
 pub(super) struct View<'a> {
@@ -28,25 +32,46 @@ pub(super) struct Centres {
 }
 
 impl Centres {
-    /// A layer of 8 x 8 centres.
+    /// The centres of an octant, 4 x 4 x 4.
     #[inline(always)]
-    pub(super) fn layer(&self, z: usize) -> [Lanes; 3] {
+    pub(super) fn octant(&self, octant: usize) -> [Lanes; 3] {
         let mut p = [[0.0; LANES]; 3];
+        let corner: [f32; 3] = std::array::from_fn(|axis| (4 * (octant >> axis & 1)) as f32);
         for k in 0..3 {
-            let start = self.first[k] + z as f32 * self.steps[2][k];
-            let (sx, sy) = (self.steps[0][k], self.steps[1][k]);
+            let [sx, sy, sz] = [self.steps[0][k], self.steps[1][k], self.steps[2][k]];
             for l in 0..LANES {
-                p[k][l] = start + (l & 7) as f32 * sx + (l >> 3) as f32 * sy;
+                let (x, y, z) = ((l & 3) as f32, (l >> 2 & 3) as f32, (l >> 4) as f32);
+                p[k][l] = self.first[k] + (corner[0] + x) * sx + (corner[1] + y) * sy + (corner[2] + z) * sz;
             }
         }
         p
     }
 }
 
-/// Distance and weight of every cell of a block, in the widest vectors there are.
+/// Position in its block of cell `lane` of an octant.
+#[inline(always)]
+pub(super) fn cell_of(octant: usize, lane: usize) -> usize {
+    let corner = (octant & 1) * 4 + (octant >> 1 & 1) * 32 + (octant >> 2) * 256;
+    corner + (lane & 3) + (lane >> 2 & 3) * 8 + (lane >> 4) * 64
+}
+
+/// What is known of a block beforehand, a bit for each octant: those in which all is free, and those that must be looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Octants {
+    pub free: u8,
+    pub mixed: u8,
+}
+
+/// Distance and weight of every cell of a block, in the widest vectors there are; returns how many have a weight.
 #[multiversion(targets = "simd")]
-pub(super) fn observe_block(view: &View<'_>, centres: &Centres, distance: &mut [f32], weight: &mut [f32]) {
-    layers(view, centres, distance, weight);
+pub(super) fn observe_block(
+    view: &View<'_>,
+    centres: &Centres,
+    octants: Octants,
+    distance: &mut [f32; BLOCK],
+    weight: &mut [f32; BLOCK],
+) -> usize {
+    block(view, centres, octants, distance, weight)
 }
 
 /// The same, compiled for any processor.
@@ -54,20 +79,38 @@ pub(super) fn observe_block(view: &View<'_>, centres: &Centres, distance: &mut [
 pub(super) fn observe_block_plain(
     view: &View<'_>,
     centres: &Centres,
-    distance: &mut [f32],
-    weight: &mut [f32],
-) {
-    layers(view, centres, distance, weight);
+    octants: Octants,
+    distance: &mut [f32; BLOCK],
+    weight: &mut [f32; BLOCK],
+) -> usize {
+    block(view, centres, octants, distance, weight)
 }
 
 #[inline(always)]
-fn layers(view: &View<'_>, centres: &Centres, distance: &mut [f32], weight: &mut [f32]) {
-    let layers = distance.chunks_exact_mut(LANES).zip(weight.chunks_exact_mut(LANES));
-    for (z, (distance, weight)) in layers.enumerate() {
-        if let (Ok(distance), Ok(weight)) = (distance.try_into(), weight.try_into()) {
-            layer(view, &centres.layer(z), distance, weight);
+fn block(
+    view: &View<'_>,
+    centres: &Centres,
+    octants: Octants,
+    distance: &mut [f32; BLOCK],
+    weight: &mut [f32; BLOCK],
+) -> usize {
+    weight.fill(0.0);
+    let mut observed = 0;
+    for octant in 0..8 {
+        let (mut d, mut w) = ([view.truncation; LANES], [view.carve_weight; LANES]);
+        if octants.mixed >> octant & 1 == 1 {
+            observe(view, &centres.octant(octant), &mut d, &mut w);
+        } else if octants.free >> octant & 1 == 0 {
+            continue;
+        }
+        observed += w.iter().map(|&w| u32::from(w > 0.0)).sum::<u32>();
+        for row in 0..LANES / 4 {
+            let cell = cell_of(octant, 4 * row);
+            distance[cell..cell + 4].copy_from_slice(&d[4 * row..4 * row + 4]);
+            weight[cell..cell + 4].copy_from_slice(&w[4 * row..4 * row + 4]);
         }
     }
+    observed as usize
 }
 
 /// Where 64 points fall: the pixel left above of each, and how far right below of its centre.
@@ -92,17 +135,22 @@ pub(super) fn places(u: &Lanes, v: &Lanes, stride: usize) -> Places {
 }
 
 #[inline(always)]
-fn layer(view: &View<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut Lanes) {
+fn observe(view: &View<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut Lanes) {
     let stride = view.image.stride;
     let seen = view.lens.project(p);
     let at = places(&seen.u, &seen.v, stride);
     let mut corners = [[0.0f32; LANES]; 4];
     let linear = &view.image.linear[..];
+    // Checked without a way out of the loop, with indices that are seen to have 31 bits: so the loads are gathers.
+    let n = linear.len().saturating_sub(stride + 1);
+    let (above, below) = (&linear[..n], &linear[stride..][..n]);
+    let (above_right, below_right) = (&linear[1..][..n], &linear[stride + 1..][..n]);
     for l in 0..LANES {
-        let i = at.index[l] as usize;
-        let (above, below) = (&linear[i..i + 2], &linear[i + stride..i + stride + 2]);
-        (corners[0][l], corners[1][l], corners[2][l], corners[3][l]) =
-            (above[0], above[1], below[0], below[1]);
+        let i = (at.index[l] & 0x3fff_ffff) as usize;
+        corners[0][l] = if i < n { above[i] } else { 0.0 };
+        corners[1][l] = if i < n { above_right[i] } else { 0.0 };
+        corners[2][l] = if i < n { below[i] } else { 0.0 };
+        corners[3][l] = if i < n { below_right[i] } else { 0.0 };
     }
     let parallel = view.lens.is_parallel();
     let (tau, per_tau, carve) = (view.truncation, 1.0 / view.truncation, view.carve_weight);
@@ -164,28 +212,34 @@ struct Spot {
 
 /// The nearest ray speaks of its surface, but only as far aside as half a cell; beyond, what is free is free up to the
 /// nearest of the four. A ray that met nothing says that it is free.
-#[inline(never)]
+#[inline(always)]
 fn alone(view: &View<'_>, spot: &Spot) -> (f32, f32) {
     const NOTHING: (f32, f32) = (0.0, 0.0);
     let stride = view.image.stride;
     let value = &view.image.value;
+    let (above, below) = (&value[spot.index..][..2], &value[spot.index + stride..][..2]);
+    let four = [above[0].abs(), above[1].abs(), below[0].abs(), below[1].abs()];
+    let tau = view.truncation;
+    // Most cells here lie behind all four.
+    let farthest = four[0].max(four[1]).max(four[2].max(four[3]));
+    if farthest * spot.scale - spot.length < -tau {
+        return NOTHING;
+    }
+    let (right, low) = (spot.right >= 0.5, spot.below >= 0.5);
     let pixel = nearest(spot.index, spot.right, spot.below, stride);
     let v = value[pixel];
-    let (du, dv) = (spot.right - (spot.right + 0.5).floor(), spot.below - (spot.below + 0.5).floor());
+    let (du, dv) = (spot.right - f32::from(u8::from(right)), spot.below - f32::from(u8::from(low)));
     let aside = view.lens.aside(du, dv, (pixel / stride).saturating_sub(1), spot.length, spot.scale);
     let (value, hit) = if aside <= view.aside {
         (v.abs(), v > 0.0)
     } else {
-        let i = spot.index;
-        let four = [value[i], value[i + 1], value[i + stride], value[i + stride + 1]];
-        (four.into_iter().map(f32::abs).fold(f32::INFINITY, f32::min), false)
+        (four[0].min(four[1]).min(four[2].min(four[3])), false)
     };
     if value == 0.0 {
         return NOTHING;
     }
     let range = value * spot.scale;
     let d = range - spot.length;
-    let tau = view.truncation;
     let weight = if d > tau {
         if spot.length >= 0.0 { view.carve_weight } else { 0.0 }
     } else if hit {
@@ -223,9 +277,10 @@ mod tests {
             aside: 0.05,
         };
         let centres = Centres { first, steps: [[0.08, 0.06, 0.0], [-0.06, 0.08, 0.0], [0.0, 0.0, 0.1]] };
-        let [mut a, mut b, mut c, mut d] = std::array::from_fn(|_| vec![0.0f32; 512]);
-        observe_block(&view, &centres, &mut a, &mut b);
-        observe_block_plain(&view, &centres, &mut c, &mut d);
+        let [mut a, mut b, mut c, mut d] = [[0.0f32; BLOCK]; 4];
+        let octants = Octants { free: 4, mixed: 0xfb };
+        let observed = observe_block(&view, &centres, octants, &mut a, &mut b);
+        assert_eq!(observed, observe_block_plain(&view, &centres, octants, &mut c, &mut d));
         let bits = |v: &[f32]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&b), bits(&d));
         let said = |d: &[f32], w: &[f32]| {

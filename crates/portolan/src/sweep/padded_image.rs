@@ -4,6 +4,7 @@ use super::lens::Lens;
 use super::weight::WeightModel;
 use crate::geom::vector::{dot, norm, sub};
 use crate::scan::{BeamCounts, MAX_OPENING, MAX_SLOPE, RangeImage, RefusedBeams};
+use multiversion::multiversion;
 
 /// Neighbours nearer than this say more about the noise than about the surface (metres).
 const BASELINE: f64 = 0.05;
@@ -82,25 +83,21 @@ impl PaddedImage {
             let most = stretch.into_iter().fold(1.0, f64::max);
             let (low, high) =
                 (how.min_range.max(NEAREST) as f32, (how.max_range / most * (1.0 - 1e-6)) as f32);
-            values.iter().all(|v| (*v == 0.0) | (v.abs() > low) & (v.abs() < high))
+            all_within(values, low, high)
         };
         for row in 0..self.rows {
             let from = &image.values[row * w..][..w];
             let to = &mut self.value[(row + 1) * stride + 1..][..w];
-            if from.iter().all(|v| v.is_finite()) && all_fit(row, from) {
+            if all_fit(row, from) {
                 to.copy_from_slice(from);
             } else {
                 for (column, (to, &v)) in to.iter_mut().zip(from).enumerate() {
                     *to = clean(v, lens.stretch(column, row), how, &mut refused);
                 }
             }
-            hits += to.iter().map(|v| u32::from(*v > 0.0)).sum::<u32>();
-            free += to.iter().map(|v| u32::from(*v < 0.0)).sum::<u32>();
             let linear = &mut self.linear[(row + 1) * stride + 1..][..w];
-            let parallel = lens.is_parallel();
-            for (q, &v) in linear.iter_mut().zip(&*to) {
-                *q = if v > 0.0 { if parallel { v } else { 1.0 / v } } else { 0.0 };
-            }
+            let (hit, empty) = make_linear(to, linear, lens.is_parallel());
+            (hits, free) = (hits + hit, free + empty);
         }
         if lens.is_closed() {
             Self::repeat_seam(&mut self.value, stride);
@@ -117,27 +114,18 @@ impl PaddedImage {
         let stride = self.stride;
         let parallel = lens.is_parallel();
         // Neighbours of one surface are not further apart than `slope` times the nearer one, and `step`.
-        let slope = |opening: f64| match (parallel, opening <= MAX_OPENING) {
-            (true, _) => (0.0, (MAX_SLOPE * opening) as f32 + step),
-            (false, true) => ((MAX_SLOPE * opening) as f32, step),
+        let slope = |opening: f32| match (parallel, f64::from(opening) <= MAX_OPENING) {
+            (true, _) => (0.0, MAX_SLOPE as f32 * opening + step),
+            (false, true) => (MAX_SLOPE as f32 * opening, step),
             (false, false) => (0.0, f32::NEG_INFINITY),
         };
         for row in 0..=self.rows {
-            let [across, _] = lens.openings(row.saturating_sub(1).min(self.rows - 1));
-            let [_, down] = lens.openings(row.saturating_sub(1).min(self.rows - 1));
+            let [across, down] = lens.openings(row.saturating_sub(1));
             let ((ax, bx), (ay, by)) = (slope(across), slope(down));
             let (v0, v1) =
                 (&self.value[row * stride..][..stride], &self.value[(row + 1) * stride..][..stride]);
             let linear = &mut self.linear[row * stride..][..stride - 1];
-            for (i, q) in linear.iter_mut().enumerate() {
-                let (a, b, c, d) = (v0[i], v0[i + 1], v1[i], v1[i + 1]);
-                let near = |x: f32, y: f32, k: f32, s: f32| (x - y).abs() <= k * x.min(y) + s;
-                let hits = (a > 0.0) & (b > 0.0) & (c > 0.0) & (d > 0.0);
-                let whole =
-                    hits & near(a, b, ax, bx) & near(c, d, ax, bx) & near(a, c, ay, by) & near(b, d, ay, by);
-                let silent = (a == 0.0) & (b == 0.0) & (c == 0.0) & (d == 0.0);
-                *q = if whole | silent { *q } else { -*q };
-            }
+            mark_torn(v0, v1, linear, [ax, bx, ay, by]);
         }
     }
 
@@ -211,6 +199,43 @@ impl PaddedImage {
                 self.cosine[(row + 1) * stride + column + 1] = cosine.clamp(0.02, 1.0) as f32;
             }
         }
+    }
+}
+
+/// Whether all values are 0 or between these (NaN is not).
+#[multiversion(targets = "simd")]
+fn all_within(values: &[f32], low: f32, high: f32) -> bool {
+    let bad = |v: f32| u32::from(!((v == 0.0) | (v.abs() > low) & (v.abs() < high)));
+    values.iter().fold(0, |any, &v| any | bad(v)) == 0
+}
+
+/// A row of values as what is linear on a plane; returns how many are surfaces, and how many free.
+#[multiversion(targets = "simd")]
+fn make_linear(values: &[f32], linear: &mut [f32], parallel: bool) -> (u32, u32) {
+    let (mut hits, mut free) = (0, 0);
+    for (q, &v) in linear.iter_mut().zip(values) {
+        hits += u32::from(v > 0.0);
+        free += u32::from(v < 0.0);
+        let value = if parallel { v } else { 1.0 / v };
+        *q = if v > 0.0 { value } else { 0.0 };
+    }
+    (hits, free)
+}
+
+/// Turns the sign of a row of `linear` where the four pixels below and right of it are not of one surface. Neighbours in a
+/// row are where they are not further apart than `how[0]` times the nearer one and `how[1]`, in a column `how[2]`, `how[3]`.
+#[multiversion(targets = "simd")]
+fn mark_torn(above: &[f32], below: &[f32], linear: &mut [f32], how: [f32; 4]) {
+    let n = linear.len();
+    let (a, b, c, d) = (&above[..n], &above[1..=n], &below[..n], &below[1..=n]);
+    let near = |x: f32, y: f32, k: f32, s: f32| (x - y).abs() <= k * x.min(y) + s;
+    for i in 0..n {
+        let (a, b, c, d) = (a[i], b[i], c[i], d[i]);
+        let hits = (a > 0.0) & (b > 0.0) & (c > 0.0) & (d > 0.0);
+        let [kx, sx, ky, sy] = how;
+        let whole = hits & near(a, b, kx, sx) & near(c, d, kx, sx) & near(a, c, ky, sy) & near(b, d, ky, sy);
+        let silent = (a == 0.0) & (b == 0.0) & (c == 0.0) & (d == 0.0);
+        linear[i] = if whole | silent { linear[i] } else { -linear[i] };
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::WeightModel;
 use super::lens::{BAD_IMAGE, LANES, Lens, Window};
-use super::observe::{Centres, View, nearest, observe_block, places};
+use super::observe::{Centres, Octants, View, cell_of, nearest, observe_block, places};
 use super::padded_image::{Cleaning, PaddedImage};
 use super::range_pyramid::RangePyramid;
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
@@ -55,8 +55,7 @@ pub struct Projective {
     image_from_world: [[f64; 3]; 3],
     bounds: Option<Aabb<3>>,
     keys: Vec<BlockKey<3>>,
-    /// Blocks whose every cell is free beyond the truncation.
-    free: Vec<bool>,
+    octants: Vec<Octants>,
 }
 
 impl Projective {
@@ -72,7 +71,7 @@ impl Projective {
             image_from_world: Pose::<3>::IDENTITY.rotation,
             bounds: None,
             keys: Vec::new(),
-            free: Vec::new(),
+            octants: Vec::new(),
         }
     }
 
@@ -87,7 +86,7 @@ impl Projective {
         (colors, most): (bool, usize),
     ) -> Result<(BeamCounts, RefusedBeams), PlanError> {
         self.keys.clear();
-        self.free.clear();
+        self.octants.clear();
         let lens = Lens::of(image).ok_or(PlanError::BadImage(BAD_IMAGE))?;
         let tau = self.settings.truncation;
         let cleaning = Cleaning {
@@ -98,12 +97,7 @@ impl Projective {
             colors,
         };
         let counted = self.image.fill(image, &lens, &cleaning);
-        if self.carves() {
-            self.pyramid.build(self.image.stride, &self.image.value, |v| [v.abs(); 2]);
-        } else {
-            let hit = |v: f32| if v > 0.0 { [v; 2] } else { [f32::INFINITY, f32::NEG_INFINITY] };
-            self.pyramid.build(self.image.stride, &self.image.value, hit);
-        }
+        self.pyramid.build(self.image.stride, &self.image.value, !self.carves());
         self.lens = Some(lens);
         self.lattice = *lattice;
         self.origin = world_from_image.translation;
@@ -164,11 +158,11 @@ impl Projective {
         if found.len() > most {
             return Err(PlanError::TooManyBlocks);
         }
-        self.keys.extend(found.iter().map(|&packed| {
-            let index = |k: u64| ((packed >> (1 + 20 * k)) & 0xf_ffff) as i64;
-            BlockKey([0, 1, 2].map(|k| (first[k as usize] + index(k)) as i32))
+        self.keys.extend(found.iter().map(|&(packed, _)| {
+            let index = |k: usize| ((packed >> (20 * k)) & 0xf_ffff) as i64;
+            BlockKey(std::array::from_fn(|k| (first[k] + index(k)) as i32))
         }));
-        self.free.extend(found.iter().map(|packed| packed & 1 == 1));
+        self.octants.extend(found.iter().map(|(_, octants)| *octants));
         Ok(())
     }
 
@@ -196,23 +190,28 @@ impl Projective {
 
     /// Whether all cells of the `i`-th planned block are free beyond the truncation.
     pub(crate) fn is_free(&self, i: usize) -> bool {
-        self.free[i]
+        self.octants[i].mixed == 0
     }
 
     /// The evidence about the `i`-th planned block, into `evidence`; returns for how many cells there is some.
     pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
         let Some(lens) = &self.lens else { return 0 };
         let (distance, weight) = evidence.planes_mut();
-        if self.free[i] && self.settings.weights == WeightModel::Constant {
-            distance.fill(self.settings.truncation as f32);
-            weight.fill(self.settings.carve_weight);
-        } else {
-            observe_block(&self.view(lens), &self.centres(self.keys[i]), distance, weight);
+        let mut octants = self.octants[i];
+        if self.settings.weights != WeightModel::Constant {
+            // What is free has weights of its own too.
+            octants = Octants { free: 0, mixed: octants.mixed | octants.free };
         }
-        if let Some(bounds) = &self.bounds {
-            keep_inside(&self.lattice, bounds, self.keys[i], weight);
+        let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight))
+        else {
+            return 0;
+        };
+        let observed =
+            observe_block(&self.view(lens), &self.centres(self.keys[i]), octants, distance, weight);
+        match &self.bounds {
+            Some(bounds) if keep_inside(&self.lattice, bounds, self.keys[i], weight) => evidence.observed(),
+            _ => observed,
         }
-        evidence.observed()
     }
 
     /// The colours of the `i`-th planned block: those of the nearest pixels, for cells within `band` metres of the surface,
@@ -224,20 +223,20 @@ impl Projective {
         let centres = self.centres(self.keys[i]);
         let image = &self.image;
         let mut found = 0;
-        for z in 0..BLOCK_EDGE {
-            if !(0..LANES).any(|l| near(z * LANES + l)) {
+        for octant in 0..8 {
+            if !(0..LANES).any(|l| near(cell_of(octant, l))) {
                 continue;
             }
-            let seen = lens.project(&centres.layer(z));
+            let seen = lens.project(&centres.octant(octant));
             let at = places(&seen.u, &seen.v, image.stride);
-            for l in (0..LANES).filter(|l| near(z * LANES + l)) {
+            for l in 0..LANES {
+                let cell = cell_of(octant, l);
                 let pixel = nearest(at.index[l] as usize, at.right[l], at.below[l], image.stride);
-                if image.value[pixel] > 0.0 {
+                if near(cell) && image.value[pixel] > 0.0 {
                     let (row, column) = (pixel / image.stride - 1, pixel % image.stride);
                     let column = (column + image.columns - 1) % image.columns;
                     let rgb = image.colors[row * image.columns + column];
-                    let weight = distances.weights()[z * LANES + l];
-                    colors.set(z * LANES + l, ColorObservation { rgb, weight });
+                    colors.set(cell, ColorObservation { rgb, weight: distances.weights()[cell] });
                     found += 1;
                 }
             }
@@ -246,17 +245,23 @@ impl Projective {
     }
 }
 
-/// Silences the cells whose centre is not inside.
-pub(super) fn keep_inside(lattice: &Lattice<3>, bounds: &Aabb<3>, key: BlockKey<3>, weight: &mut [f32]) {
+/// Silences the cells whose centre is not inside; returns whether there may be such cells.
+pub(super) fn keep_inside(
+    lattice: &Lattice<3>,
+    bounds: &Aabb<3>,
+    key: BlockKey<3>,
+    weight: &mut [f32],
+) -> bool {
     let (low, high) = (lattice.center(key.first_cell()), lattice.center(key.cell(weight.len() - 1)));
     if bounds.contains(low) && bounds.contains(high) {
-        return;
+        return false;
     }
     for (i, w) in weight.iter_mut().enumerate() {
         if !bounds.contains(lattice.center(key.cell(i))) {
             *w = 0.0;
         }
     }
+    true
 }
 
 /// The search for blocks, from large boxes of blocks to single ones.
@@ -276,30 +281,43 @@ enum Class {
     Mixed,
 }
 
-/// A cube of `2^level` blocks from `at`, counted from the search's first block.
+/// A cube of `2^level` octants of blocks from `at`, counted from the search's first block.
 #[derive(Clone, Copy)]
 struct Node {
     at: [i64; 3],
     level: u32,
 }
 
+/// The level at which a node is a block.
+const BLOCK: u32 = 1;
+
 impl Node {
     fn children(self) -> impl Iterator<Item = Self> {
         let (level, half) = (self.level - 1, 1i64 << (self.level - 1));
         (0..8).map(move |c| Self { at: std::array::from_fn(|k| self.at[k] + half * (c >> k & 1)), level })
     }
+
+    /// Indices of a block in 20 bits each, in the order of keys.
+    fn packed(self) -> u64 {
+        let [x, y, z] = self.at.map(|v| (v >> BLOCK) as u64);
+        (z << 40) | (y << 20) | x
+    }
 }
 
+/// A block that is seen: its packed indices, and what is known of its octants.
+type Found = (u64, Octants);
+
 impl Search<'_> {
-    /// Blocks as x, y, z in 20 bits each above the bit that says that all is free; in the order of keys.
-    fn run(&self, span: i64) -> Vec<u64> {
-        let level = span.max(1).ilog2() + u32::from(span.count_ones() > 1);
+    /// In the order of keys. `span` is the number of blocks along the longest axis.
+    fn run(&self, span: i64) -> Vec<Found> {
+        let level = BLOCK + span.max(1).ilog2() + u32::from(span.count_ones() > 1);
         let mut nodes = vec![Node { at: [0; 3], level }];
         // Enough parts for every core, the same ones for any number of them.
-        while nodes.len() < 256 && nodes.iter().any(|n| n.level > 2) {
+        const LEAST: u32 = BLOCK + 2;
+        while nodes.len() < 256 && nodes.iter().any(|n| n.level > LEAST) {
             nodes = nodes
                 .into_iter()
-                .flat_map(|n| match (n.level > 2).then(|| self.class(n)) {
+                .flat_map(|n| match (n.level > LEAST).then(|| self.class(n)) {
                     None => vec![n],
                     Some(Class::Nothing) => vec![],
                     Some(Class::Free | Class::Mixed) => n.children().collect(),
@@ -312,7 +330,7 @@ impl Search<'_> {
             found
         };
         #[cfg(feature = "parallel")]
-        let parts: Vec<Vec<u64>> = {
+        let parts: Vec<Vec<Found>> = {
             use rayon::prelude::*;
             if rayon::current_num_threads() == 1 {
                 nodes.iter().map(each).collect()
@@ -321,62 +339,79 @@ impl Search<'_> {
             }
         };
         #[cfg(not(feature = "parallel"))]
-        let parts: Vec<Vec<u64>> = nodes.iter().map(each).collect();
+        let parts: Vec<Vec<Found>> = nodes.iter().map(each).collect();
         let mut all = parts.concat();
-        all.sort_unstable();
+        all.sort_unstable_by_key(|found| found.0);
         all
     }
 
-    fn descend(&self, node: Node, found: &mut Vec<u64>) {
+    fn descend(&self, node: Node, found: &mut Vec<Found>) {
         if found.len() > self.most {
             return;
         }
         match self.class(node) {
             Class::Nothing => {}
             Class::Free => self.all(node, found),
-            Class::Mixed if node.level == 0 => found.push(pack(node.at, false)),
+            Class::Mixed if node.level == BLOCK => {
+                let mut octants = Octants::default();
+                for (bit, octant) in node.children().enumerate() {
+                    match self.class(octant) {
+                        Class::Nothing => {}
+                        Class::Free => octants.free |= 1 << bit,
+                        Class::Mixed => octants.mixed |= 1 << bit,
+                    }
+                }
+                if octants != Octants::default() {
+                    found.push((node.packed(), octants));
+                }
+            }
             Class::Mixed => node.children().for_each(|child| self.descend(child, found)),
         }
     }
 
-    fn all(&self, node: Node, found: &mut Vec<u64>) {
-        let end: [i64; 3] =
-            std::array::from_fn(|k| (node.at[k] + (1 << node.level)).min(self.last[k] - self.first[k] + 1));
-        for z in node.at[2]..end[2] {
-            for y in node.at[1]..end[1] {
-                if found.len() > self.most {
-                    return;
-                }
-                found.extend((node.at[0]..end[0]).map(|x| pack([x, y, z], true)));
-            }
+    /// All blocks of a node that is free.
+    fn all(&self, node: Node, found: &mut Vec<Found>) {
+        if !self.is_inside(node) || found.len() > self.most {
+        } else if node.level == BLOCK {
+            found.push((node.packed(), Octants { free: 0xff, mixed: 0 }));
+        } else {
+            node.children().for_each(|child| self.all(child, found));
         }
+    }
+
+    fn is_inside(&self, node: Node) -> bool {
+        (0..3).all(|k| node.at[k] >> BLOCK <= self.last[k] - self.first[k])
     }
 
     fn class(&self, node: Node) -> Class {
         let sweep = self.sweep;
-        if (0..3).any(|k| node.at[k] > self.last[k] - self.first[k]) {
+        if !self.is_inside(node) {
             return Class::Nothing;
         }
-        let edge = (BLOCK_EDGE as i64) << node.level;
+        const OCTANT: i64 = BLOCK_EDGE as i64 / 2;
+        let edge = OCTANT << node.level;
         let r = sweep.lattice.resolution;
         let offset: [f64; 3] = std::array::from_fn(|k| {
-            let cell = (self.first[k] + node.at[k]) * BLOCK_EDGE as i64;
+            let cell = self.first[k] * BLOCK_EDGE as i64 + node.at[k] * OCTANT;
             (sweep.lattice.origin[k] - sweep.origin[k]) + (cell as f64 + 0.5 * edge as f64) * r
         });
         // The box of the centres of its cells.
         let half = 0.5 * (edge - 1) as f64 * r;
-        let square = |v: f64| v * v;
-        let near: f64 = offset.iter().map(|o| square((o.abs() - half).max(0.0))).sum();
-        let far: f64 = offset.iter().map(|o| square(o.abs() + half)).sum();
-        let rows = &sweep.image_from_world;
-        let centre = rows.map(|row| (0..3).map(|k| row[k] * offset[k]).sum::<f64>());
-        let halves = rows.map(|row| half * (row[0].abs() + row[1].abs() + row[2].abs()));
-        let Some(window) = self.lens.window(centre, halves, near.sqrt(), far.sqrt()) else {
+        let (mut near, mut far) = (0.0, 0.0);
+        let (mut centre, mut halves) = ([0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            let (low, high) = ((offset[k].abs() - half).max(0.0), offset[k].abs() + half);
+            (near, far) = (near + low * low, far + high * high);
+            let row = &sweep.image_from_world[k];
+            centre[k] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
+            halves[k] = half * (row[0].abs() + row[1].abs() + row[2].abs());
+        }
+        let Some(window) = self.lens.window(centre, halves, f64::sqrt(near), f64::sqrt(far)) else {
             return Class::Nothing;
         };
         let [least, most] = self.extremes(&window);
         let tau = sweep.settings.truncation;
-        let slack = 1e-4 * r + 1e-6 * (window.depth[1].abs() + far.sqrt());
+        let slack = 1e-4 * r + 1e-6 * (window.depth[1].abs() + f64::sqrt(far));
         if window.depth[0] > f64::from(most) + tau + slack {
             return Class::Nothing;
         }
@@ -399,8 +434,4 @@ impl Search<'_> {
         let b = pyramid.extremes([1, (to - columns).min(columns + 1)], window.rows);
         [a[0].min(b[0]), a[1].max(b[1])]
     }
-}
-
-fn pack(at: [i64; 3], free: bool) -> u64 {
-    ((at[2] as u64) << 41) | ((at[1] as u64) << 21) | ((at[0] as u64) << 1) | u64::from(free)
 }

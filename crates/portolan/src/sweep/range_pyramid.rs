@@ -1,5 +1,7 @@
 //! The nearest and the farthest value of any part of an image in a few reads.
 
+use multiversion::multiversion;
+
 /// Smallest and largest values of squares of 2, 4, 8 ... pixels. Windows are looked up in the level whose squares are no
 /// more than a third of it, so that what is read is little more than the window.
 #[derive(Clone, Debug, Default)]
@@ -19,22 +21,16 @@ struct Level {
 const SQUARES: usize = 4;
 
 impl RangePyramid {
-    /// Builds it from an image of `columns` a row, of which each value is turned into what counts as its smallest and
-    /// its largest.
-    pub(super) fn build(&mut self, columns: usize, values: &[f32], extremes: impl Fn(f32) -> [f32; 2]) {
+    /// Builds it from an image of `columns` a row: of the values without their sign, or of those above 0 only (of which
+    /// none are between infinity and minus infinity).
+    pub(super) fn build(&mut self, columns: usize, values: &[f32], surfaces_only: bool) {
         let rows = values.len() / columns;
         let first = self.level(0, columns.div_ceil(2), rows.div_ceil(2));
-        for (y, out) in first.extremes.chunks_exact_mut(columns.div_ceil(2)).enumerate() {
+        let width = columns.div_ceil(2);
+        for (y, out) in first.extremes.chunks_exact_mut(width).enumerate() {
             let top = &values[2 * y * columns..][..columns];
             let bottom = values.get((2 * y + 1) * columns..(2 * y + 2) * columns).unwrap_or(top);
-            let of = |x: usize| join(extremes(top[x]), extremes(bottom[x]));
-            let pairs = columns / 2;
-            for (x, out) in out[..pairs].iter_mut().enumerate() {
-                *out = join(of(2 * x), of(2 * x + 1));
-            }
-            if columns % 2 == 1 {
-                out[pairs] = of(columns - 1);
-            }
+            halve(top, bottom, out, surfaces_only);
         }
         self.used = 1;
         loop {
@@ -88,6 +84,23 @@ impl RangePyramid {
     }
 }
 
+/// Two rows into one of half the length.
+#[multiversion(targets = "simd")]
+fn halve(top: &[f32], bottom: &[f32], out: &mut [[f32; 2]], surfaces_only: bool) {
+    let extremes = |v: f32| {
+        let silent = surfaces_only & !(v > 0.0);
+        [if silent { f32::INFINITY } else { v.abs() }, if silent { f32::NEG_INFINITY } else { v.abs() }]
+    };
+    let pairs = top.chunks_exact(2).zip(bottom.chunks_exact(2));
+    for (out, (t, b)) in out.iter_mut().zip(pairs) {
+        *out = join(join(extremes(t[0]), extremes(t[1])), join(extremes(b[0]), extremes(b[1])));
+    }
+    let n = top.len();
+    if n % 2 == 1 {
+        out[n / 2] = join(extremes(top[n - 1]), extremes(bottom[n - 1]));
+    }
+}
+
 #[inline(always)]
 fn join(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
@@ -105,7 +118,7 @@ mod tests {
                 (0..columns * rows).map(|i| ((i as u32).wrapping_mul(2_654_435_761).wrapping_add(seed) >> 20) as f32).collect();
             let mut pyramid = RangePyramid::default();
             for _ in 0..2 {
-                pyramid.build(columns, &values, |v| [v, v]);
+                pyramid.build(columns, &values, false);
             }
             let at = |t: f64, n: usize| ((t * n as f64) as usize).min(n - 1);
             let (mut u, mut v) = ([at(w[0], columns), at(w[1], columns)], [at(w[2], rows), at(w[3], rows)]);
