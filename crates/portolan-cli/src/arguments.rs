@@ -2,6 +2,7 @@
 
 use portolan::cell::TsdfRule;
 use portolan::geom::Aabb;
+use portolan::scan::Body;
 
 fn number(text: &str) -> Result<f64, String> {
     text.trim().parse::<f64>().map_err(|_| "not a number".to_owned())
@@ -73,16 +74,50 @@ pub(crate) fn weight_or_zero(text: &str) -> Result<f32, String> {
     }
 }
 
-/// `x0,y0,x1,y1` in metres.
-pub(crate) fn bounds(text: &str) -> Result<Aabb<2>, String> {
+/// A box of the plane or of space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Bounds {
+    /// x, y
+    Plane(Aabb<2>),
+    /// x, y, z
+    Space(Aabb<3>),
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let values = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
-    let [x0, y0, x1, y1] = values[..] else {
-        return Err("must be four numbers x0,y0,x1,y1 in metres".to_owned());
-    };
-    if !(values.iter().all(|v| v.is_finite()) && x0 < x1 && y0 < y1) {
-        return Err("must have finite corners with x0 < x1 and y0 < y1".to_owned());
+    if values.iter().all(|v| v.is_finite()) { Ok(values) } else { Err("must be finite numbers".to_owned()) }
+}
+
+fn corners<const D: usize>(min: [f64; D], max: [f64; D]) -> Result<Aabb<D>, String> {
+    let ordered = (0..D).all(|k| min[k] < max[k]);
+    ordered.then(|| Aabb::new(min, max)).ok_or_else(|| "must have its smaller corner first".to_owned())
+}
+
+/// `x0,y0,x1,y1` or `x0,y0,z0,x1,y1,z1` in metres.
+pub(crate) fn bounds(text: &str) -> Result<Bounds, String> {
+    match numbers(text)?[..] {
+        [x0, y0, x1, y1] => corners([x0, y0], [x1, y1]).map(Bounds::Plane),
+        [x0, y0, z0, x1, y1, z1] => corners([x0, y0, z0], [x1, y1, z1]).map(Bounds::Space),
+        _ => Err("must be four or six numbers: x0,y0,x1,y1 or x0,y0,z0,x1,y1,z1 in metres".to_owned()),
     }
-    Ok(Aabb::new([x0, y0], [x1, y1]))
+}
+
+/// `x0,y0,z0,x1,y1,z1` in metres.
+pub(crate) fn box3(text: &str) -> Result<Aabb<3>, String> {
+    match bounds(text) {
+        Ok(Bounds::Space(b)) => Ok(b),
+        Err(e) => Err(e),
+        Ok(Bounds::Plane(_)) => Err("must be six numbers x0,y0,z0,x1,y1,z1 in metres".to_owned()),
+    }
+}
+
+/// A box `x0,y0,z0,x1,y1,z1` or a ball `x,y,z,radius` in metres.
+pub(crate) fn body(text: &str) -> Result<Body, String> {
+    match numbers(text)?[..] {
+        [x, y, z, radius] if radius > 0.0 => Ok(Body::Sphere { center: [x, y, z], radius }),
+        [x0, y0, z0, x1, y1, z1] => corners([x0, y0, z0], [x1, y1, z1]).map(Body::Box),
+        _ => Err("must be a box x0,y0,z0,x1,y1,z1 or a ball x,y,z,radius in metres".to_owned()),
+    }
 }
 
 /// Bytes, with an optional suffix K, M, G or T (powers of 1024).
@@ -143,7 +178,12 @@ mod tests {
 
     #[test]
     fn boxes_and_bytes() {
-        assert_eq!(bounds("-1,-2,3,4.5"), Ok(Aabb::new([-1.0, -2.0], [3.0, 4.5])));
+        assert_eq!(bounds("-1,-2,3,4.5"), Ok(Bounds::Plane(Aabb::new([-1.0, -2.0], [3.0, 4.5]))));
+        let space = Aabb::new([-1.0, -2.0, -3.0], [3.0, 4.5, 6.0]);
+        assert_eq!(bounds("-1,-2,-3,3,4.5,6"), Ok(Bounds::Space(space)));
+        assert_eq!((box3("-1,-2,-3,3,4.5,6"), body("-1,-2,-3,3,4.5,6")), (Ok(space), Ok(Body::Box(space))));
+        assert_eq!(body("1,2,3,0.5"), Ok(Body::Sphere { center: [1.0, 2.0, 3.0], radius: 0.5 }));
+        assert!(box3("1,2,3,4").is_err() && body("1,2,3,0").is_err() && body("1,2,3").is_err());
         for bad in ["1,2,3", "1,2,1,3", "1,2,nan,3", "a,b,c,d"] {
             assert!(bounds(bad).is_err(), "{bad}");
         }

@@ -2,6 +2,7 @@
 
 use portolan::geom::{Aabb, Grid};
 use portolan::scan::ScanStats;
+use portolan_io::space_log::SpaceLogStats;
 use portolan_io::{CarmenStats, TimeOrder};
 use serde_json::{Map, Value, json};
 
@@ -64,6 +65,25 @@ pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
             TimeOrder::Ascending => "ascending",
             TimeOrder::NotAscending => "not ascending",
         },
+    })
+}
+
+/// What else was found in a log of space.
+pub(crate) fn space_log_stats(stats: &SpaceLogStats) -> Value {
+    json!({
+        "scans": stats.scans,
+        "poses": stats.poses,
+        "scans_without_pose": stats.scans_without_pose,
+        "poses_without_scan": stats.poses_without_scan,
+        "unmatched_times": stats.unmatched_times,
+        "mended_poses": stats.mended_poses,
+        "worst_pose": stats.worst_pose,
+        "refused_poses": {
+            "total": stats.refused_poses.len(),
+            "first": stats.refused_poses.first().map(ToString::to_string),
+        },
+        "scans_without_color": stats.scans_without_color,
+        "colors_left_out": stats.colors_left_out,
     })
 }
 

@@ -6,26 +6,72 @@ use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{RangeLimits, Scan};
+use portolan_io::poses3::PoseConvention;
+use portolan_io::space_log::{Intrinsics, SpaceLog, SpaceLogKind, SpaceLogOptions};
 use portolan_io::{CarmenLog, FileKind, detect, detect_no_return, read_poses_2d};
 
 use crate::arguments::{length, length_or_zero};
 
 /// Kinds of logs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LogFormat {
     /// CARMEN text logs (.log, .clf; plain, gzip, bzip2)
     Carmen,
+    /// Scans of space
+    Space(SpaceLogKind),
+}
+
+/// The kind of a word of `--format`.
+fn log_format(word: &str) -> Result<LogFormat, String> {
+    match SpaceLogKind::from_word(word) {
+        _ if word == "carmen" => Ok(LogFormat::Carmen),
+        Some(kind) => Ok(LogFormat::Space(kind)),
+        None => {
+            Err(format!("must be one of carmen, {}", SpaceLogKind::ALL.map(SpaceLogKind::word).join(", ")))
+        }
+    }
+}
+
+/// The convention of a word of `--pose-convention`.
+fn pose_convention(word: &str) -> Result<PoseConvention, String> {
+    PoseConvention::from_word(word)
+        .ok_or_else(|| format!("must be one of {}", PoseConvention::ALL.map(PoseConvention::word).join(", ")))
 }
 
 /// Which log, with which poses.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct LogArgs {
-    /// Poses of the sensor, one per scan, instead of the log's own: x y theta, t x y theta, or TUM
+    /// Poses of the sensor, instead of the log's own. Planar: one per scan, x y theta, t x y theta, or TUM. In space:
+    /// KITTI rows, TUM lines, 4x4 matrices or a Redwood trajectory
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
-    /// Kind of LOG, where it is not recognised
-    #[arg(long)]
+    /// Kind of LOG, where it is not recognised: carmen, or a kind of log of space that a wrong word lists
+    #[arg(long, value_name = "KIND", value_parser = log_format)]
     pub(crate) format: Option<LogFormat>,
+    /// In space: what the numbers of the poses mean, where it is not what the format says: world-from-sensor,
+    /// sensor-from-world, transposed-rotation (Stanford, BigBIRD), column-major, opengl-camera
+    #[arg(long, value_name = "WORD", value_parser = pose_convention)]
+    pub(crate) pose_convention: Option<PoseConvention>,
+    /// Depth images: the camera, fx,fy,cx,cy (pixels) or a file
+    #[arg(long, value_name = "CAMERA")]
+    pub(crate) intrinsics: Option<String>,
+    /// Depth images: units per metre, 1000 for millimetres
+    #[arg(long, value_name = "N", value_parser = length, allow_negative_numbers = true)]
+    pub(crate) depth_scale: Option<f64>,
+    /// How far a pose's time may lie from a scan's (seconds) [default: 0.02]
+    #[arg(long, value_name = "S", value_parser = length_or_zero, allow_negative_numbers = true)]
+    pub(crate) time_tolerance: Option<f64>,
+}
+
+impl LogArgs {
+    /// Whether the log is one of scans of space. What is not recognised counts as planar: that reader says what is wrong.
+    pub(crate) fn is_space(&self, path: &Path) -> anyhow::Result<bool> {
+        match self.format {
+            Some(LogFormat::Carmen) => Ok(false),
+            Some(LogFormat::Space(_)) => Ok(true),
+            None => Ok(matches!(detect(path)?, FileKind::SpaceLog(_))),
+        }
+    }
 }
 
 /// How readings become beams.
@@ -58,7 +104,22 @@ impl LimitArgs {
     }
 }
 
-/// Reads a log.
+/// Opens a log of scans of space.
+pub(crate) fn read_space(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<SpaceLog> {
+    let default = SpaceLogOptions::default();
+    let options = SpaceLogOptions {
+        format: args.format.and_then(|f| if let LogFormat::Space(kind) = f { Some(kind) } else { None }),
+        poses: args.poses.clone(),
+        pose_convention: args.pose_convention,
+        intrinsics: args.intrinsics.as_deref().map(Intrinsics::from_word),
+        depth_scale: args.depth_scale,
+        color,
+        time_tolerance: args.time_tolerance.unwrap_or(default.time_tolerance),
+    };
+    Ok(SpaceLog::open(path, &options)?)
+}
+
+/// Reads a planar log.
 pub(crate) fn read(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> {
     if args.format.is_none() {
         match detect(path)? {
@@ -68,7 +129,7 @@ pub(crate) fn read(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> {
             FileKind::Unknown(what) => {
                 bail!("{}: not a log: {what}; or force it with --format carmen", path.display())
             }
-            kind => bail!("{}: is {}, not a log; give a CARMEN log", path.display(), describe(&kind)),
+            kind => bail!("{}: is {}, not a log of planar scans", path.display(), describe(&kind)),
         }
     }
     let log = CarmenLog::read(path)?;
@@ -89,6 +150,7 @@ pub(crate) fn read(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> {
 pub(crate) fn describe(kind: &FileKind) -> String {
     match kind {
         FileKind::CarmenLog => "a CARMEN log".into(),
+        FileKind::SpaceLog(kind) => kind.label().into(),
         FileKind::Portolan => "a portolan map".into(),
         FileKind::PortolanFolder => "a folder with a portolan map".into(),
         FileKind::EsdfBin => "a distance field (esdf.bin)".into(),

@@ -15,6 +15,7 @@ mod pictures;
 mod progress;
 mod report;
 mod source;
+mod space;
 
 use std::process::ExitCode;
 

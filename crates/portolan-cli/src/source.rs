@@ -3,16 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
 use portolan_io::{
-    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, Pgm, Polyline, detect, read_geojson,
+    AnyMapFile, CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline,
+    SpaceMapFile, detect, read_geojson,
 };
 
 use crate::log::describe;
 
 /// What a file holds.
 pub(crate) enum Source {
-    /// `map.portolan`
+    /// `map.portolan` of the plane
     Map(Box<MapFile>),
+    /// `map.portolan` of space
+    SpaceMap(Box<SpaceMapFile>),
     /// `esdf.bin`
     Esdf(EsdfFile),
     /// A map_server map
@@ -21,15 +25,19 @@ pub(crate) enum Source {
     Image(Pgm),
     /// A contour
     Contour(Vec<Polyline>),
+    /// A `.bt` or `.ot`
+    Octomap(Box<OctomapTree>),
     /// A log
     Log(Box<CarmenLog>),
+    /// A log of scans of space
+    SpaceLog(Box<SpaceLog>),
 }
 
 /// Opens a file or a folder.
 pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
     Ok(match detect(path)? {
-        FileKind::Portolan => Source::Map(Box::new(MapFile::read(path)?)),
-        FileKind::PortolanFolder => Source::Map(Box::new(MapFile::read(path.join("map.portolan"))?)),
+        FileKind::Portolan => of_map(AnyMapFile::read(path)?),
+        FileKind::PortolanFolder => of_map(AnyMapFile::read(path.join("map.portolan"))?),
         FileKind::EsdfBin => Source::Esdf(EsdfFile::read(path)?),
         FileKind::MapServerYaml => Source::Server(MapServerMap::read(path)?),
         FileKind::Pgm => match yaml_beside(path) {
@@ -37,13 +45,24 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
             None => Source::Image(Pgm::read(path)?),
         },
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
+        FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
         FileKind::CarmenLog => Source::Log(Box::new(CarmenLog::read(path)?)),
+        FileKind::SpaceLog(_) => {
+            Source::SpaceLog(Box::new(SpaceLog::open(path, &SpaceLogOptions::default())?))
+        }
         FileKind::Unknown(what) => bail!("{}: not recognised: {what}", path.display()),
         kind => bail!("{}: is {}, which is not read yet", path.display(), describe(&kind)),
     })
 }
 
-/// Opens a map made by `map`; `what` is to be done with it.
+fn of_map(file: AnyMapFile) -> Source {
+    match file {
+        AnyMapFile::Plane(file) => Source::Map(file),
+        AnyMapFile::Space(file) => Source::SpaceMap(file),
+    }
+}
+
+/// Opens a map of the plane made by `map`; `what` is to be done with it.
 pub(crate) fn open_map(path: &Path, what: &str) -> anyhow::Result<MapFile> {
     match open(path)? {
         Source::Map(file) => Ok(*file),
@@ -61,6 +80,10 @@ fn yaml_beside(path: &Path) -> Option<PathBuf> {
 impl Source {
     /// What the user should know before he trusts it.
     pub(crate) fn warning(&self) -> Option<String> {
+        if let Self::Octomap(file) = self {
+            let colors = "it has colours, which are passed over: what is written from it has none";
+            return file.colors_left_out().then(|| colors.into());
+        }
         let Self::Server(map) = self else { return None };
         let cells = map.unknown_grey_taken_for_free;
         (cells > 0).then(|| {
@@ -75,11 +98,15 @@ impl Source {
     pub(crate) fn describe(&self) -> &'static str {
         match self {
             Self::Map(_) => "a portolan map",
+            Self::SpaceMap(_) => "a portolan map of space",
             Self::Esdf(_) => "a distance field (esdf.bin)",
             Self::Server(_) => "a map_server map",
             Self::Image(_) => "a PGM image without its yaml file",
             Self::Contour(_) => "a contour (GeoJSON)",
+            Self::Octomap(file) if file.is_binary() => "an OctoMap tree of free and occupied (.bt)",
+            Self::Octomap(_) => "an OctoMap tree of log odds (.ot)",
             Self::Log(_) => "a CARMEN log",
+            Self::SpaceLog(log) => log.kind().label(),
         }
     }
 }

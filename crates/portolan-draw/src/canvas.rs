@@ -85,6 +85,25 @@ impl Canvas {
         data[..3].copy_from_slice(&[mixed.r, mixed.g, mixed.b]);
     }
 
+    /// Puts rows of pixels, `width` each, with their upper left corner at `(x, y)`; what does not fit is left out.
+    pub(crate) fn paste(&mut self, x: usize, y: usize, width: usize, pixels: &[[u8; 3]]) {
+        let (columns, rows) = (self.width() as usize, self.height() as usize);
+        let fits = width.min(columns.saturating_sub(x));
+        let data = self.pixels.data_mut();
+        for (row, pixels) in pixels.chunks_exact(width.max(1)).take(rows.saturating_sub(y)).enumerate() {
+            for (column, &[r, g, b]) in pixels.iter().take(fits).enumerate() {
+                let at = 4 * ((y + row) * columns + x + column);
+                data[at..at + 4].copy_from_slice(&[r, g, b, 255]);
+            }
+        }
+    }
+
+    /// Lays another picture over this one, its upper left corner at `(x, y)`.
+    pub fn paste_canvas(&mut self, x: usize, y: usize, other: &Self) {
+        let pixels: Vec<[u8; 3]> = other.pixels.data().chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+        self.paste(x, y, other.width() as usize, &pixels);
+    }
+
     /// A raster of `shape[0] × shape[1]` cells of `resolution` metres whose cell (0, 0) has its lower left
     /// corner at `origin`; `color` is asked for the cells by index and its answer laid over the picture.
     ///

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::bytes::open;
+use crate::space_log::SpaceLogKind;
 use crate::{IoError, container, esdf_bin};
 
 /// So much of a file is looked at (unpacked bytes).
@@ -28,10 +29,12 @@ pub enum FileKind {
     GeoJson,
     /// A picture of contours; not read.
     Svg,
-    /// OctoMap's binary tree; not read yet.
+    /// OctoMap's tree of free and occupied: [`crate::OctomapTree`].
     OctomapBt,
-    /// OctoMap's full tree; not read yet.
+    /// OctoMap's tree of log odds: [`crate::OctomapTree`].
     OctomapOt,
+    /// Scans of space with poses: [`crate::space_log::SpaceLog`].
+    SpaceLog(SpaceLogKind),
     /// None of these; the text says what was seen and what would be known.
     Unknown(String),
 }
@@ -46,10 +49,16 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
         if path.join("map.portolan").is_file() {
             return Ok(FileKind::PortolanFolder);
         }
-        return Ok(FileKind::Unknown("a folder without map.portolan; name a file inside it".into()));
+        if let Some(kind) = SpaceLogKind::recognise(path) {
+            return Ok(FileKind::SpaceLog(kind));
+        }
+        let what = "a folder without map.portolan and without scans of a known layout; name a file inside it";
+        return Ok(FileKind::Unknown(what.into()));
     }
     let head = open(path)?.read_up_to(HEAD)?;
-    Ok(by_content(&head).or_else(|| by_name(path, &head)).unwrap_or_else(|| unknown(&head)))
+    let as_log = || SpaceLogKind::recognise(path).map(FileKind::SpaceLog);
+    let kind = by_content(&head).or_else(as_log).or_else(|| by_name(path, &head));
+    Ok(kind.unwrap_or_else(|| unknown(&head)))
 }
 
 fn by_content(head: &[u8]) -> Option<FileKind> {
@@ -136,7 +145,7 @@ fn unknown(head: &[u8]) -> FileKind {
         [0x89, b'P', b'N', b'G', ..] => "it is a PNG picture (convert it to PGM)".to_owned(),
         _ => format!("it starts with {}", crate::error::shown(&head[..head.len().min(16)])),
     };
-    let known = "known are CARMEN logs, map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON";
+    let known = "known are CARMEN logs, map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON, OctoMap";
     FileKind::Unknown(format!("{seen}; {known}"))
 }
 
@@ -205,6 +214,7 @@ mod tests {
             ("maps_2d/depot.yaml", MapServerYaml),
             ("maps_2d/willow-full.pgm", Pgm),
             ("maps_octomap/geb079.bt", OctomapBt),
+            ("rgbd_redkitchen", SpaceLog(SpaceLogKind::SevenScenes)),
         ] {
             let Some(path) = real_data(name) else { continue };
             assert_eq!(detect(path).unwrap(), kind);

@@ -79,6 +79,18 @@ pub enum IoError {
         /// What was found instead.
         found: String,
     },
+    /// Files of a log do not fit together, or something is missing between them.
+    #[error("{}: {field} is {value}; {advice}", shown_path(path))]
+    Layout {
+        /// The file or folder.
+        path: PathBuf,
+        /// What does not fit.
+        field: String,
+        /// Its value.
+        value: String,
+        /// What to do.
+        advice: String,
+    },
     /// What the caller wants to write, or to combine, cannot be held by the format.
     #[error("{}: {field} is {value}; {advice}", shown_path(path))]
     Unwritable {
@@ -126,6 +138,16 @@ impl IoError {
         Self::Unwritable { path: path.into(), field, value, advice }
     }
 
+    pub(crate) fn layout(
+        path: &Path,
+        field: impl Into<String>,
+        value: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        Self::Layout { path: path.into(), field, value, advice }
+    }
+
     pub(crate) fn os(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
         Self::Os { path: path.into(), action, cause }
     }
@@ -139,6 +161,7 @@ impl IoError {
             | Self::Text { path, .. }
             | Self::Binary { path, .. }
             | Self::NoScans { path, .. }
+            | Self::Layout { path, .. }
             | Self::Unwritable { path, .. } => path,
         }
     }

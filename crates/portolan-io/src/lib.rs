@@ -4,9 +4,19 @@
 //! |---|---|---|
 //! | CARMEN log (plain, gzip, bzip2) | [`CarmenLog`], [`detect_no_return`] | |
 //! | pose files (`x y theta`, `t x y theta`, TUM) | [`read_poses_2d`] | |
+//! | PCD (text, binary, packed) | [`read_pcd`] | [`write_pcd`] |
+//! | PLY (text, binary) | [`read_ply_cloud`], [`read_ply_mesh`] | [`write_ply_cloud`] |
+//! | KITTI velodyne `.bin` | [`read_kitti_bin`] | [`write_kitti_bin`] |
+//! | XYZ, CSV, PTS | [`read_xyz`] | |
+//! | OctoMap scan graph | [`read_scan_graph`] | |
+//! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
+//! | logs of scans of space with poses | [`space_log::SpaceLog`] | |
 //! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
+//! | the same as KITTI, TUM RGB-D, 7-Scenes | | [`LogWriter`] |
+//! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
+//! | OctoMap `.bt`, `.ot` | [`OctomapTree`] | [`write_octomap_bt`], [`write_octomap_ot`] |
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
 //! | SVG contours | | [`write_svg`] |
@@ -26,14 +36,24 @@ mod detect;
 mod error;
 mod esdf_bin;
 mod geojson;
+mod kitti_bin;
+mod log_writer;
 mod map_file;
 mod map_server;
+mod octomap;
+mod pcd;
 mod pgm;
+mod ply;
+mod points;
 mod points_csv;
 mod poses;
+pub mod poses3;
+mod scan_graph;
+pub mod space_log;
 mod svg;
 #[cfg(test)]
 mod testing;
+mod xyz;
 
 pub use bytes::{Compression, Input, open, write_atomic};
 pub use carmen::{
@@ -45,15 +65,25 @@ pub use detect::{FileKind, detect};
 pub use error::IoError;
 pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
 pub use geojson::{parse_geojson, read_geojson, write_geojson};
+pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
+pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{
     AnyMapFile, ColorBricks, MapFile, MapHeader, OccupancyBricks, SpaceMapFile, TsdfBricks, sweep_of,
     sweep_word, weights_of, weights_word,
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
+pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
+pub use pcd::{read_pcd, write_pcd};
 pub use pgm::Pgm;
+pub use ply::{PlyMesh, read_ply_cloud, read_ply_mesh, write_ply_cloud};
+pub use points::{
+    CloudGrid, PointCloudFile, PointFormat, RefusedPoints, Viewpoint, parse_points, point_format, read_points,
+};
 pub use points_csv::{AnswerRow, AnswerStatus, QueryPoints, write_answer, write_answer_header};
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};
+pub use scan_graph::{ScanGraphNode, read_scan_graph};
 pub use svg::{SvgStyle, write_svg};
+pub use xyz::read_xyz;
 
 /// Points joined by straight segments (metres); a closed line repeats its first point at the end.
 pub type Polyline = Vec<[f64; 2]>;

@@ -10,7 +10,7 @@ use portolan::map::{OccupancyGrid, Tsdf, TsdfConfig};
 use portolan::store::Dense;
 use portolan::surface::{Contour, ContourSettings, marching_squares};
 use portolan_io::{
-    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, Polyline, write_esdf, write_map_server,
+    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, write_esdf, write_map_server,
 };
 use serde_json::json;
 
@@ -24,9 +24,9 @@ use crate::source::{Source, open};
     after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  portolan convert intel intel.yaml"
 )]
 pub(crate) struct Args {
-    /// map.portolan or its folder, map_server yaml, esdf.bin, or GeoJSON contour
+    /// map.portolan or its folder, map_server yaml, esdf.bin, GeoJSON contour, or OctoMap .bt or .ot
     input: PathBuf,
-    /// File to write: .portolan, .yaml (with its .pgm), .bin, .geojson or .svg
+    /// File to write: .portolan, .yaml (with its .pgm), .bin, .geojson, .svg, .bt or .ot
     out: PathBuf,
     #[command(flatten)]
     output: Output,
@@ -39,6 +39,8 @@ enum Target {
     MapServer,
     Esdf,
     Contour,
+    OctomapBt,
+    OctomapOt,
 }
 
 /// Converts the file.
@@ -65,6 +67,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             }
         }
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
+        Source::Octomap(file) => convert_octomap(file, target, args)?,
         _ => false,
     };
     if !done {
@@ -89,6 +92,8 @@ fn target(out: &Path) -> Option<Target> {
         "yaml" | "yml" | "pgm" => Some(Target::MapServer),
         "bin" => Some(Target::Esdf),
         "geojson" | "json" | "svg" => Some(Target::Contour),
+        "bt" => Some(Target::OctomapBt),
+        "ot" => Some(Target::OctomapOt),
         _ => None,
     }
 }
@@ -102,7 +107,9 @@ fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
         Source::Esdf(EsdfFile::Three(_)) => "nothing yet: it is in space",
         Source::Contour(_) => ".geojson or .svg",
         Source::Image(_) => "nothing without its yaml file",
-        Source::Log(_) => "nothing here: `portolan map` makes maps of logs",
+        Source::Octomap(_) => ".bt or .ot",
+        Source::SpaceMap(_) => ".portolan",
+        Source::Log(_) | Source::SpaceLog(_) => "nothing here: `portolan map` makes maps of logs",
     };
     let (input, out) = (args.input.display(), args.out.display());
     anyhow::anyhow!("{input}: {} cannot become {out}; it can become {possible}", source.describe())
@@ -131,6 +138,7 @@ fn convert_map(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<bo
         (Target::Contour, Some(tsdf)) => {
             return write_lines(&marching_squares(tsdf, &ContourSettings::of(tsdf)), args);
         }
+        (Target::OctomapBt | Target::OctomapOt, _) => return Ok(false),
         (Target::Esdf | Target::Contour, None) => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
             return convert_esdf(&esdf_of_cells(grid, &cells), target, args);
@@ -162,13 +170,24 @@ fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Re
             }
             return write_lines(&contour, args);
         }
+        Target::OctomapBt | Target::OctomapOt => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Back to its own format: the same bytes.
+fn convert_octomap(file: &OctomapTree, target: Target, args: &Args) -> anyhow::Result<bool> {
+    match target {
+        Target::OctomapBt => file.write_bt(&args.out)?,
+        Target::OctomapOt => file.write_ot(&args.out)?,
+        _ => return Ok(false),
     }
     Ok(true)
 }
 
 fn convert_esdf(esdf: &Esdf<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match target {
-        Target::Portolan => return Ok(false),
+        Target::Portolan | Target::OctomapBt | Target::OctomapOt => return Ok(false),
         Target::Esdf => write_field(esdf, args)?,
         Target::MapServer => {
             let cell = |d: &f32| match d {

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use portolan::geom::{Aabb, Grid};
 use portolan::map::MapRepr;
+use portolan::store::Store;
 use portolan_io::{CarmenLog, EsdfBin, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
-use portolan_io::{Polyline, detect_no_return};
+use portolan_io::{OctomapTree, Polyline, detect_no_return};
 use serde_json::{Value, json};
 
 use crate::arguments::shown_bytes;
@@ -13,6 +14,8 @@ use crate::json;
 use crate::log::{describe, path_length};
 use crate::output::Output;
 use crate::source::{Source, open};
+
+mod space;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan info intel.log.gz")]
@@ -27,7 +30,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let kind = detect(&args.file)?;
     let mut document = match kind {
-        FileKind::Svg | FileKind::OctomapBt | FileKind::OctomapOt => json!({ "kind": describe(&kind) }),
+        FileKind::Svg => json!({ "kind": describe(&kind) }),
         _ => {
             let source = open(&args.file)?;
             let mut document = about(&source);
@@ -82,7 +85,10 @@ fn about(source: &Source) -> Value {
             "hint": "resolution and origin are in a yaml file, which is not beside it",
         }),
         Source::Contour(contour) => of_contour(contour),
+        Source::Octomap(file) => of_octomap(file),
         Source::Log(log) => of_log(log),
+        Source::SpaceMap(file) => space::of_map(file),
+        Source::SpaceLog(log) => space::of_log(log),
     }
 }
 
@@ -163,6 +169,33 @@ fn of_contour(lines: &[Polyline]) -> Value {
         "segments": steps.count(),
         "length": length,
         "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
+    })
+}
+
+fn of_octomap(file: &OctomapTree) -> Value {
+    let tree = file.tree();
+    let (free, occupied) = file.leaves();
+    let (mut extent, mut extent_occupied) = (Aabb::EMPTY, Aabb::EMPTY);
+    let mut observed_volume = 0.0;
+    tree.for_each_leaf(|leaf| {
+        let leaf_box = tree.lattice().aabb(leaf.cell, leaf.cell.map(|v| v + (1 << leaf.height)));
+        observed_volume += leaf_box.extent().iter().product::<f64>();
+        extent = extent.union(leaf_box);
+        if leaf.value.0 >= 0.0 {
+            extent_occupied = extent_occupied.union(leaf_box);
+        }
+    });
+    json!({
+        "class": file.class(),
+        "resolution": file.resolution(),
+        "depth": tree.depth(),
+        "leaves": { "total": free + occupied, "free": free, "occupied": occupied },
+        "inner_nodes": file.inner_nodes(),
+        "inner_nodes_that_could_be_merged": file.prunable_nodes(),
+        "observed_volume": observed_volume,
+        "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
+        "extent_of_occupied": (!extent_occupied.is_empty()).then(|| json::aabb(&extent_occupied)),
+        "bytes_in_memory": tree.memory_bytes(),
     })
 }
 

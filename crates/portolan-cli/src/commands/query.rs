@@ -5,26 +5,32 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Esdf, EsdfSettings, esdf_from_tsdf};
+use portolan::field::{Esdf, EsdfSettings, SparseEsdf, esdf_from_tsdf};
 use portolan::geom::Pose;
-use portolan::map::MapRepr;
+use portolan::map::{MapRepr, OccupancySweep, SparseOccupancy};
+use portolan::store::Store;
 use portolan_io::{
-    AnswerRow, AnswerStatus, EsdfBin, EsdfFile, Input, MapCell, MapFile, MapServerMap, QueryPoints,
-    write_answer, write_answer_header,
+    AnswerRow, AnswerStatus, EsdfBin, EsdfFile, Input, MapCell, MapFile, MapServerMap, OctomapTree,
+    QueryPoints, SpaceMapFile, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
+use crate::arguments::length;
 use crate::output::Output;
 use crate::source::{Source, open};
+use crate::space::esdf_settings;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echo 1.5,2.0 | portolan query intel --points -")]
 pub(crate) struct Args {
-    /// A folder that `map` wrote, a map.portolan, an esdf.bin, or a map_server yaml
+    /// A folder that `map` wrote, a map.portolan, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot
     map: PathBuf,
     /// CSV of x,y or x,y,z in metres; - reads standard input
     #[arg(long, value_name = "FILE")]
     points: PathBuf,
+    /// Maps of space: distances are found up to here (metres) [default: as the map was made]
+    #[arg(long, value_name = "M", value_parser = length)]
+    max_distance: Option<f64>,
     #[command(flatten)]
     output: Output,
 }
@@ -36,7 +42,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         // Standard output is for the answers.
         writeln!(io::stderr(), "portolan: warning: {}: {warning}", args.map.display())?;
     }
-    let field = Fields::of(source, &args.map)?;
+    let field = Fields::of(source, args)?;
     let points = if args.points == Path::new("-") {
         QueryPoints::parse(Input::from_reader(io::stdin(), "standard input".as_ref())?)?
     } else {
@@ -97,26 +103,32 @@ enum Fields {
 
 /// Answers to occupancy and distance of one map.
 struct Field<const D: usize> {
-    distance: Option<Esdf<D>>,
-    /// Per cell of the distance field, if it tells.
-    status: Option<Vec<u8>>,
+    distance: Option<Distance<D>>,
     occupancy: Occupancy<D>,
     /// For maps that are turned against the world.
     world_from_field: Pose<D>,
 }
 
 type Occupancy<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<f64>>;
+/// Distance and gradient.
+type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>;
+
+fn dense<const D: usize>(esdf: Esdf<D>) -> Distance<D> {
+    Box::new(move |p| esdf.distance_and_gradient(p))
+}
 
 impl Fields {
-    fn of(source: Source, path: &Path) -> anyhow::Result<Self> {
+    fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
             Source::Map(file) => Self::Two(of_map(*file)),
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
             Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
             Source::Server(map) => Self::Two(of_server(map)),
+            Source::SpaceMap(file) => Self::Three(of_space_map(*file, args.max_distance)?),
+            Source::Octomap(file) => Self::Three(of_octomap(*file)),
             other => bail!(
-                "{}: is {}; give a map.portolan or its folder, an esdf.bin, or a map_server yaml",
-                path.display(),
+                "{}: is {}; give a map.portolan or its folder, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot",
+                args.map.display(),
                 other.describe()
             ),
         })
@@ -133,14 +145,39 @@ fn of_map(file: MapFile) -> Field<2> {
         let occupied = |i: usize| map.store().at(i).map(|v| v.0 > 0);
         Some(Esdf::from_mask(*map.store().grid(), occupied))
     };
-    let distance = of_tsdf.or_else(of_grid);
+    let distance = of_tsdf.or_else(of_grid).map(dense);
     let occupancy: Occupancy<2> = match (file.grid, file.tree, file.tsdf) {
         (Some(map), ..) => Box::new(move |p| map.probability(p)),
         (_, Some(map), _) => Box::new(move |p| map.probability(p)),
         (.., Some(map)) => Box::new(move |p| map.occupancy(p).map_or(Answer::Unknown, Answer::Known)),
         _ => Box::new(|_| Answer::Outside),
     };
-    Field { distance, status: None, occupancy, world_from_field: Pose::IDENTITY }
+    Field { distance, occupancy, world_from_field: Pose::IDENTITY }
+}
+
+fn of_space_map(file: SpaceMapFile, max_distance: Option<f64>) -> anyhow::Result<Field<3>> {
+    let saved = file.header.settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
+    let max_distance = max_distance.or(saved).unwrap_or(1.0);
+    let distance = file.tsdf.as_ref().map(|map| -> Distance<3> {
+        let how = esdf_settings(map.weights, map.carve_weight, max_distance);
+        let esdf = SparseEsdf::of(&map.store, &how);
+        Box::new(move |p| esdf.distance_and_gradient(p))
+    });
+    let occupancy: Occupancy<3> = match (file.occupancy, file.tsdf) {
+        (Some(map), _) => {
+            let map = SparseOccupancy::from_store(map.store, map.model, OccupancySweep::Auto)?;
+            Box::new(move |p| map.probability(p))
+        }
+        (None, Some(map)) => Box::new(move |p| match map.store.lattice().cell_of(p) {
+            None => Answer::Outside,
+            Some(cell) => match map.store.cell(cell) {
+                Some(c) => Answer::Known(if c.distance < 0.0 { 1.0 } else { 0.0 }),
+                None => Answer::Unknown,
+            },
+        }),
+        (None, None) => Box::new(|_| Answer::Outside),
+    };
+    Ok(Field { distance, occupancy, world_from_field: Pose::IDENTITY })
 }
 
 fn of_esdf<const D: usize>(file: EsdfBin<D>) -> anyhow::Result<Field<D>> {
@@ -151,18 +188,40 @@ fn of_esdf<const D: usize>(file: EsdfBin<D>) -> anyhow::Result<Field<D>> {
     }
     let esdf = Esdf::from_samples(file.grid, samples)?;
     let occupancy: Occupancy<D> = Box::new(|_| Answer::Unknown);
-    Ok(Field { distance: Some(esdf), status: file.status, occupancy, world_from_field: Pose::IDENTITY })
+    let status = file.status;
+    let distance: Distance<D> = Box::new(move |p| match esdf.distance_and_gradient(p) {
+        Answer::Known(answer) if is_saturated(&esdf, status.as_deref(), p) => Answer::Saturated(answer),
+        answer => answer,
+    });
+    Ok(Field { distance: Some(distance), occupancy, world_from_field: Pose::IDENTITY })
 }
 
 fn of_server(map: MapServerMap) -> Field<2> {
     let world_from_field = map.world_from_grid();
-    let distance = Some(esdf_of_server(&map));
+    let distance = Some(dense(esdf_of_server(&map)));
     let occupancy: Occupancy<2> = Box::new(move |p| match map.grid.index_of(p) {
         None => Answer::Outside,
         Some(i) if map.occupancy[i].is_nan() => Answer::Unknown,
         Some(i) => Answer::Known(f64::from(map.occupancy[i])),
     });
-    Field { distance, status: None, occupancy, world_from_field }
+    Field { distance, occupancy, world_from_field }
+}
+
+/// Occupancy alone: a tree holds no distances.
+fn of_octomap(file: OctomapTree) -> Field<3> {
+    let tree = file.into_tree();
+    let bounds = tree.grid().aabb();
+    let occupancy: Occupancy<3> =
+        Box::new(move |p| match tree.lattice().cell_of(p).filter(|_| bounds.contains(p)) {
+            None => Answer::Outside,
+            Some(cell) => tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(logistic(v.0))),
+        });
+    Field { distance: None, occupancy, world_from_field: Pose::IDENTITY }
+}
+
+/// P(occupied) of log odds.
+fn logistic(log_odds: f32) -> f64 {
+    1.0 / (1.0 + (-f64::from(log_odds)).exp())
 }
 
 /// The distance field of a map_server map, in its own frame.
@@ -187,19 +246,13 @@ impl<const D: usize> Field<D> {
             upper: None,
             gradient: None,
         };
-        let Some(esdf) = &self.distance else {
+        let Some(distance) = &self.distance else {
             if occupancy == Answer::Outside {
                 row.status = AnswerStatus::Outside;
             }
             return row;
         };
-        match esdf.distance_and_gradient(p) {
-            Answer::Known((d, _)) if self.is_saturated(esdf, p) => {
-                row.status = AnswerStatus::Saturated;
-                row.distance = Some(d);
-                // Bounds are about the magnitude; the side is the distance's sign.
-                row.lower = Some(d.abs());
-            }
+        match distance(p) {
             Answer::Known((d, gradient)) => {
                 row.status = AnswerStatus::Known;
                 row.distance = Some(d);
@@ -208,6 +261,7 @@ impl<const D: usize> Field<D> {
             Answer::Saturated((d, _)) => {
                 row.status = AnswerStatus::Saturated;
                 row.distance = Some(d);
+                // Bounds are about the magnitude; the side is the distance's sign.
                 row.lower = Some(d.abs());
             }
             Answer::Unknown => {}
@@ -215,15 +269,15 @@ impl<const D: usize> Field<D> {
         }
         row
     }
+}
 
-    /// Whether one of the cells that a point is interpolated from is.
-    fn is_saturated(&self, esdf: &Esdf<D>, p: [f64; D]) -> bool {
-        let Some(status) = &self.status else { return false };
-        let grid = esdf.grid();
-        let Some((base, _)) = grid.interpolation(p) else { return false };
-        (0..1usize << D).any(|c| {
-            let cell = std::array::from_fn(|k| base[k] + ((c >> k) & 1) as i32);
-            grid.index(cell).is_some_and(|i| status[i] == EsdfBin::<D>::SATURATED)
-        })
-    }
+/// Whether one of the cells that a point is interpolated from is.
+fn is_saturated<const D: usize>(esdf: &Esdf<D>, status: Option<&[u8]>, p: [f64; D]) -> bool {
+    let Some(status) = status else { return false };
+    let grid = esdf.grid();
+    let Some((base, _)) = grid.interpolation(p) else { return false };
+    (0..1usize << D).any(|c| {
+        let cell = std::array::from_fn(|k| base[k] + ((c >> k) & 1) as i32);
+        grid.index(cell).is_some_and(|i| status[i] == EsdfBin::<D>::SATURATED)
+    })
 }

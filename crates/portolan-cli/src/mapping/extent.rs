@@ -75,7 +75,7 @@ pub(crate) fn check_memory(
         MapKind::Tree => 3.0,
         MapKind::Tsdf => 16.0,
         MapKind::Esdf => 24.0,
-        MapKind::Contour => 1.0,
+        MapKind::Contour | MapKind::Mesh => 1.0,
     };
     let cells: f64 = grid.shape.iter().map(|&s| s as f64).product();
     let beams: usize = scans.iter().map(|(_, s)| s.len()).sum();

@@ -13,5 +13,5 @@ pub(crate) use artefacts::{
 pub(crate) use extent::{check_memory, grid_over, seen, with_outlier};
 pub(crate) use fuse::{FusionReport, Maps, fuse};
 pub(crate) use grow::grown;
-pub(crate) use settings::{MapKind, Settings};
+pub(crate) use settings::{MapKind, Settings, map_word};
 pub(crate) use words::{Summary, report};

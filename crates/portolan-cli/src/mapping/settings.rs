@@ -17,14 +17,17 @@ use crate::json::object;
 pub(crate) enum MapKind {
     /// Occupancy grid
     Grid,
-    /// Occupancy quadtree
+    /// Occupancy quadtree, in space octree
+    #[value(alias = "octree")]
     Tree,
     /// Truncated signed distance field
     Tsdf,
     /// Euclidean signed distance field, derived from the tsdf
     Esdf,
-    /// Contour, derived from the tsdf
+    /// Contour, derived from the tsdf of a planar log
     Contour,
+    /// Mesh, derived from the tsdf of a log of space
+    Mesh,
 }
 
 /// All that decides what the maps will hold.
@@ -140,12 +143,13 @@ impl Settings {
 }
 
 /// The word for a map on the command line.
-fn map_word(kind: MapKind) -> &'static str {
+pub(crate) fn map_word(kind: MapKind) -> &'static str {
     match kind {
         MapKind::Grid => "grid",
         MapKind::Tree => "tree",
         MapKind::Tsdf => "tsdf",
         MapKind::Esdf => "esdf",
         MapKind::Contour => "contour",
+        MapKind::Mesh => "mesh",
     }
 }

@@ -4,6 +4,7 @@ mod atomic;
 mod lines;
 mod number;
 mod open;
+mod scalar;
 
 pub use atomic::write_atomic;
 pub use open::{Compression, Input, open};
@@ -11,3 +12,4 @@ pub use open::{Compression, Input, open};
 pub(crate) use lines::Lines;
 pub(crate) use number::{fields, parse_f64};
 pub(crate) use open::{open_file, read_failed};
+pub(crate) use scalar::{Endian, Scalar};

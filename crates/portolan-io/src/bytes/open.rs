@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 use crate::IoError;
 
+/// So many bytes come with the first [`BufRead::fill_buf`] of any input, where it has them: enough to tell its format.
+const HEAD: u64 = 64;
+
 /// How a file is packed, told by its first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compression {
@@ -51,9 +54,9 @@ impl Input {
     /// [`IoError::Os`] where the first bytes cannot be read.
     pub fn from_reader(reader: impl Read + 'static, name: &Path) -> Result<Self, IoError> {
         let mut reader = BufReader::with_capacity(1 << 16, reader);
-        let mut head = Vec::with_capacity(3);
+        let mut head = Vec::with_capacity(HEAD as usize);
         // A pipe may deliver byte by byte, so the magic is read, not peeked.
-        reader.by_ref().take(3).read_to_end(&mut head).map_err(|e| IoError::os(name, "read it", e))?;
+        reader.by_ref().take(HEAD).read_to_end(&mut head).map_err(|e| IoError::os(name, "read it", e))?;
         let compression = Compression::of(&head);
         let whole = io::Cursor::new(head).chain(reader);
         let reader: Box<dyn BufRead> = match compression {

@@ -33,6 +33,18 @@ impl HitMiss {
         self.miss[(i >> 6) & 7] |= 1 << (i & 63);
     }
 
+    /// The bits of a block of 512 cells: hits, then misses, 64 cells a word.
+    #[inline(always)]
+    pub fn from_words(hit: [u64; 8], miss: [u64; 8]) -> Self {
+        Self { hit, miss, words: 8 }
+    }
+
+    /// Hits and misses that no hit overrules, of cells `64 * w .. 64 * w + 64`.
+    #[inline(always)]
+    pub fn word(&self, w: usize) -> (u64, u64) {
+        (self.hit[w], self.miss[w] & !self.hit[w])
+    }
+
     /// Eight bits each of hits and of misses that no hit overrules, for cells `from .. from + 8`; `from` must
     /// be a multiple of eight.
     #[inline(always)]

@@ -106,7 +106,12 @@ pub struct LogOdds32(pub f32);
 
 /// What the two log-odds cells share; lets trees hold either.
 pub trait LogOddsValue:
-    Cell<Planes = Vec<Self>, Brick = LogOddsBrick<Self>, Evidence = HitMiss> + PartialOrd
+    Cell<
+        Planes = Vec<Self>,
+        Brick = LogOddsBrick<Self>,
+        Evidence = HitMiss,
+        Rule: Clone + std::fmt::Debug + Send,
+    > + PartialOrd
 {
     /// Marks a cell that was never observed. Not a value.
     const UNOBSERVED: Self;
@@ -114,8 +119,29 @@ pub trait LogOddsValue:
     /// Whether this is the mark of a cell that was never observed.
     fn is_unobserved(self) -> bool;
 
+    /// What makes probabilities of values quickly.
+    type Lookup: Clone + std::fmt::Debug + Send + Sync;
+
+    /// The filter's rule for a model.
+    ///
+    /// # Errors
+    /// Where the model is not valid.
+    fn rule(model: &OccupancyModel) -> Result<Self::Rule, OccupancyModelError>;
+
+    /// Makes ready for [`LogOddsValue::look_up`].
+    fn lookup(rule: &Self::Rule) -> Self::Lookup;
+
+    /// P(occupied) of a value: the same as [`LogOddsValue::probability`], in nanoseconds.
+    fn look_up(self, lookup: &Self::Lookup) -> f64;
+
+    /// Whether a value is above P(occupied) = 0.5.
+    fn is_occupied(self) -> bool;
+
     /// P(occupied) of a value.
     fn probability(self, rule: &Self::Rule) -> f64;
+
+    /// The value as a number, in units of the rule's quantum; meaningless for the mark of a never-observed cell.
+    fn units(self) -> f64;
 
     /// The same value, bit for bit, marks included.
     fn same(self, other: Self) -> bool;
@@ -125,6 +151,25 @@ const UNOBSERVED_BYTE: i8 = i8::MIN;
 
 impl LogOddsValue for LogOdds8 {
     const UNOBSERVED: Self = Self(UNOBSERVED_BYTE);
+    type Lookup = ProbabilityTable;
+
+    fn rule(model: &OccupancyModel) -> Result<LogOddsRule<i8>, OccupancyModelError> {
+        LogOddsRule::<i8>::new(model)
+    }
+
+    fn lookup(rule: &LogOddsRule<i8>) -> ProbabilityTable {
+        ProbabilityTable::new(rule)
+    }
+
+    #[inline(always)]
+    fn look_up(self, lookup: &ProbabilityTable) -> f64 {
+        lookup.of(self)
+    }
+
+    #[inline(always)]
+    fn is_occupied(self) -> bool {
+        self.0 > 0
+    }
 
     #[inline(always)]
     fn is_unobserved(self) -> bool {
@@ -137,6 +182,11 @@ impl LogOddsValue for LogOdds8 {
     }
 
     #[inline(always)]
+    fn units(self) -> f64 {
+        f64::from(self.0)
+    }
+
+    #[inline(always)]
     fn same(self, other: Self) -> bool {
         self.0 == other.0
     }
@@ -144,6 +194,23 @@ impl LogOddsValue for LogOdds8 {
 
 impl LogOddsValue for LogOdds32 {
     const UNOBSERVED: Self = Self(f32::NAN);
+    type Lookup = ();
+
+    fn rule(model: &OccupancyModel) -> Result<LogOddsRule<f32>, OccupancyModelError> {
+        LogOddsRule::<f32>::new(model)
+    }
+
+    fn lookup(_: &LogOddsRule<f32>) {}
+
+    #[inline(always)]
+    fn look_up(self, (): &()) -> f64 {
+        1.0 / (1.0 + (-f64::from(self.0)).exp())
+    }
+
+    #[inline(always)]
+    fn is_occupied(self) -> bool {
+        self.0 > 0.0
+    }
 
     #[inline(always)]
     fn is_unobserved(self) -> bool {
@@ -153,6 +220,11 @@ impl LogOddsValue for LogOdds32 {
     #[inline(always)]
     fn probability(self, _: &LogOddsRule<f32>) -> f64 {
         1.0 / (1.0 + (-f64::from(self.0)).exp())
+    }
+
+    #[inline(always)]
+    fn units(self) -> f64 {
+        f64::from(self.0)
     }
 
     #[inline(always)]

@@ -52,6 +52,13 @@ impl<const D: usize> RayWalk<D> {
         t
     }
 
+    /// Current cell, step along each axis, arc length at the next face and from face to face: for sweeps that step in
+    /// their own way, to the same cells.
+    #[inline(always)]
+    pub(crate) fn into_parts(self) -> ([i32; D], [i32; D], [f64; D], [f64; D]) {
+        (self.cell, self.step, self.t_next, self.t_delta)
+    }
+
     /// Steps into the next cell.
     #[inline(always)]
     pub fn advance(&mut self) {

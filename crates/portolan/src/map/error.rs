@@ -1,7 +1,7 @@
 //! Why a map cannot be made.
 
 use crate::cell::{OccupancyModelError, TsdfRuleError};
-use crate::geom::Grid;
+use crate::geom::{Grid, Lattice};
 use crate::store::BricksFull;
 
 /// What is wrong with a map's settings.
@@ -28,6 +28,24 @@ pub enum MapError {
     /// The weight of free space is not between 0 and 1.
     #[error("carve_weight must be above 0 and at most 1, got {0}")]
     CarveWeight(f32),
+    /// The ranges that are used are none, or reach further than a scan is searched.
+    #[error(
+        "ranges from {min} to {max} m are not possible: need 0 <= min < max, and max below {most} m at this resolution"
+    )]
+    Ranges {
+        /// Smallest range used (metres).
+        min: f64,
+        /// Largest range used (metres).
+        max: f64,
+        /// Limit at this resolution (metres).
+        most: f64,
+    },
+    /// A range image contradicts itself.
+    #[error("a range image cannot be used: {0}")]
+    Image(&'static str),
+    /// Distances and colours lie on different lattices.
+    #[error("the lattices of distances and colours differ")]
+    Lattices,
     /// Bricks would need more memory than they may have.
     #[error(transparent)]
     Full(#[from] BricksFull),
@@ -45,15 +63,20 @@ const DENSE_LIMIT: usize = 1 << 31;
 
 /// Checks that a dense map of this grid can be made.
 pub(super) fn check_grid<const D: usize>(grid: &Grid<D>) -> Result<(), MapError> {
-    let resolution = grid.lattice.resolution;
-    if !(resolution > 0.0 && resolution.is_finite()) {
-        return Err(MapError::Resolution(resolution));
-    }
-    if let Some(&bad) = grid.lattice.origin.iter().find(|v| !v.is_finite()) {
-        return Err(MapError::Origin(bad));
-    }
+    check_lattice(&grid.lattice)?;
     match grid.checked_len() {
         Some(1..=DENSE_LIMIT) => Ok(()),
         cells => Err(MapError::Cells { cells: cells.unwrap_or(usize::MAX), limit: DENSE_LIMIT }),
+    }
+}
+
+/// Checks that a lattice has cells.
+pub(super) fn check_lattice<const D: usize>(lattice: &Lattice<D>) -> Result<(), MapError> {
+    if !(lattice.resolution > 0.0 && lattice.resolution.is_finite()) {
+        return Err(MapError::Resolution(lattice.resolution));
+    }
+    match lattice.origin.iter().find(|v| !v.is_finite()) {
+        Some(&bad) => Err(MapError::Origin(bad)),
+        None => Ok(()),
     }
 }

@@ -5,6 +5,9 @@ mod error;
 mod integrate;
 mod occupancy_grid;
 mod repr;
+mod sparse_error;
+mod sparse_occupancy;
+mod sparse_tsdf;
 mod tree_map;
 mod tsdf;
 
@@ -12,6 +15,8 @@ pub use cloud::Cloud;
 pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
+pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
+pub use sparse_tsdf::{PointSweep, SparseTsdf, SparseTsdfConfig};
 pub use tree_map::{Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 

@@ -8,7 +8,7 @@ const BASELINE: f64 = 0.1;
 /// How many neighbours on either side are looked at for the baseline.
 const REACH: usize = 5;
 /// Neighbouring hits belong to one surface up to this tangent of the incidence angle (80 degrees).
-const MAX_SLOPE: f64 = 5.67;
+pub(crate) const MAX_SLOPE: f64 = 5.67;
 
 /// Cosine of the angle between each beam and the surface's normal, in `[0, 1]`: 1 head-on. The tangent is
 /// the chord between the nearest neighbours that are at least 10 cm apart and connected to the beam. Beams

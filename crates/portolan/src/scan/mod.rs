@@ -10,19 +10,25 @@
 //! | [`BeamKind::Dropped`] | nothing at all, or a reading that was refused | no | never |
 //! | [`BeamKind::SelfHit`] | the robot's own body | no | never |
 
+mod angles;
 mod beam;
+mod frame_filter;
 mod incidence;
 mod laser;
 mod point_scan;
 mod range_image;
 mod record;
+mod rings;
+mod spherical_layout;
 mod stats;
 
 pub use beam::{Beam, BeamKind};
+pub use frame_filter::{Body, FrameFilter};
 pub use incidence::cos_incidence;
-pub(crate) use incidence::{MAX_OPENING, connected};
+pub(crate) use incidence::{MAX_OPENING, MAX_SLOPE, connected};
 pub use laser::RangeLimits;
 pub use point_scan::{Frame, Origin, PointScan};
 pub use range_image::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
 pub use record::{BeamOrder, Scan};
+pub use spherical_layout::SphericalLayout;
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};

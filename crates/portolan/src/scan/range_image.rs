@@ -109,6 +109,19 @@ impl RangeImage {
         })
     }
 
+    /// Origin and end of every reading in the sensor's frame, row by row, and whether a surface is at the end.
+    pub fn readings(&self) -> impl Iterator<Item = ([f64; 3], [f64; 3], bool)> + '_ {
+        self.values.iter().enumerate().filter(|(_, v)| **v != 0.0).map(|(i, &v)| {
+            let (row, column) = (i / self.columns, i % self.columns);
+            let end = self.point(column, row, f64::from(v.abs()));
+            let origin = match &self.projection {
+                Projection::Orthographic { top, .. } => [end[0], end[1], *top],
+                _ => [0.0; 3],
+            };
+            (origin, end, v > 0.0)
+        })
+    }
+
     /// Number of surfaces.
     pub fn hits(&self) -> usize {
         self.values.iter().filter(|v| **v > 0.0).count()

@@ -64,6 +64,14 @@ impl RefusedBeams {
     }
 }
 
+impl std::ops::Add for RefusedBeams {
+    type Output = Self;
+    fn add(mut self, o: Self) -> Self {
+        self += o;
+        self
+    }
+}
+
 impl std::ops::AddAssign for RefusedBeams {
     fn add_assign(&mut self, o: Self) {
         self.not_finite += o.not_finite;

@@ -4,13 +4,20 @@ mod arena;
 mod bricks;
 mod dense;
 mod tree;
+mod tree_bricks;
 mod tree_build;
+mod tree_leaves;
+mod tree_levels;
 mod tree_records;
+mod tree_remake;
 
 pub use bricks::{Bricks, BricksFull};
 pub use dense::Dense;
 pub use tree::{Leaf, Tree};
-pub use tree_records::{TreeRecords, TreeRecordsError};
+pub use tree_bricks::TreeBricksError;
+pub use tree_leaves::LeavesIn;
+pub use tree_levels::Summary;
+pub use tree_records::{Slot, TreeRecords, TreeRecordsError};
 
 use crate::cell::Cell;
 use crate::geom::{BlockKey, Lattice};

@@ -7,7 +7,7 @@ use crate::cell::LogOddsValue;
 use crate::geom::{BlockKey, Grid, Lattice, block_cells};
 
 /// Height of a block: `2^3` cells along each edge.
-const BLOCK_HEIGHT: u32 = 3;
+pub(super) const BLOCK_HEIGHT: u32 = 3;
 
 /// A pruned tree of log odds over `2^depth` cells along each axis (Hornung et al. 2013; here inner records
 /// only: 9 bytes each in the plane, 13 in space, with one-byte values).
@@ -17,8 +17,8 @@ const BLOCK_HEIGHT: u32 = 3;
 /// was never observed costs nothing.
 #[derive(Clone, Debug)]
 pub struct Tree<V: LogOddsValue, const D: usize> {
-    lattice: Lattice<D>,
-    depth: u32,
+    pub(super) lattice: Lattice<D>,
+    pub(super) depth: u32,
     pub(super) arena: Arena<V, D>,
     /// Record of the root, [`NONE`] while the root is a leaf.
     pub(super) root: u32,
@@ -44,7 +44,12 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
     /// An empty tree whose root covers `2^depth` cells of `resolution` metres along each axis, from `origin`
     /// (world) upwards. `None` unless 3 <= depth <= 28.
     pub fn new(origin: [f64; D], resolution: f64, depth: u32) -> Option<Self> {
-        (BLOCK_HEIGHT..=28).contains(&depth).then(|| Self {
+        (BLOCK_HEIGHT..=28).contains(&depth).then(|| Self::empty(origin, resolution, depth))
+    }
+
+    /// [`Tree::new`] for a depth that was checked.
+    pub(super) fn empty(origin: [f64; D], resolution: f64, depth: u32) -> Self {
+        Self {
             lattice: Lattice::new(origin, resolution),
             depth,
             arena: Arena::new(),
@@ -52,7 +57,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
             root_value: V::UNOBSERVED,
             scratch: vec![V::UNOBSERVED; block_cells::<D>()],
             path: Vec::new(),
-        })
+        }
     }
 
     /// An empty tree on the lattice of a grid, deep enough to cover it.
@@ -117,8 +122,33 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         }
     }
 
-    fn inside(&self, cell: [i32; D]) -> bool {
+    pub(super) fn inside(&self, cell: [i32; D]) -> bool {
         cell.iter().all(|&c| c >= 0 && c >> self.depth == 0)
+    }
+
+    /// Overwrites a block with the cells of `block`, x fastest. The block must lie inside.
+    pub(super) fn set_block(&mut self, key: BlockKey<D>, block: &[V]) {
+        debug_assert!(self.inside(key.first_cell()), "the block is outside");
+        self.descend_to(key.first_cell());
+        let slot = self.block_slot();
+        if let Err(record) = slot {
+            self.arena.release_children(record);
+        }
+        self.fill_slot(slot, block);
+    }
+
+    /// Puts the cells of `block` into the slot at the end of the path, whose children were given back.
+    fn fill_slot(&mut self, slot: Result<V, u32>, block: &[V]) {
+        let contents = subtree(&mut self.arena, block, 0, BLOCK_HEIGHT);
+        if let (Err(record), Ok(_)) = (slot, &contents) {
+            match self.path.last() {
+                Some(&(parent, child)) => self.arena.unset_child(parent, child),
+                None => self.arena.release(record, 1),
+            }
+        } else if let (Err(record), Err(_), None) = (slot, &contents, self.path.last()) {
+            self.arena.release(record, 1);
+        }
+        self.replace_block(contents);
     }
 
     /// Turns the slot at the end of the path into `value` or a subtree, and merges equal siblings on the way up.
@@ -215,7 +245,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
 
 /// Which child of a node of height `height + 1` holds a cell.
 #[inline(always)]
-fn child_index<const D: usize>(cell: [i32; D], height: u32) -> usize {
+pub(super) fn child_index<const D: usize>(cell: [i32; D], height: u32) -> usize {
     let mut child = 0;
     for k in 0..D {
         child |= ((cell[k] >> height) as usize & 1) << k;
@@ -264,17 +294,8 @@ impl<V: LogOddsValue, const D: usize> Store<V, D> for Tree<V, D> {
             }
         }
         V::fuse_run(&mut scratch, 0, evidence, 0, block_cells::<D>(), rule);
-        let contents = subtree(&mut self.arena, &scratch, 0, BLOCK_HEIGHT);
-        if let (Err(record), Ok(_)) = (slot, &contents) {
-            match self.path.last() {
-                Some(&(parent, child)) => self.arena.unset_child(parent, child),
-                None => self.arena.release(record, 1),
-            }
-        } else if let (Err(record), Err(_), None) = (slot, &contents, self.path.last()) {
-            self.arena.release(record, 1);
-        }
+        self.fill_slot(slot, &scratch);
         self.scratch = scratch;
-        self.replace_block(contents);
     }
 
     fn memory_bytes(&self) -> usize {

@@ -18,6 +18,65 @@ pub struct TreeRecords<V> {
     pub masks: Vec<u8>,
 }
 
+/// What became of a node of a tree that is written down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Slot<V> {
+    /// One value for all of it; [`LogOddsValue::UNOBSERVED`] where nothing is known.
+    Leaf(V),
+    /// It has a record.
+    Inner,
+}
+
+/// Writing a tree down, depth first: [`TreeRecords::begin`] for each inner node, [`TreeRecords::set`] for its children,
+/// each after its own records, [`TreeRecords::end`].
+impl<V: LogOddsValue> TreeRecords<V> {
+    /// No record yet.
+    pub fn new() -> Self {
+        Self { root_value: V::UNOBSERVED, values: Vec::new(), masks: Vec::new() }
+    }
+
+    /// Opens the record of an inner node of a tree in `D` dimensions; its children are unobserved leaves until set.
+    pub fn begin<const D: usize>(&mut self) -> usize {
+        self.values.resize(self.values.len() + children::<D>(), V::UNOBSERVED);
+        self.masks.push(0);
+        self.masks.len() - 1
+    }
+
+    /// Sets a child of an open record.
+    pub fn set<const D: usize>(&mut self, record: usize, child: usize, slot: Slot<V>) {
+        match slot {
+            Slot::Leaf(value) => self.values[record * children::<D>() + child] = value,
+            Slot::Inner => self.masks[record] |= 1 << child,
+        }
+    }
+
+    /// Closes a record. Where its children are equal leaves it goes, and the node becomes a leaf.
+    pub fn end<const D: usize>(&mut self, record: usize) -> Slot<V> {
+        let values = &self.values[record * children::<D>()..][..children::<D>()];
+        let first = values[0];
+        if self.masks[record] != 0 || values.iter().any(|v| !v.same(first)) {
+            return Slot::Inner;
+        }
+        // No record below it is left, so that it is the last.
+        self.masks.truncate(record);
+        self.values.truncate(record * children::<D>());
+        Slot::Leaf(first)
+    }
+
+    /// Sets the root, after all records.
+    pub fn set_root(&mut self, slot: Slot<V>) {
+        if let Slot::Leaf(value) = slot {
+            self.root_value = value;
+        }
+    }
+}
+
+impl<V: LogOddsValue> Default for TreeRecords<V> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// Why a list of records is not a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -91,6 +150,19 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         }
         debug_assert_eq!(block_cells::<D>(), 1 << (3 * D));
         Ok(tree)
+    }
+
+    /// A tree from records that were just written down, depth first, no deeper than `depth`.
+    pub(super) fn of_sound_records(
+        origin: [f64; D],
+        resolution: f64,
+        depth: u32,
+        records: &TreeRecords<V>,
+    ) -> Self {
+        let tree = Self::from_records(origin, resolution, depth, records);
+        debug_assert!(tree.is_ok(), "{:?}", tree.err());
+        // Unreachable: an empty tree stands in so that no caller has an error that cannot happen.
+        tree.unwrap_or_else(|_| Self::empty(origin, resolution, depth))
     }
 
     /// Checks what must always hold; for tests. Panics where it does not.

@@ -5,18 +5,30 @@
 //! | [`Rays`] | hits and misses | every cell that a beam passes through, exactly |
 //! | [`March`] | distances | samples along every beam, as the textbook does it |
 //! | [`CellCentre`] | distances | the centre of every cell, against the range interpolated between beams |
+//! | [`Projective`] | distances | the centre of every cell of space, against a range image |
+//! | [`PointRays`] | distances | every cell that a ray to a point of space passes through; the nearest ray counts |
 
 mod cell_centre;
 mod fan;
 mod fan_plan;
+mod lens;
 mod march;
 mod nearest_ray;
+mod observe;
+pub(crate) mod occupancy;
+mod padded_image;
+mod point_rays;
+mod projective;
+mod range_pyramid;
 mod rays;
 mod touched;
 mod weight;
 
 pub use cell_centre::CellCentre;
 pub use march::March;
+pub use point_rays::PointRays;
+pub(crate) use projective::PlanError;
+pub use projective::{Projective, ProjectiveSettings};
 pub use rays::Rays;
 pub use weight::WeightModel;
 

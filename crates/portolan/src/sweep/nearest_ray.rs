@@ -7,18 +7,35 @@ use crate::geom::vector::{along, dot, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
 use crate::scan::Scan;
 
-/// Distances, and how far aside of each cell's centre the beam passed that they come from.
+/// A ray in the world: a beam where it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ray<const D: usize> {
+    pub origin: [f64; D],
+    /// Unit vector.
+    pub direction: [f64; D],
+    /// Metres: to the surface, or up to where there is none.
+    pub range: f64,
+    pub hit: bool,
+    pub weight: f32,
+}
+
+/// Distances, and how far aside of each cell's centre the beam passed that they come from, and which it was.
 #[derive(Clone, Debug)]
 pub(super) struct NearestBeam {
-    distances: Distances,
+    pub distances: Distances,
     aside_sq: Box<[f32]>,
+    pub ray: Box<[u32]>,
 }
 
 impl Evidence for NearestBeam {
     type One = DistanceObservation;
 
     fn silent(cells: usize) -> Self {
-        Self { distances: Distances::silent(cells), aside_sq: vec![0.0; cells].into() }
+        Self {
+            distances: Distances::silent(cells),
+            aside_sq: vec![0.0; cells].into(),
+            ray: vec![0; cells].into(),
+        }
     }
 
     fn clear(&mut self) {
@@ -52,18 +69,34 @@ impl<const D: usize> NearestRay<D> {
         world_from_sensor: &Pose<D>,
         (lattice, bounds): (&Lattice<D>, &Aabb<D>),
         weights: &[f32],
-        (tau, carve_weight): (f64, f32),
+        how: (f64, f32),
     ) {
+        let rays = scan.beams().zip(weights).map(|(beam, &weight)| Ray {
+            origin: world_from_sensor.translation,
+            direction: world_from_sensor.rotate(beam.direction),
+            range: beam.free_range(),
+            hit: beam.is_hit(),
+            weight,
+        });
+        self.plan_rays(rays, (lattice, bounds), how, usize::MAX);
+    }
+
+    /// Stops where more than `most` blocks are touched, and says so with `false`.
+    pub(super) fn plan_rays(
+        &mut self,
+        rays: impl Iterator<Item = Ray<D>>,
+        (lattice, bounds): (&Lattice<D>, &Aabb<D>),
+        (tau, carve_weight): (f64, f32),
+        most: usize,
+    ) -> bool {
         self.touched.clear();
         let carve = carve_weight > 0.0;
-        let origin = world_from_sensor.translation;
-        for (beam, &weight) in scan.beams().zip(weights) {
-            let z = beam.free_range();
-            if z <= 0.0 || (!beam.is_hit() && !carve) {
+        for (number, ray) in rays.enumerate() {
+            let (origin, direction, z) = (ray.origin, ray.direction, ray.range);
+            if z <= 0.0 || (!ray.hit && !carve) {
                 continue;
             }
-            let direction = world_from_sensor.rotate(beam.direction);
-            let length = if beam.is_hit() { z + tau } else { z };
+            let length = if ray.hit { z + tau } else { z };
             let Some((near, far)) = clip(bounds, origin, direction, length) else { continue };
             let near = if carve { near } else { near.max(z - tau) };
             let Some(mut walk) = RayWalk::new(lattice, along(origin, direction, near), direction) else {
@@ -73,15 +106,15 @@ impl<const D: usize> NearestRay<D> {
                 let cell = walk.cell();
                 let offset = sub(lattice.center(cell), origin);
                 let s = dot(offset, direction);
-                let d = if beam.is_hit() {
+                let d = if ray.hit {
                     z - s
                 } else if s <= z - tau {
                     tau
                 } else {
                     f64::NEG_INFINITY
                 };
-                let free = if d > tau || !beam.is_hit() { carve_weight } else { 1.0 };
-                let w = weight * free * (1.0 + d / tau).clamp(0.0, 1.0) as f32;
+                let free = if d > tau || !ray.hit { carve_weight } else { 1.0 };
+                let w = ray.weight * free * (1.0 + d / tau).clamp(0.0, 1.0) as f32;
                 if w > 0.0 && (carve || d <= tau) {
                     let aside_sq = (dot(offset, offset) - s * s) as f32;
                     let i = BlockKey::offset(cell);
@@ -91,6 +124,7 @@ impl<const D: usize> NearestRay<D> {
                             .distances
                             .set(i, DistanceObservation { distance: d.min(tau) as f32, weight: w });
                         evidence.aside_sq[i] = aside_sq;
+                        evidence.ray[i] = number as u32;
                     }
                 }
                 if near + walk.exit() >= far {
@@ -98,8 +132,12 @@ impl<const D: usize> NearestRay<D> {
                 }
                 walk.advance();
             }
+            if self.touched.keys().len() > most {
+                return false;
+            }
         }
         self.touched.sort();
+        true
     }
 
     pub(super) fn blocks(&self) -> &[BlockKey<D>] {
@@ -108,5 +146,10 @@ impl<const D: usize> NearestRay<D> {
 
     pub(super) fn evidence(&self, i: usize) -> &Distances {
         &self.touched.evidence(i).distances
+    }
+
+    /// Evidence with the number of the ray that each cell's comes from.
+    pub(super) fn nearest(&self, i: usize) -> &NearestBeam {
+        self.touched.evidence(i)
     }
 }

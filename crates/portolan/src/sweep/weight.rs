@@ -29,6 +29,16 @@ impl WeightModel {
         }
     }
 
+    /// Whether the weight falls with the square of the range, and whether it is that of the incidence.
+    pub(super) fn parts(self) -> (bool, bool) {
+        match self {
+            Self::Constant => (false, false),
+            Self::InverseSquare => (true, false),
+            Self::CosIncidence => (false, true),
+            Self::InverseSquareCosIncidence => (true, true),
+        }
+    }
+
     /// One weight per beam of the scan, into `weights`; `cosines` is scratch. Incidence comes from neighbouring
     /// beams and is 1 where there are none.
     pub(super) fn weigh<const D: usize>(
@@ -37,12 +47,7 @@ impl WeightModel {
         cosines: &mut Vec<f32>,
         weights: &mut Vec<f32>,
     ) {
-        let (square, cosine) = match self {
-            Self::Constant => (false, false),
-            Self::InverseSquare => (true, false),
-            Self::CosIncidence => (false, true),
-            Self::InverseSquareCosIncidence => (true, true),
-        };
+        let (square, cosine) = self.parts();
         weights.clear();
         weights.extend(
             scan.beams().map(|b| if square { (b.range.max(1.0).powi(2).recip()) as f32 } else { 1.0 }),

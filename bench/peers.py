@@ -1,0 +1,182 @@
+#!/usr/bin/env python3
+"""One workload by one peer: prints one JSON line. `compare.py` calls it; by hand: peers.py WORKLOAD PEER --data DIR.
+
+Only the peer's own library calls are inside the clock. What it reads is what portolan reads: KITTI folders, 7-Scenes
+folders, npy volumes.
+"""
+import argparse
+import json
+import os
+import resource
+import sys
+import time
+from pathlib import Path
+
+PEERS = {
+    "occupancy": ["octomap", "octomap-discretized"],
+    "lidar-tsdf": ["vdbfusion"],
+    "depth-tsdf": ["open3d"],
+    "surface": ["flying-edges", "flying-edges-normals", "scikit-image", "pymcubes"],
+    "query": ["octomap"],
+}
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("workload", choices=PEERS)
+    parser.add_argument("peer")
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--resolution", type=float, default=0.1)
+    parser.add_argument("--scans", type=int, default=20)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--carve", action="store_true")
+    return parser.parse_args()
+
+
+def kitti(folder, scans):
+    import numpy as np
+
+    rows = np.loadtxt(folder / "poses.txt")[:scans]
+    for i, row in enumerate(rows):
+        pose = row.reshape(3, 4)
+        points = np.fromfile(folder / "velodyne" / f"{i:06d}.bin", "<f4").reshape(-1, 4)[:, :3].astype(np.float64)
+        yield np.ascontiguousarray(points @ pose[:, :3].T + pose[:, 3]), np.ascontiguousarray(pose[:, 3])
+
+
+def seven_scenes(folder, scans):
+    import cv2
+    import numpy as np
+
+    for depth in sorted(folder.glob("*.depth.png"))[:scans]:
+        pose = np.loadtxt(str(depth).replace(".depth.png", ".pose.txt"))
+        yield cv2.imread(str(depth), cv2.IMREAD_UNCHANGED), pose
+
+
+def octomap_tree(args, scans, discretize):
+    import octomap
+
+    tree = octomap.OcTree(args.resolution)
+    for points, origin in scans:
+        tree.insertPointCloud(points, origin, -1.0, False, discretize)
+    return tree
+
+
+def occupancy(args):
+    scans = list(kitti(args.data / "lidar_building", args.scans))
+    run = lambda: octomap_tree(args, scans, args.peer == "octomap-discretized")
+    return len(scans), run, lambda tree: {"nodes": tree.size(), "bytes": tree.memoryUsage()}
+
+
+def lidar_tsdf(args):
+    import numpy as np
+    import vdbfusion
+
+    scans = list(kitti(args.data / "lidar_building", args.scans))
+    poses = []
+    for _, origin in scans:
+        pose = np.eye(4)
+        pose[:3, 3] = origin
+        poses.append(pose)
+
+    def run():
+        volume = vdbfusion.VDBVolume(args.resolution, 3 * args.resolution, args.carve)
+        for (points, _), pose in zip(scans, poses):
+            volume.integrate(points, pose)
+        return volume
+
+    return len(scans), run, lambda volume: {}
+
+
+def depth_tsdf(args):
+    import numpy as np
+    import open3d as o3d
+
+    core, folder = o3d.core, args.data / "rgbd_building"
+    intrinsics = core.Tensor(np.loadtxt(folder / "camera-intrinsics.txt"))
+    frames = [
+        (o3d.t.geometry.Image(core.Tensor(depth)), core.Tensor(np.linalg.inv(pose)))
+        for depth, pose in seven_scenes(folder, args.scans)
+    ]
+
+    def run():
+        grid = o3d.t.geometry.VoxelBlockGrid(
+            ("tsdf", "weight"), (core.float32, core.float32), ((1), (1)), args.resolution, 8, 200_000
+        )
+        for image, camera_from_world in frames:
+            blocks = grid.compute_unique_block_coordinates(image, intrinsics, camera_from_world, 1000.0, 8.0, 4.0)
+            grid.integrate(blocks, image, intrinsics, camera_from_world, 1000.0, 8.0, 4.0)
+        return grid
+
+    return len(frames), run, lambda grid: {"blocks": int(grid.hashmap().size())}
+
+
+def surface(args):
+    import numpy as np
+
+    volume = np.load(args.data / "grids" / "w4_gyroid_256_f32.npy")
+    if args.peer == "scikit-image":
+        from skimage import measure
+
+        run, count = lambda: measure.marching_cubes(volume, 0.0)[:2], lambda r: len(r[1])
+    elif args.peer == "pymcubes":
+        import mcubes
+
+        run, count = lambda: mcubes.marching_cubes(volume, 0.0), lambda r: len(r[1])
+    else:
+        import vtk
+        from vtk.util import numpy_support
+
+        if args.threads > 1:
+            vtk.vtkSMPTools.SetBackend("STDThread")
+            vtk.vtkSMPTools.Initialize(args.threads)
+        image = vtk.vtkImageData()
+        image.SetDimensions(*volume.shape[::-1])
+        image.GetPointData().SetScalars(numpy_support.numpy_to_vtk(volume.ravel(), deep=0))
+
+        def run():
+            edges = vtk.vtkFlyingEdges3D()
+            edges.SetInputData(image)
+            edges.SetValue(0, 0.0)
+            edges.ComputeGradientsOff()
+            if args.peer == "flying-edges":
+                edges.ComputeNormalsOff()
+            edges.Update()
+            return edges.GetOutput()
+
+        count = lambda r: r.GetNumberOfPolys()
+    return 1, run, lambda result: {"triangles": count(result)}
+
+
+def query(args):
+    import numpy as np
+
+    tree = octomap_tree(args, kitti(args.data / "lidar_building", args.scans), True)
+    points = np.fromfile(args.data / "grids" / "w5_queries_1e6x3.f32", "<f4").reshape(-1, 3).astype(np.float64)
+    run = lambda: tree.getLabels(points)
+    return len(points), run, lambda labels: {"known": int((np.asarray(labels) >= 0).sum())}
+
+
+def main():
+    args = arguments()
+    if args.threads == 1:
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR"):
+            os.environ[f"{name}_NUM_THREADS"] = "1"
+    try:
+        per, run, describe = globals()[args.workload.replace("-", "_")](args)
+    except ImportError as missing:
+        print(json.dumps({"missing": str(missing)}))
+        return
+    seconds, result = [], None
+    for _ in range(args.repeats):
+        result = None  # the last run's memory is not this one's
+        start = time.perf_counter()
+        result = run()
+        seconds.append(time.perf_counter() - start)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    print(json.dumps({"seconds": seconds, "per": per, "peak": peak, **describe(result)}))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

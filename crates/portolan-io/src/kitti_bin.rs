@@ -1,0 +1,92 @@
+//! Velodyne scans of the KITTI data sets: `x y z reflectance` per point, four little-endian `f32`, nothing else.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use crate::bytes::{Endian, Input, Scalar, open};
+use crate::points::{CloudBuilder, PointCloudFile};
+use crate::{IoError, write_atomic};
+
+/// Bytes of a point.
+const STRIDE: usize = 16;
+/// The most bytes of a file.
+const MOST_BYTES: u64 = 1 << 32;
+
+/// Reads a scan (metres, the lidar's frame: x forward, y left, z up).
+///
+/// # Errors
+/// [`IoError::Binary`] where the length is not a multiple of 16 bytes.
+pub fn read_kitti_bin(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+    parse(open(path)?)
+}
+
+pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
+    let bytes = input.read_all(MOST_BYTES)?;
+    let points = bytes.chunks_exact(STRIDE);
+    if !points.remainder().is_empty() {
+        let at = (bytes.len() - points.remainder().len()) as u64;
+        let value = format!("{} bytes", points.remainder().len());
+        let advice =
+            "a scan has 16 bytes per point (x y z reflectance as f32): the file is cut off or no scan";
+        return Err(IoError::binary(input.path(), at, "the last point", value, advice));
+    }
+    let mut builder = CloudBuilder::new(false);
+    for (i, point) in points.enumerate() {
+        let value = |k: usize| Scalar::F32.read(&point[4 * k..], Endian::Little);
+        if builder.push(i, [value(0), value(1), value(2)]) {
+            builder.cloud.intensity.push(value(3) as f32);
+        }
+    }
+    Ok(builder.finish())
+}
+
+/// Writes a scan; points without an intensity get 0. The offset is added, in `f32`.
+///
+/// # Errors
+/// As [`write_atomic`].
+pub fn write_kitti_bin(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), IoError> {
+    write_atomic(path, |w| write_to(w, cloud))
+}
+
+fn write_to(w: &mut impl Write, cloud: &PointCloudFile) -> io::Result<()> {
+    for i in 0..cloud.points.len() {
+        let [x, y, z] = cloud.position(i).map(|v| v as f32);
+        for v in [x, y, z, cloud.intensity.get(i).copied().unwrap_or(0.0)] {
+            w.write_all(&v.to_le_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::bad_bytes;
+
+    fn read(bytes: Vec<u8>) -> Result<PointCloudFile, IoError> {
+        parse(Input::from_reader(io::Cursor::new(bytes), "0.bin".as_ref())?)
+    }
+
+    #[test]
+    fn the_layout_is_four_floats() {
+        let mut bytes = Vec::new();
+        for v in [1.0f32, -2.0, 0.5, 0.25, f32::NAN, 0.0, 0.0, 0.0] {
+            bytes.extend(v.to_le_bytes());
+        }
+        let cloud = read(bytes.clone()).unwrap();
+        assert_eq!((cloud.points.clone(), cloud.intensity.clone()), (vec![[1.0, -2.0, 0.5]], vec![0.25]));
+        assert_eq!(cloud.refused.not_finite, 1);
+        let mut written = Vec::new();
+        write_to(&mut written, &cloud).unwrap();
+        assert_eq!(written, bytes[..16]);
+        let error = read(bytes[..20].to_vec()).unwrap_err().to_string();
+        assert!(error.contains("0.bin: byte 16: the last point is 4 bytes; a scan has 16"), "{error}");
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic() {
+        for bytes in bad_bytes(&[7; 64], 3, 500) {
+            let _ = read(bytes);
+        }
+    }
+}

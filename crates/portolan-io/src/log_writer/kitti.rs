@@ -1,0 +1,55 @@
+//! KITTI odometry: points of a Velodyne, poses of the left camera.
+
+use std::io::Write;
+
+use portolan::geom::Pose;
+use portolan::scan::{Frame, Origin};
+
+use super::{LogWriter, matrix_rows};
+use crate::{IoError, write_atomic};
+
+/// `calib.txt` has the projections of four cameras, which there are not, and `Tr`, which readers need.
+pub(super) fn texts(camera_from_lidar: &Pose<3>) -> Vec<(&'static str, String)> {
+    let row = matrix_rows(camera_from_lidar).map(|r| r.join(" ")).join(" ");
+    let projection = "1 0 0 0 0 1 0 0 0 0 1 0";
+    let cameras: String = (0..4).map(|k| format!("P{k}: {projection}\n")).collect();
+    let calib = format!("{cameras}Tr: {row}\n");
+    vec![("calib.txt", calib), ("poses.txt", String::new()), ("times.txt", String::new())]
+}
+
+impl LogWriter {
+    pub(super) fn push_kitti(
+        &mut self,
+        world_from_camera: &Pose<3>,
+        seconds: f64,
+        frame: &Frame,
+    ) -> Result<(), IoError> {
+        let path = self.folder.join("velodyne").join(format!("{:06}.bin", self.count));
+        let points: Vec<[f32; 3]> = match frame {
+            Frame::Image(image) => image.points().map(|(_, p)| p.map(|v| v as f32)).collect(),
+            Frame::Points(scan) if scan.origin == Origin::Common([0.0; 3]) => scan.points.clone(),
+            Frame::Points(_) => {
+                let advice = "KITTI's rays begin in the zero of the points; move the points and the pose";
+                return Err(IoError::unwritable(
+                    &path,
+                    "the origin of rays",
+                    "not the zero of the points",
+                    advice,
+                ));
+            }
+        };
+        write_atomic(&path, |out| {
+            for [x, y, z] in points {
+                // Intensity is not simulated.
+                for v in [x, y, z, 0.0] {
+                    out.write_all(&v.to_le_bytes())?;
+                }
+            }
+            Ok(())
+        })?;
+        let pose = matrix_rows(world_from_camera).map(|r| r.join(" ")).join(" ");
+        self.text("poses.txt").push_str(&(pose + "\n"));
+        self.text("times.txt").push_str(&format!("{seconds:.6e}\n"));
+        Ok(())
+    }
+}

@@ -1,0 +1,115 @@
+//! A `.bt` or `.ot` in memory.
+
+use std::path::Path;
+
+use portolan::cell::LogOdds32;
+use portolan::store::Tree;
+
+use super::header::{Header, Kind};
+use super::stored::Stored;
+use super::{read, write};
+use crate::{Compression, IoError};
+
+/// An OctoMap file: the tree of log odds and what else the file says.
+///
+/// The tree is the smallest that has the file's cells: where eight equal leaves stand side by side in the file, they
+/// are one here. Which they were, and values of inner nodes that are not the largest of their children's (trees
+/// written after `lazy_eval` have them), is kept beside the tree: written again in the format that it was read from, the
+/// file has the same bytes. (Except a `ColorOcTree` in an `.ot`: its colours are passed over.)
+#[derive(Clone, Debug)]
+pub struct OctomapTree {
+    pub(super) tree: Tree<LogOdds32, 3>,
+    pub(super) header: Header,
+    pub(super) stored: Stored,
+    pub(super) free: u64,
+    pub(super) occupied: u64,
+    pub(super) colors_left_out: bool,
+}
+
+impl OctomapTree {
+    /// Reads a `.bt` or `.ot`; the first line tells which. Packed with gzip or bzip2 it is read, too.
+    ///
+    /// A `.bt` may have any class name. In an `.ot` the name tells the layout of a node: `OcTree`, `OcTreeStamped` (whose
+    /// stamps are not in the file) and `ColorOcTree` (whose colours are passed over) are read.
+    ///
+    /// # Errors
+    /// [`IoError`] where a field is wrong, a log odds is not finite, the nodes are not as many as the header says, or
+    /// bytes are missing or left over.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let input = crate::open(&path)?;
+        let packed = input.compression();
+        read::read(input, packed, path.as_ref())
+    }
+
+    /// Reads a file that is in memory, under the name that errors shall give.
+    ///
+    /// # Errors
+    /// As [`OctomapTree::read`].
+    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self, IoError> {
+        read::read(bytes, Compression::Plain, name)
+    }
+
+    /// The cells: log odds as they are in an `.ot`; in a `.bt` [`super::OCTOMAP_FREE`] and [`super::OCTOMAP_OCCUPIED`].
+    /// Its cell 0 is the world's cell -32,768; the depth is 16.
+    pub fn tree(&self) -> &Tree<LogOdds32, 3> {
+        &self.tree
+    }
+
+    /// The cells alone.
+    pub fn into_tree(self) -> Tree<LogOdds32, 3> {
+        self.tree
+    }
+
+    /// Whether it was a `.bt`: free and occupied only.
+    pub fn is_binary(&self) -> bool {
+        self.header.kind == Kind::Bt
+    }
+
+    /// Name of the tree's class.
+    pub fn class(&self) -> &str {
+        &self.header.class
+    }
+
+    /// Metres per cell.
+    pub fn resolution(&self) -> f64 {
+        self.header.resolution
+    }
+
+    /// Leaves of the file that are free (log odds below 0, as OctoMap has it) and occupied.
+    pub fn leaves(&self) -> (u64, u64) {
+        (self.free, self.occupied)
+    }
+
+    /// Inner nodes of the file.
+    pub fn inner_nodes(&self) -> u64 {
+        self.header.size - self.free - self.occupied
+    }
+
+    /// Inner nodes of the file whose leaves are all equal, so that OctoMap's `prune` would make them leaves.
+    pub fn prunable_nodes(&self) -> u64 {
+        self.stored.open_nodes()
+    }
+
+    /// Whether the file had colours, which are not kept.
+    pub fn colors_left_out(&self) -> bool {
+        self.colors_left_out
+    }
+
+    /// Writes a `.bt`. Read from a `.bt` it has the same bytes; else every leaf becomes free or occupied and equal leaves
+    /// are merged, as OctoMap's `writeBinary` does it. Comments and class name stay.
+    ///
+    /// # Errors
+    /// As [`crate::write_atomic`].
+    pub fn write_bt(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+        write::file_bt(self, path.as_ref())
+    }
+
+    /// Writes an `.ot`. Nodes are those of the file that was read, and read from an `.ot` without colours it has the same
+    /// bytes. Comments stay; the class is `OcTree`, or `OcTreeStamped` where it was.
+    ///
+    /// # Errors
+    /// As [`crate::write_atomic`].
+    pub fn write_ot(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+        write::file_ot(self, path.as_ref())
+    }
+}

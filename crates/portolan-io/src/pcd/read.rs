@@ -1,0 +1,195 @@
+//! From bytes to a cloud.
+
+use std::path::Path;
+
+use super::columns::{Column, rgb};
+use super::header::{self, Data, Field, Header};
+use super::lzf;
+use crate::IoError;
+use crate::bytes::{Input, Scalar, fields, open, parse_f64};
+use crate::error::shown;
+use crate::points::{CloudBuilder, PointCloudFile, channel, is_time, time_unit};
+
+/// The most bytes of a file.
+const MOST_BYTES: u64 = 4 << 30;
+
+/// Reads a PCD file, plain or packed by gzip or bzip2. Points are in the file's frame: the viewpoint is reported, not applied.
+/// Points that are NaN are no reading in an organised cloud, and refused in others.
+///
+/// # Errors
+/// [`IoError::Text`] for a wrong header or a wrong line, [`IoError::Binary`] for a body that is too short or damaged.
+pub fn read_pcd(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+    parse(open(path)?)
+}
+
+pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
+    let bytes = input.read_all(MOST_BYTES)?;
+    parse_bytes(&bytes, input.path())
+}
+
+fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, IoError> {
+    let header = header::parse(bytes, path)?;
+    let body = &bytes[header.body..];
+    match header.data {
+        Data::Ascii => {
+            // Text is turned into the columns that the header describes, so that all three layouts are read by one piece
+            // of code.
+            let packed = text_to_binary(body, &header, path)?;
+            cloud(&packed, &header, path)
+        }
+        Data::Binary => {
+            let size = size_of(&header, path)?;
+            if body.len() < size {
+                let advice = format!("the header announces {size}: the file is cut off");
+                let value = format!("{} bytes", body.len());
+                return Err(IoError::binary(path, header.body as u64, "the data", value, advice));
+            }
+            cloud(&body[..size], &header, path)
+        }
+        Data::Compressed => cloud(&unpack(body, &header, path)?, &header, path),
+    }
+}
+
+/// Bytes of all points.
+fn size_of(header: &Header, path: &Path) -> Result<usize, IoError> {
+    header.points().checked_mul(header.stride).ok_or_else(|| {
+        let value = format!("{} points of {} bytes", header.points(), header.stride);
+        IoError::binary(path, header.body as u64, "the size of the data", value, "split the file")
+    })
+}
+
+fn unpack(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, IoError> {
+    let at = header.body as u64;
+    let size = size_of(header, path)?;
+    let word = |k: usize| {
+        body.get(4 * k..4 * k + 4).map(|b| Scalar::U32.read(b, crate::bytes::Endian::Little) as usize)
+    };
+    let (Some(packed_size), Some(unpacked_size)) = (word(0), word(1)) else {
+        let value = format!("{} bytes", body.len());
+        return Err(IoError::binary(path, at, "the packed data", value, "the file is cut off"));
+    };
+    if unpacked_size != size {
+        let advice = format!("{} points of {} bytes need {size}", header.points(), header.stride);
+        return Err(IoError::binary(path, at + 4, "the unpacked size", unpacked_size.to_string(), advice));
+    }
+    let Some(packed) = body[8..].get(..packed_size) else {
+        let value = format!("{} bytes", body.len() - 8);
+        let advice = format!("{packed_size} are announced: the file is cut off");
+        return Err(IoError::binary(path, at, "the packed data", value, advice));
+    };
+    lzf::unpack(packed, size).map_err(|k| {
+        let advice = "copy or download the file again";
+        IoError::binary(path, at + 8 + k as u64, "the packed data", "damaged", advice)
+    })
+}
+
+/// The text body as the binary body would be.
+fn text_to_binary(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, IoError> {
+    let kinds: Vec<(Scalar, bool)> = (header.fields.iter())
+        .flat_map(|f| std::iter::repeat_n((f.scalar, f.name == "rgb" || f.name == "rgba"), f.count))
+        .collect();
+    let mut out = Vec::new();
+    let mut points = 0;
+    for (line, number) in body.split(|b| *b == b'\n').zip(header.body_line..) {
+        let mut words = fields(line).peekable();
+        if words.peek().is_none() {
+            continue;
+        }
+        if points == header.points() {
+            let advice = format!("the header announces {points} points");
+            return Err(IoError::text(path, number, "a line behind the last point", shown(line), advice));
+        }
+        for (k, &(scalar, color)) in kinds.iter().enumerate() {
+            let word = words.next().unwrap_or_default();
+            let Some(value) = parse_f64(word) else {
+                let field = format!("column {}", k + 1);
+                let advice = format!("write {} numbers per line", header.words);
+                return Err(IoError::text(path, number, field, shown(word), advice));
+            };
+            put(&mut out, value, scalar, color);
+        }
+        if words.next().is_some() {
+            let advice = format!("write {} numbers per line", header.words);
+            return Err(IoError::text(path, number, "the number of columns", "too large", advice));
+        }
+        points += 1;
+    }
+    if points < header.points() {
+        let advice = format!("the header announces {}: the file is cut off", header.points());
+        return Err(IoError::text(
+            path,
+            header.body_line,
+            "the number of points",
+            points.to_string(),
+            advice,
+        ));
+    }
+    Ok(out)
+}
+
+fn put(out: &mut Vec<u8>, value: f64, scalar: Scalar, color: bool) {
+    match scalar {
+        Scalar::I8 => out.extend((value as i8).to_le_bytes()),
+        Scalar::U8 => out.extend((value as u8).to_le_bytes()),
+        Scalar::I16 => out.extend((value as i16).to_le_bytes()),
+        Scalar::U16 => out.extend((value as u16).to_le_bytes()),
+        Scalar::I32 => out.extend((value as i32).to_le_bytes()),
+        Scalar::U32 => out.extend((value as u32).to_le_bytes()),
+        Scalar::I64 => out.extend((value as i64).to_le_bytes()),
+        Scalar::U64 => out.extend((value as u64).to_le_bytes()),
+        // A colour called a float is often written as the whole number that it is.
+        Scalar::F32 if color && (1.0..=f64::from(u32::MAX)).contains(&value) => {
+            out.extend((value as u32).to_le_bytes())
+        }
+        Scalar::F32 => out.extend((value as f32).to_le_bytes()),
+        Scalar::F64 => out.extend(value.to_le_bytes()),
+    }
+}
+
+/// The columns that a cloud is made of.
+fn cloud(body: &[u8], header: &Header, path: &Path) -> Result<PointCloudFile, IoError> {
+    let column = |field: &Field| Column::of(field, header, body);
+    let named = |names: &[&str]| header.field(names).and_then(column);
+    let three = |a, b, c| Some([named(&[a])?, named(&[b])?, named(&[c])?]);
+    let Some(position) = three("x", "y", "z") else {
+        let names: Vec<_> = header.fields.iter().map(|f| f.name.as_str()).collect();
+        let advice = "give a cloud with fields x, y and z";
+        return Err(IoError::text(path, 1, "FIELDS", shown(names.join(" ").as_bytes()), advice));
+    };
+    let intensity = named(&["intensity", "i", "reflectivity", "reflectance"]);
+    let packed = named(&["rgb", "rgba"]);
+    let channels = three("r", "g", "b").or_else(|| three("red", "green", "blue"));
+    let normal = three("normal_x", "normal_y", "normal_z");
+    let ring = named(&["ring", "channel"]);
+    let time = header.fields.iter().find(|f| is_time(&f.name)).and_then(column);
+
+    let fine = position[0].scalar == Scalar::F64;
+    let mut builder = CloudBuilder::new(fine);
+    builder.cloud.viewpoint = header.viewpoint;
+    if header.height > 1 {
+        builder.organise(header.width, header.height);
+    }
+    for i in 0..header.points() {
+        if !builder.push(i, position.map(|c| c.get(i))) {
+            continue;
+        }
+        if let Some(column) = intensity {
+            builder.cloud.intensity.push(column.get(i) as f32);
+        }
+        if let Some(column) = packed {
+            builder.cloud.colors.push(rgb(column.bits(i)));
+        } else if let Some(columns) = channels {
+            builder.cloud.colors.push(columns.map(|c| channel(c.get(i), c.scalar)));
+        }
+        if let Some(columns) = normal {
+            builder.cloud.normals.push(columns.map(|c| c.get(i) as f32));
+        }
+        if let Some(column) = ring {
+            builder.cloud.rings.push(column.get(i) as u16);
+        }
+        if let Some(column) = time {
+            builder.times.push(column.get(i) * time_unit(column.scalar));
+        }
+    }
+    Ok(builder.finish())
+}

@@ -1,0 +1,193 @@
+//! Vertices as a cloud of points, range scans with their rows and columns.
+
+use std::path::Path;
+
+use super::MOST_BYTES;
+use super::body::Body;
+use super::header::{self, Element, Header};
+use crate::IoError;
+use crate::bytes::{Input, Scalar, open};
+use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, channel, is_time, time_unit};
+
+/// The most pixels of a range grid.
+const MOST_PIXELS: u64 = 1 << 30;
+
+/// Reads the vertices of a PLY file, with intensity, time, normals and colours where it has them, and with the rows and
+/// columns of its `range_grid` (whose size `obj_info num_cols` and `num_rows` tell). In a range scan the points are in the
+/// order of pixels.
+///
+/// # Errors
+/// [`IoError::Text`] for a wrong header or text, [`IoError::Binary`] for wrong binary data, both for a grid that names
+/// vertices that are not there or names one twice.
+pub fn read_ply_cloud(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+    parse(open(path)?)
+}
+
+pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
+    let bytes = input.read_all(MOST_BYTES)?;
+    parse_bytes(&bytes, input.path())
+}
+
+pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, IoError> {
+    let header = header::parse(bytes, path)?;
+    let mut body = Body::of(&header, bytes, path);
+    let mut cloud = None;
+    let mut vertices = Vertices::default();
+    for element in &header.elements {
+        match (element.name.as_str(), cloud.as_mut()) {
+            ("vertex" | "point", None) => {
+                let with_grid = header.elements.iter().any(|e| e.name == "range_grid");
+                cloud = Some(read_vertices(&mut body, element, with_grid, &mut vertices, path)?);
+            }
+            ("range_grid", Some(cloud)) => read_grid(&mut body, &header, element, &vertices, cloud)?,
+            _ => {
+                for _ in 0..element.count {
+                    body.row(element, None)?;
+                }
+            }
+        }
+    }
+    cloud.ok_or_else(|| {
+        let names: Vec<_> = header.elements.iter().map(|e| e.name.as_str()).collect();
+        let value = crate::error::shown(names.join(" ").as_bytes());
+        IoError::text(path, header.body_line - 1, "the elements", value, "give a file with vertices")
+    })
+}
+
+/// The point of each vertex of the file, `None` where it was refused.
+#[derive(Default)]
+struct Vertices(Vec<Option<u32>>);
+
+/// Where a vertex has what.
+struct Fields {
+    position: [(usize, Scalar); 3],
+    intensity: Option<(usize, Scalar)>,
+    normal: Option<[(usize, Scalar); 3]>,
+    color: Option<[(usize, Scalar); 3]>,
+    ring: Option<(usize, Scalar)>,
+    time: Option<(usize, Scalar)>,
+}
+
+impl Fields {
+    fn of(element: &Element) -> Option<Self> {
+        let color = [
+            &["red", "r", "diffuse_red"][..],
+            &["green", "g", "diffuse_green"],
+            &["blue", "b", "diffuse_blue"],
+        ];
+        let names = element.properties.iter().map(|p| p.name.as_str());
+        Some(Self {
+            position: element.three([&["x"], &["y"], &["z"]])?,
+            intensity: element.value(&["intensity", "scalar_intensity", "reflectance", "reflectivity"]),
+            normal: element.three([&["nx"], &["ny"], &["nz"]]),
+            color: element.three(color),
+            ring: element.value(&["ring"]),
+            time: names.into_iter().find(|n| is_time(n)).and_then(|n| element.value(&[n])),
+        })
+    }
+}
+
+fn read_vertices(
+    body: &mut Body,
+    element: &Element,
+    with_grid: bool,
+    vertices: &mut Vertices,
+    path: &Path,
+) -> Result<PointCloudFile, IoError> {
+    let Some(fields) = Fields::of(element) else {
+        return Err(IoError::text(
+            path,
+            1,
+            "the properties of vertices",
+            "without x, y, z",
+            "give a file with points",
+        ));
+    };
+    // Text may hold more digits than the type that the header speaks of.
+    let fine = fields.position[0].1 == Scalar::F64 || body.is_text();
+    let mut builder = CloudBuilder::new(fine);
+    for i in 0..element.count {
+        body.row(element, None)?;
+        let values = &body.values;
+        let kept = builder.push(i as usize, fields.position.map(|(k, _)| values[k]));
+        if with_grid {
+            vertices.0.push(kept.then(|| builder.cloud.points.len() as u32 - 1));
+        }
+        if !kept {
+            continue;
+        }
+        if let Some((k, _)) = fields.intensity {
+            builder.cloud.intensity.push(values[k] as f32);
+        }
+        if let Some(n) = fields.normal {
+            builder.cloud.normals.push(n.map(|(k, _)| values[k] as f32));
+        }
+        if let Some(c) = fields.color {
+            builder.cloud.colors.push(c.map(|(k, scalar)| channel(values[k], scalar)));
+        }
+        if let Some((k, _)) = fields.ring {
+            builder.cloud.rings.push(values[k] as u16);
+        }
+        if let Some((k, scalar)) = fields.time {
+            builder.times.push(values[k] * time_unit(scalar));
+        }
+    }
+    Ok(builder.finish())
+}
+
+/// Puts the points into the order of their pixels.
+fn read_grid(
+    body: &mut Body,
+    header: &Header,
+    element: &Element,
+    vertices: &Vertices,
+    cloud: &mut PointCloudFile,
+) -> Result<(), IoError> {
+    let size = header.columns.zip(header.rows).map(|(c, r)| (c, r, c.saturating_mul(r)));
+    let Some((columns, rows, _)) = size.filter(|s| s.2 == element.count && s.2 <= MOST_PIXELS) else {
+        let value = format!("{:?} x {:?} for {} pixels", header.columns, header.rows, element.count);
+        return Err(body.error(
+            "obj_info num_cols, num_rows",
+            value,
+            "write the columns and rows of range_grid",
+        ));
+    };
+    let wanted = element.indices();
+    let (mut order, mut pixels) = (Vec::new(), Vec::new());
+    let mut taken = vec![false; cloud.points.len()];
+    for pixel in 0..element.count {
+        body.row(element, wanted)?;
+        let Some(&index) = body.list.first() else {
+            cloud.refused.no_reading += 1;
+            continue;
+        };
+        let vertex = (index >= 0.0 && body.list.len() == 1).then(|| vertices.0.get(index as usize)).flatten();
+        let Some(vertex) = vertex else {
+            let advice = format!("a pixel has no vertex, or one of {}", vertices.0.len());
+            return Err(body.error("range_grid", format!("{:?}", body.list), &advice));
+        };
+        // A refused vertex was counted where it was read.
+        let Some(point) = *vertex else { continue };
+        if std::mem::replace(&mut taken[point as usize], true) {
+            return Err(body.error("range_grid", format!("{index} again"), "give each vertex one pixel"));
+        }
+        order.push(point as usize);
+        pixels.push(pixel as u32);
+    }
+    // Points without a pixel are no part of the image; scanners do not write any.
+    cloud.refused.no_reading += (cloud.points.len() - order.len()) as u64;
+    reorder(&mut cloud.points, &order);
+    reorder(&mut cloud.intensity, &order);
+    reorder(&mut cloud.times, &order);
+    reorder(&mut cloud.rings, &order);
+    reorder(&mut cloud.colors, &order);
+    reorder(&mut cloud.normals, &order);
+    cloud.grid = Some(CloudGrid { columns: columns as usize, rows: rows as usize, pixels });
+    Ok(())
+}
+
+fn reorder<T: Copy>(list: &mut Vec<T>, order: &[usize]) {
+    if !list.is_empty() {
+        *list = order.iter().map(|&i| list[i]).collect();
+    }
+}

@@ -1,0 +1,139 @@
+//! Meshes as a reference to compare with.
+
+use std::path::Path;
+
+use super::MOST_BYTES;
+use super::body::Body;
+use super::header::{self, Element};
+use crate::IoError;
+use crate::bytes::open;
+use crate::points::channel;
+
+/// A mesh of triangles. `normals` and `colors` have one entry per vertex, or none at all.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlyMesh {
+    /// Corners (metres), as the file has them.
+    pub vertices: Vec<[f64; 3]>,
+    /// Corners of each triangle; polygons are fans about their first corner, strips are taken apart.
+    pub triangles: Vec<[u32; 3]>,
+    /// Normals of vertices, not made unit vectors.
+    pub normals: Vec<[f32; 3]>,
+    /// Red, green, blue of vertices.
+    pub colors: Vec<[u8; 3]>,
+    /// Faces that were left out: fewer than three corners, or a corner that is not finite. Such corners stay in `vertices`,
+    /// so that indices keep their meaning.
+    pub refused_faces: u64,
+}
+
+/// Reads a mesh. A file without faces is a mesh without triangles.
+///
+/// # Errors
+/// [`IoError::Text`] for a wrong header or text, [`IoError::Binary`] for wrong binary data, both for a face whose corners are
+/// not there.
+pub fn read_ply_mesh(path: impl AsRef<Path>) -> Result<PlyMesh, IoError> {
+    let mut input = open(path)?;
+    let bytes = input.read_all(MOST_BYTES)?;
+    parse_bytes(&bytes, input.path())
+}
+
+pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PlyMesh, IoError> {
+    let header = header::parse(bytes, path)?;
+    let mut body = Body::of(&header, bytes, path);
+    let mut mesh = PlyMesh::default();
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" if mesh.vertices.is_empty() => read_vertices(&mut body, element, &mut mesh)?,
+            "face" => {
+                for _ in 0..element.count {
+                    body.row(element, element.indices())?;
+                    let corners = corners(&body, mesh.vertices.len())?;
+                    mesh.add_polygon(&corners);
+                }
+            }
+            "tristrips" => {
+                for _ in 0..element.count {
+                    body.row(element, element.indices())?;
+                    let strips = std::mem::take(&mut body.list);
+                    for strip in strips.split(|v| *v == -1.0) {
+                        body.list = strip.to_vec();
+                        let corners = corners(&body, mesh.vertices.len())?;
+                        mesh.add_strip(&corners);
+                    }
+                }
+            }
+            _ => {
+                for _ in 0..element.count {
+                    body.row(element, None)?;
+                }
+            }
+        }
+    }
+    if mesh.vertices.is_empty() {
+        return Err(IoError::text(
+            path,
+            1,
+            "the number of vertices",
+            "0",
+            "give a file with vertices x, y, z",
+        ));
+    }
+    Ok(mesh)
+}
+
+fn read_vertices(body: &mut Body, element: &Element, mesh: &mut PlyMesh) -> Result<(), IoError> {
+    let Some(position) = element.three([&["x"], &["y"], &["z"]]) else {
+        return Err(body.error(
+            "the properties of vertices",
+            "without x, y, z".into(),
+            "give a file with points",
+        ));
+    };
+    let normal = element.three([&["nx"], &["ny"], &["nz"]]);
+    let color =
+        element.three([&["red", "diffuse_red"], &["green", "diffuse_green"], &["blue", "diffuse_blue"]]);
+    for _ in 0..element.count {
+        body.row(element, None)?;
+        mesh.vertices.push(position.map(|(k, _)| body.values[k]));
+        if let Some(n) = normal {
+            mesh.normals.push(n.map(|(k, _)| body.values[k] as f32));
+        }
+        if let Some(c) = color {
+            mesh.colors.push(c.map(|(k, scalar)| channel(body.values[k], scalar)));
+        }
+    }
+    Ok(())
+}
+
+/// The corners that the last row names.
+fn corners(body: &Body, vertices: usize) -> Result<Vec<u32>, IoError> {
+    let corner = |&v: &f64| {
+        let there = v >= 0.0 && v < vertices as f64 && v.fract() == 0.0;
+        there.then_some(v as u32).ok_or_else(|| {
+            body.error("a corner of a face", v.to_string(), &format!("the file has {vertices} vertices"))
+        })
+    };
+    body.list.iter().map(corner).collect()
+}
+
+impl PlyMesh {
+    fn add_polygon(&mut self, corners: &[u32]) {
+        let finite = |c: &u32| self.vertices[*c as usize].iter().all(|v| v.is_finite());
+        match corners {
+            [first, rest @ ..] if rest.len() >= 2 && corners.iter().all(finite) => {
+                self.triangles.extend(rest.windows(2).map(|w| [*first, w[0], w[1]]));
+            }
+            _ => self.refused_faces += 1,
+        }
+    }
+
+    /// Every corner after the second makes a triangle with the two before it, turned about each time. Triangles with equal
+    /// corners only turn the strip.
+    fn add_strip(&mut self, corners: &[u32]) {
+        for (i, w) in corners.windows(3).enumerate() {
+            let [a, b, c] = if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] };
+            if a != b && b != c && c != a {
+                self.add_polygon(&[a, b, c]);
+            }
+        }
+    }
+}

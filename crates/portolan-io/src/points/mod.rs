@@ -1,0 +1,9 @@
+//! Clouds of points, whatever file they come from.
+
+mod builder;
+mod cloud;
+mod read;
+
+pub(crate) use builder::{CloudBuilder, channel, is_time, time_unit};
+pub use cloud::{CloudGrid, PointCloudFile, RefusedPoints, Viewpoint};
+pub use read::{PointFormat, parse_points, point_format, read_points};

@@ -1,0 +1,92 @@
+//! The scans of a depth camera: a depth image each, perhaps with a colour picture.
+
+use std::path::{Path, PathBuf};
+
+use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
+
+use super::color::{color_size, read_color};
+use super::depth_png::{depth_image_size, read_depth};
+use super::parts::FrameSource;
+use super::{Camera, SpaceLogOptions, SpaceLogStats};
+use crate::IoError;
+
+/// A depth image that was found.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct DepthFrame {
+    pub(super) depth: PathBuf,
+    /// Its colour picture, of the same pixels.
+    pub(super) color: Option<PathBuf>,
+    pub(super) pinhole: Pinhole,
+}
+
+/// Reads depth images.
+pub(super) struct DepthFrames {
+    frames: Vec<DepthFrame>,
+    units_per_metre: f64,
+}
+
+impl DepthFrames {
+    /// `units_per_metre` is the format's, which the caller may overrule. The first pictures are looked at: a camera of
+    /// another size, or depth of another kind, fails here and not in the middle of the log; colours of another size than
+    /// the depth are left out, and said so in `stats`.
+    pub(super) fn new(
+        mut frames: Vec<DepthFrame>,
+        camera: &Camera,
+        units_per_metre: f64,
+        options: &SpaceLogOptions,
+        stats: &mut SpaceLogStats,
+    ) -> Result<Self, IoError> {
+        let units_per_metre = options.depth_scale.unwrap_or(units_per_metre);
+        if let Some(first) = frames.first() {
+            if !(units_per_metre > 1e-6 && units_per_metre < 1e9) {
+                let advice = "give the units of a metre: 1000 for millimetres";
+                let value = units_per_metre.to_string();
+                return Err(IoError::layout(&first.depth, "the depth scale", value, advice));
+            }
+            camera.check_size(&first.depth, depth_image_size(&first.depth)?)?;
+        }
+        if options.color {
+            stats.colors_left_out = why_no_colors(&frames)?;
+        }
+        if !options.color || stats.colors_left_out.is_some() {
+            frames.iter_mut().for_each(|f| f.color = None);
+        } else if frames.iter().any(|f| f.color.is_some()) {
+            stats.scans_without_color = frames.iter().filter(|f| f.color.is_none()).count() as u64;
+        }
+        Ok(Self { frames, units_per_metre })
+    }
+}
+
+/// Why the colours that are there are not used.
+fn why_no_colors(frames: &[DepthFrame]) -> Result<Option<String>, IoError> {
+    let Some((depth, color)) = frames.iter().find_map(|f| Some((&f.depth, f.color.as_ref()?))) else {
+        return Ok(None);
+    };
+    let [[w, h], [x, y]] = [depth_image_size(depth)?, color_size(color)?];
+    Ok(([w, h] != [x, y]).then(|| format!("they are {x} x {y} while the depth images are {w} x {h}")))
+}
+
+/// The colour picture of a name in a folder, whatever it is packed with.
+pub(super) fn color_beside(folder: &Path, stem: &str) -> Option<PathBuf> {
+    let names = ["jpg", "png", "jpeg"].map(|extension| folder.join(format!("{stem}.{extension}")));
+    names.into_iter().find(|path| path.is_file())
+}
+
+impl FrameSource for DepthFrames {
+    fn frame(&self, i: usize) -> Result<Frame, IoError> {
+        let frame = &self.frames[i];
+        let depth = read_depth(&frame.depth, self.units_per_metre)?;
+        let colors = match &frame.color {
+            Some(path) => read_color(path, [depth.columns, depth.rows])?,
+            None => Vec::new(),
+        };
+        Ok(Frame::Image(RangeImage {
+            projection: Projection::Pinhole(frame.pinhole),
+            columns: depth.columns,
+            rows: depth.rows,
+            values: depth.values,
+            colors,
+            refused: RefusedBeams::default(),
+        }))
+    }
+}

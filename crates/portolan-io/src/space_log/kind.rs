@@ -1,0 +1,114 @@
+//! The kinds of logs: their words, what recognises them, what opens them.
+
+use std::path::Path;
+
+use super::parts::Parts;
+use super::{SpaceLogOptions, bigbird, redwood, seven_scenes, tum_rgbd};
+use crate::IoError;
+
+/// A kind of log of scans of space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SpaceLogKind {
+    /// A folder of `frame-NNNNNN.depth.png` with `frame-NNNNNN.pose.txt` (7-Scenes, 3DMatch).
+    SevenScenes,
+    /// A folder with `depth.txt`, `rgb.txt` and `groundtruth.txt` (TUM RGB-D, ETH3D SLAM).
+    TumRgbd,
+    /// A folder `masked_depth` with `pose/poses.txt` (BigBIRD as the GPIS tools store it).
+    BigBird,
+    /// A folder `depth` of pictures with a trajectory (Redwood, Open3D) or with poses in a folder `pose` (ScanNet).
+    Redwood,
+}
+
+/// What the crate knows of a kind.
+struct Format {
+    word: &'static str,
+    label: &'static str,
+    /// Whether a file or folder is of this kind. Reads no more than a few names and bytes.
+    is_it: fn(&Path) -> bool,
+    open: fn(&Path, &SpaceLogOptions) -> Result<Parts, IoError>,
+}
+
+impl SpaceLogKind {
+    /// All kinds, in the order in which they are tried.
+    pub const ALL: [Self; 4] = [Self::SevenScenes, Self::TumRgbd, Self::BigBird, Self::Redwood];
+
+    fn format(self) -> Format {
+        match self {
+            Self::SevenScenes => Format {
+                word: "seven-scenes",
+                label: "depth images with poses (7-Scenes)",
+                is_it: seven_scenes::is_it,
+                open: seven_scenes::open,
+            },
+            Self::TumRgbd => Format {
+                word: "tum",
+                label: "depth images with times (TUM RGB-D)",
+                is_it: tum_rgbd::is_it,
+                open: tum_rgbd::open,
+            },
+            Self::BigBird => Format {
+                word: "bigbird",
+                label: "masked depth images of an object (BigBIRD)",
+                is_it: bigbird::is_it,
+                open: bigbird::open,
+            },
+            Self::Redwood => Format {
+                word: "redwood",
+                label: "depth images with a trajectory (Redwood)",
+                is_it: redwood::is_it,
+                open: redwood::open,
+            },
+        }
+    }
+
+    /// The word of `--format`.
+    pub fn word(self) -> &'static str {
+        self.format().word
+    }
+
+    /// The kind of a word; `None` where no kind has it.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.word() == word)
+    }
+
+    /// The kind in words.
+    pub fn label(self) -> &'static str {
+        self.format().label
+    }
+
+    /// The kind of a file or folder by its layout, names and first bytes; `None` where it is no such log.
+    pub fn recognise(path: &Path) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| (kind.format().is_it)(path))
+    }
+
+    pub(super) fn parts(self, path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+        (self.format().open)(path, options)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_has_a_word_of_its_own() {
+        for (i, kind) in SpaceLogKind::ALL.into_iter().enumerate() {
+            assert_eq!(SpaceLogKind::from_word(kind.word()), Some(kind));
+            assert!(SpaceLogKind::ALL[..i].iter().all(|other| other.label() != kind.label()));
+        }
+        assert_eq!(SpaceLogKind::from_word("rosbag"), None);
+    }
+
+    #[test]
+    fn other_folders_are_no_logs() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(SpaceLogKind::recognise(folder.path()), None);
+        assert_eq!(SpaceLogKind::recognise(&folder.path().join("missing")), None);
+        std::fs::create_dir(folder.path().join("depth")).unwrap();
+        std::fs::write(folder.path().join("a.log"), "0 0 1\n").unwrap();
+        assert_eq!(SpaceLogKind::recognise(folder.path()), None);
+        std::fs::write(folder.path().join("depth/0.png"), "").unwrap();
+        assert_eq!(SpaceLogKind::recognise(folder.path()), Some(SpaceLogKind::Redwood));
+    }
+}

@@ -1,0 +1,39 @@
+//! Logs of scans of space with the pose of every scan: one interface for depth cameras and lidars.
+//!
+//! | kind | layout | poses |
+//! |---|---|---|
+//! | [`SevenScenes`](SpaceLogKind::SevenScenes) | `frame-NNNNNN.depth.png`, `.color.jpg` or `.color.png` | `frame-NNNNNN.pose.txt` |
+//! | [`TumRgbd`](SpaceLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
+//! | [`Redwood`](SpaceLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
+//! | [`BigBird`](SpaceLogKind::BigBird) | `masked_depth/frameF_camC.png` | `pose/poses.txt` |
+//!
+//! [`SpaceLog::open`] finds the files, reads the poses and says in [`SpaceLogStats`] what does not fit together; the scans
+//! themselves are read when they are asked for, by index and from any thread.
+//!
+//! To add a format: a file here with a function `fn(&Path, &SpaceLogOptions) -> Result<Parts, IoError>`, which finds the
+//! scans and where their poses are, and a kind in `kind.rs`. Matching poses with scans, conventions, mending and refusing
+//! happen once, in `log.rs`.
+
+mod bigbird;
+mod color;
+mod depth_frames;
+mod depth_png;
+mod files;
+mod intrinsics;
+mod kind;
+mod log;
+mod matching;
+mod options;
+mod parts;
+mod redwood;
+mod seven_scenes;
+mod stats;
+#[cfg(test)]
+mod testing;
+mod tum_rgbd;
+
+pub use intrinsics::{Camera, CameraFrom, Intrinsics};
+pub use kind::SpaceLogKind;
+pub use log::SpaceLog;
+pub use options::SpaceLogOptions;
+pub use stats::{RefusedPose, SpaceLogStats};

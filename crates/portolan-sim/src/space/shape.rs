@@ -1,0 +1,217 @@
+//! Boxes, cylinders and spheres: rays, distances, surfaces, in closed form.
+
+use crate::Random;
+use portolan::geom::vector::{along, dot, norm, scale, sub};
+use portolan::geom::{Aabb, Pose};
+
+/// A solid whose distance is known in closed form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A box about the zero of its own frame, however it is turned.
+    Box {
+        /// Where it stands.
+        world_from_box: Pose<3>,
+        /// Half its edges (metres).
+        half: [f64; 3],
+    },
+    /// A cylinder whose axis is vertical.
+    Cylinder {
+        /// Middle of the axis (metres).
+        centre: [f64; 3],
+        /// Metres.
+        radius: f64,
+        /// Half its height (metres).
+        half_height: f64,
+    },
+    /// A ball.
+    Sphere {
+        /// Metres.
+        centre: [f64; 3],
+        /// Metres.
+        radius: f64,
+    },
+}
+
+/// Where a ray enters a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Entry {
+    /// Arc length (metres).
+    pub(super) range: f64,
+    /// Unit normal of the surface there, outwards.
+    pub(super) normal: [f64; 3],
+}
+
+impl Shape {
+    /// An axis-aligned box between two corners.
+    pub fn between(min: [f64; 3], max: [f64; 3]) -> Self {
+        let centre = std::array::from_fn(|k| 0.5 * (min[k] + max[k]));
+        let world_from_box = Pose { translation: centre, ..Pose::IDENTITY };
+        Self::Box { world_from_box, half: std::array::from_fn(|k| 0.5 * (max[k] - min[k])) }
+    }
+
+    /// The smallest axis-aligned box around it.
+    pub fn aabb(&self) -> Aabb<3> {
+        let (centre, reach) = match *self {
+            Self::Box { world_from_box, half } => {
+                let row = |k: usize| (0..3).map(|j| (world_from_box.rotation[k][j] * half[j]).abs()).sum();
+                (world_from_box.translation, std::array::from_fn(row))
+            }
+            Self::Cylinder { centre, radius, half_height } => (centre, [radius, radius, half_height]),
+            Self::Sphere { centre, radius } => (centre, [radius; 3]),
+        };
+        Aabb::new(along(centre, reach, -1.0), along(centre, reach, 1.0))
+    }
+
+    /// Signed distance to its surface (metres): positive outside. Exact.
+    pub fn signed_distance(&self, p_world: [f64; 3]) -> f64 {
+        match *self {
+            Self::Box { world_from_box, half } => {
+                let p = to_local(&world_from_box, sub(p_world, world_from_box.translation));
+                beyond::<3>(std::array::from_fn(|k| p[k].abs() - half[k]))
+            }
+            Self::Cylinder { centre, radius, half_height } => {
+                let p = sub(p_world, centre);
+                beyond([norm([p[0], p[1]]) - radius, p[2].abs() - half_height])
+            }
+            Self::Sphere { centre, radius } => norm(sub(p_world, centre)) - radius,
+        }
+    }
+
+    /// Where a ray (unit direction) enters the shape from outside; `None` if it misses, or begins inside or beyond.
+    pub(super) fn enter(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<Entry> {
+        match *self {
+            Self::Box { world_from_box, half } => {
+                let o = to_local(&world_from_box, sub(origin, world_from_box.translation));
+                let d = to_local(&world_from_box, direction);
+                let (mut near, mut far, mut axis) = (f64::NEG_INFINITY, f64::INFINITY, 0);
+                for k in 0..3 {
+                    if d[k] == 0.0 {
+                        if o[k].abs() > half[k] {
+                            return None;
+                        }
+                        continue;
+                    }
+                    let (a, b) = ((-half[k] - o[k]) / d[k], (half[k] - o[k]) / d[k]);
+                    if a.min(b) > near {
+                        (near, axis) = (a.min(b), k);
+                    }
+                    far = far.min(a.max(b));
+                }
+                let mut normal = [0.0; 3];
+                normal[axis] = -d[axis].signum();
+                (near >= 0.0 && near <= far)
+                    .then(|| Entry { range: near, normal: world_from_box.rotate(normal) })
+            }
+            Self::Cylinder { centre, radius, half_height } => {
+                let o = sub(origin, centre);
+                let d = direction;
+                // Between the planes of its ends, and inside the round wall.
+                let (mut near, mut far, mut cap) = (f64::NEG_INFINITY, f64::INFINITY, true);
+                if d[2] != 0.0 {
+                    let (a, b) = ((-half_height - o[2]) / d[2], (half_height - o[2]) / d[2]);
+                    (near, far) = (a.min(b), a.max(b));
+                } else if o[2].abs() > half_height {
+                    return None;
+                }
+                let a = d[0] * d[0] + d[1] * d[1];
+                let c = o[0] * o[0] + o[1] * o[1] - radius * radius;
+                if a > 0.0 {
+                    let (low, high) = roots(a, o[0] * d[0] + o[1] * d[1], c)?;
+                    if low > near {
+                        (near, cap) = (low, false);
+                    }
+                    far = far.min(high);
+                } else if c > 0.0 {
+                    return None;
+                }
+                (near >= 0.0 && near <= far).then(|| {
+                    let p = along(o, d, near);
+                    let normal = if cap {
+                        [0.0, 0.0, -d[2].signum()]
+                    } else {
+                        scale([p[0], p[1], 0.0], 1.0 / norm([p[0], p[1]]))
+                    };
+                    Entry { range: near, normal }
+                })
+            }
+            Self::Sphere { centre, radius } => {
+                let o = sub(origin, centre);
+                let (near, _) = roots(1.0, dot(o, direction), dot(o, o) - radius * radius)?;
+                let normal = scale(along(o, direction, near), 1.0 / radius);
+                (near >= 0.0).then_some(Entry { range: near, normal })
+            }
+        }
+    }
+
+    /// Area of its surface (square metres).
+    pub fn area(&self) -> f64 {
+        let tau = std::f64::consts::TAU;
+        match *self {
+            Self::Box { half: [a, b, c], .. } => 8.0 * (a * b + b * c + c * a),
+            Self::Cylinder { radius, half_height, .. } => tau * radius * (2.0 * half_height + radius),
+            Self::Sphere { radius, .. } => 2.0 * tau * radius * radius,
+        }
+    }
+
+    /// A point of its surface, uniform by area, with the unit normal outwards.
+    pub(super) fn surface_point(&self, random: &mut Random) -> ([f64; 3], [f64; 3]) {
+        let turn = |random: &mut Random| {
+            let angle = std::f64::consts::TAU * random.uniform();
+            [libm::cos(angle), libm::sin(angle)]
+        };
+        match *self {
+            Self::Box { world_from_box, half: [a, b, c] } => {
+                // Pairs of faces across x, y, z.
+                let areas = [b * c, c * a, a * b];
+                let pick = random.uniform() * areas.iter().sum::<f64>();
+                let axis = usize::from(pick >= areas[0]) + usize::from(pick >= areas[0] + areas[1]);
+                let mut p = [a, b, c].map(|h| h * (2.0 * random.uniform() - 1.0));
+                let mut normal = [0.0; 3];
+                normal[axis] = if p[axis] < 0.0 { -1.0 } else { 1.0 };
+                p[axis] = normal[axis] * [a, b, c][axis];
+                (world_from_box.transform_point(p), world_from_box.rotate(normal))
+            }
+            Self::Cylinder { centre, radius, half_height } => {
+                let [x, y] = turn(random);
+                let pick = (2.0 * half_height + radius) * random.uniform();
+                if pick < 2.0 * half_height {
+                    (
+                        [0, 1, 2].map(|k| centre[k] + [radius * x, radius * y, pick - half_height][k]),
+                        [x, y, 0.0],
+                    )
+                } else {
+                    let r = radius * random.uniform().sqrt();
+                    let up = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+                    ([0, 1, 2].map(|k| centre[k] + [r * x, r * y, up * half_height][k]), [0.0, 0.0, up])
+                }
+            }
+            Self::Sphere { centre, radius } => {
+                let z = 2.0 * random.uniform() - 1.0;
+                let [x, y] = turn(random);
+                let r = (1.0 - z * z).max(0.0).sqrt();
+                let normal = [r * x, r * y, z];
+                (along(centre, normal, radius), normal)
+            }
+        }
+    }
+}
+
+/// A displacement in the axes of a frame.
+#[inline(always)]
+fn to_local(world_from_local: &Pose<3>, v: [f64; 3]) -> [f64; 3] {
+    let m = &world_from_local.rotation;
+    std::array::from_fn(|k| m[0][k] * v[0] + m[1][k] * v[1] + m[2][k] * v[2])
+}
+
+/// Signed distance from how far a point lies beyond each pair of faces that are at right angles to each other.
+#[inline(always)]
+fn beyond<const N: usize>(excess: [f64; N]) -> f64 {
+    let deepest = excess.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if deepest <= 0.0 { deepest } else { norm(excess.map(|v| v.max(0.0))) }
+}
+
+/// Real roots of `a t^2 + 2 b t + c`, ascending (`a > 0`).
+fn roots(a: f64, b: f64, c: f64) -> Option<(f64, f64)> {
+    let disc = b * b - a * c;
+    (disc >= 0.0).then(|| ((-b - disc.sqrt()) / a, (-b + disc.sqrt()) / a))
+}

@@ -1,0 +1,241 @@
+//! True surface, true free space, and what a map says about them.
+//!
+//! The scores take closures, so that they fit any map.
+
+use super::world::SpaceWorld;
+use crate::Random;
+use portolan::gallery::{ErrorSummary, Truth};
+use portolan::geom::vector::{along, distance, scale, sub};
+use portolan::geom::{Aabb, Pose};
+use portolan::scan::Frame;
+
+/// A point of the true surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// World, metres.
+    pub point: [f64; 3],
+    /// Unit normal, towards free space.
+    pub normal: [f64; 3],
+    /// Index of the body.
+    pub body: usize,
+}
+
+/// Points of the surface of the union of all bodies within a box, uniform by area. O(tries): faces inside other bodies
+/// and outside of the box are drawn in vain, at most a thousand times as often as points are wanted.
+pub fn surface_points(world: &SpaceWorld, within: &Aabb<3>, count: usize, seed: u64) -> Vec<SurfacePoint> {
+    let mut random = Random::stream(seed, 0x5u64);
+    let mut sums = Vec::new();
+    let mut area = 0.0;
+    for body in world.bodies() {
+        area += body.shape.area();
+        sums.push(area);
+    }
+    let mut points = Vec::with_capacity(count);
+    for _ in 0..count.saturating_mul(1000) {
+        if points.len() == count {
+            break;
+        }
+        let pick = area * random.uniform();
+        let body = sums.partition_point(|s| *s <= pick);
+        let Some(b) = world.bodies().get(body) else { continue };
+        let (point, normal) = b.shape.surface_point(&mut random);
+        // A step off the face is free space, unless another body covers it.
+        if within.contains(point) && !world.is_inside(along(point, normal, 1e-6)) {
+            points.push(SurfacePoint { point, normal, body });
+        }
+    }
+    points
+}
+
+/// Those of the surface points that some scan saw: within `reach` metres of one of its end points.
+///
+/// What no scan saw is unknown to any map, and says nothing about it. O(end points + points).
+pub fn seen_surface(points: &[SurfacePoint], scans: &[(Pose<3>, Frame)], reach: f64) -> Vec<SurfacePoint> {
+    let cell = |p: [f64; 3]| p.map(|v| (v / reach).floor() as i64);
+    let mut ends: Vec<([i64; 3], [f64; 3])> = Vec::new();
+    for (pose, frame) in scans {
+        ends.extend(end_points(frame).map(|p| pose.transform_point(p)).map(|p| (cell(p), p)));
+    }
+    ends.sort_by_key(|e| e.0);
+    let near = |p: [f64; 3]| {
+        let c = cell(p);
+        (0..27).any(|k: i64| {
+            let there = [c[0] + k % 3 - 1, c[1] + k / 3 % 3 - 1, c[2] + k / 9 - 1];
+            let first = ends.partition_point(|e| e.0 < there);
+            ends[first..].iter().take_while(|e| e.0 == there).any(|e| distance(e.1, p) <= reach)
+        })
+    };
+    points.iter().filter(|s| near(s.point)).copied().collect()
+}
+
+/// Surfaces of a frame, in the sensor's frame.
+fn end_points(frame: &Frame) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
+    match frame {
+        Frame::Points(scan) => Box::new(scan.points.iter().map(|p| p.map(f64::from))),
+        Frame::Image(image) => Box::new(image.points().map(|(_, p)| p)),
+    }
+}
+
+/// Points of free space that at least one ray passed through: each lies on a ray that ended on a surface, `margin` metres
+/// or more before its true end, and `margin` away from every surface. Fewer than `count` where hardly any are found.
+///
+/// Scans and rays are drawn evenly, and the place on a ray so that far places are drawn as often as a uniform density in
+/// space would have it (the square of the range), as far as rays go.
+pub fn free_points(
+    world: &SpaceWorld,
+    scans: &[(Pose<3>, Frame)],
+    margin: f64,
+    count: usize,
+    seed: u64,
+) -> Vec<[f64; 3]> {
+    let mut random = Random::stream(seed, 0xF2EE);
+    let rays: Vec<(usize, Vec<[f64; 3]>)> =
+        scans.iter().enumerate().map(|(i, s)| (i, end_points(&s.1).collect())).collect();
+    let longest = 12.0f64;
+    let mut points = Vec::with_capacity(count);
+    if rays.is_empty() {
+        return points;
+    }
+    for _ in 0..count.saturating_mul(1000) {
+        if points.len() == count {
+            break;
+        }
+        let (scan, ends) = &rays[(random.uniform() * rays.len() as f64) as usize];
+        let (pick, reach) = (random.uniform(), longest * libm::cbrt(random.uniform()));
+        if ends.is_empty() {
+            continue;
+        }
+        let pose = &scans[*scan].0;
+        let end = pose.transform_point(ends[(pick * ends.len() as f64) as usize]);
+        let length = distance(end, pose.translation);
+        let direction = scale(sub(end, pose.translation), 1.0 / length);
+        // The noisy end may lie behind the surface: the ray itself ended at the true one.
+        let true_length = world.cast_ray(pose.translation, direction).map_or(0.0, |h| h.range);
+        let p = along(pose.translation, direction, reach);
+        if reach <= true_length.min(length) - margin && Truth::signed_distance(world, p) >= margin {
+            points.push(p);
+        }
+    }
+    points
+}
+
+/// How a map labels points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Labels {
+    /// Called free.
+    pub free: usize,
+    /// Called occupied.
+    pub occupied: usize,
+    /// Unknown to the map.
+    pub unknown: usize,
+}
+
+impl Labels {
+    /// Share of all points that are called free.
+    pub fn free_share(&self) -> f64 {
+        self.free as f64 / (self.free + self.occupied + self.unknown).max(1) as f64
+    }
+
+    /// Share of all points that are called occupied.
+    pub fn occupied_share(&self) -> f64 {
+        self.occupied as f64 / (self.free + self.occupied + self.unknown).max(1) as f64
+    }
+}
+
+/// Labels of points of true free space. `is_free`: `None` where the map does not know.
+pub fn score_free(points: &[[f64; 3]], mut is_free: impl FnMut([f64; 3]) -> Option<bool>) -> Labels {
+    let mut labels = Labels::default();
+    points.iter().for_each(|&p| count(&mut labels, is_free(p)));
+    labels
+}
+
+/// Labels of points of the true surface: occupied where the map says so at the point or a `voxel` (metres) beside it along
+/// an axis, because noise puts the end points of a surface into either of two cells; free where it calls the point free
+/// and none of those occupied.
+pub fn score_surface(
+    points: &[SurfacePoint],
+    voxel: f64,
+    mut is_free: impl FnMut([f64; 3]) -> Option<bool>,
+) -> Labels {
+    let mut labels = Labels::default();
+    for s in points {
+        let beside = |k: usize| {
+            let mut p = s.point;
+            p[k % 3] += if k < 3 { voxel } else { -voxel };
+            p
+        };
+        let here = is_free(s.point);
+        let found = here == Some(false) || (0..6).any(|k| is_free(beside(k)) == Some(false));
+        count(&mut labels, if found { Some(false) } else { here });
+    }
+    labels
+}
+
+fn count(labels: &mut Labels, is_free: Option<bool>) {
+    match is_free {
+        Some(true) => labels.free += 1,
+        Some(false) => labels.occupied += 1,
+        None => labels.unknown += 1,
+    }
+}
+
+/// Signed distances of a reconstructed surface's points to the true surface (metres): the error of the reconstruction,
+/// positive where it lies in free space. `None` without points.
+pub fn surface_errors(world: &impl Truth<3>, points: impl Iterator<Item = [f64; 3]>) -> Option<ErrorSummary> {
+    ErrorSummary::of(points.map(|p| world.signed_distance(p)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::{BuildingConfig, SpaceLidar, SpaceSensor, building};
+
+    #[test]
+    fn samples_are_where_they_say() {
+        let lidar = SpaceLidar { rings: 32, columns: 360, ..Default::default() };
+        let log =
+            building(&BuildingConfig { scans: 8, sensor: SpaceSensor::Lidar(lidar), ..Default::default() });
+        let world = &log.world;
+        let inner = world.aabb().grown(-0.1);
+        let surface = surface_points(world, &inner, 4000, 1);
+        assert_eq!(surface.len(), 4000);
+        for s in &surface {
+            assert!(world.signed_distance(s.point).abs() < 1e-9 && inner.contains(s.point));
+            assert!(world.signed_distance(along(s.point, s.normal, 1e-3)) > 0.0);
+        }
+        let seen = seen_surface(&surface, &log.scans, 0.1);
+        println!("{} of {} surface points seen", seen.len(), surface.len());
+        assert!(seen.len() > 1500 && seen.len() < 4000);
+        let free = free_points(world, &log.scans, 0.2, 3000, 1);
+        assert_eq!(free.len(), 3000);
+        assert!(free.iter().all(|&p| world.signed_distance(p) >= 0.2));
+        // A perfect map scores perfectly, one that knows nothing knows nothing.
+        let truth = |p| Some(world.signed_distance(p) > 0.05);
+        assert_eq!(score_free(&free, truth).free_share(), 1.0);
+        assert_eq!(score_surface(&surface, 0.1, truth).occupied_share(), 1.0);
+        assert_eq!(score_free(&free, |_| None).unknown, 3000);
+        assert_eq!(score_surface(&surface, 0.1, |_| Some(true)).free_share(), 1.0);
+        let shifted = surface.iter().map(|s| along(s.point, s.normal, 2e-3));
+        let errors = surface_errors(world, shifted).unwrap();
+        assert!((errors.median - 2e-3).abs() < 1e-9 && errors.bias > 0.0);
+    }
+
+    #[test]
+    fn area_is_drawn_evenly() {
+        // Half of a box is buried in another one: its points are those of what is left.
+        let shape = |min, max| crate::space::Body {
+            name: String::new(),
+            shape: crate::space::Shape::between(min, max),
+            color: [0; 3],
+        };
+        let world = SpaceWorld::new(vec![
+            shape([0.0; 3], [2.0, 1.0, 1.0]),
+            shape([1.0, -1.0, -1.0], [4.0, 2.0, 2.0]),
+        ]);
+        let points = surface_points(&world, &world.aabb(), 40_000, 3);
+        // 1 m of a bar of 1 m x 1 m with one end, and a block without the bar's end.
+        let (bar, block) = (4.0 + 1.0, 2.0 * 9.0 + 4.0 * 9.0 - 1.0);
+        let share = points.iter().filter(|s| s.body == 0).count() as f64 / points.len() as f64;
+        assert!((share - bar / (bar + block)).abs() < 0.006, "{share}");
+    }
+}

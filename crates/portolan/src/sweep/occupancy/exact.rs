@@ -1,0 +1,289 @@
+//! Exact rays of a whole scan.
+
+use super::Bits;
+use super::masks::BrickMasks;
+use super::trace::{trace, walk};
+use crate::geom::vector::{along, distance, scale, sub};
+use crate::geom::{Aabb, BlockKey, Lattice, RayWalk};
+use crate::sweep::clip;
+
+/// One beam in the world's frame (metres).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ray {
+    pub(crate) origin: [f64; 3],
+    pub(crate) end: [f64; 3],
+    /// Whether there is a surface at the end.
+    pub(crate) hit: bool,
+}
+
+/// What became of the rays of a scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tally {
+    /// Hits whose end lies outside of the bounds.
+    pub(crate) hits_outside: u64,
+    /// Rays whose origin or end is not finite or has no cell index.
+    pub(crate) unusable: u64,
+}
+
+/// Walks every beam through the cells (Amanatides & Woo 1987): each cell that beams pass gets one miss a scan, each in
+/// which one ends one hit, and a hit overrules misses (Hornung et al. 2013, as in OctoMap's `computeUpdate`). The cell in
+/// which a beam without a surface ends gets nothing. Rays are shared out to threads with bits of their own, which are
+/// then merged: the order does not matter.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ExactRays {
+    parts: Vec<BrickMasks>,
+    keys: Vec<BlockKey<3>>,
+    slots: Vec<u32>,
+}
+
+/// Rays that are worth a thread.
+const RAYS_A_PART: usize = 2048;
+
+impl ExactRays {
+    /// Marks `count` rays. Cells outside of `bounds` may be marked, too: see `CellBox::mask`.
+    pub(crate) fn plan(
+        &mut self,
+        lattice: &Lattice<3>,
+        bounds: Option<&Aabb<3>>,
+        count: usize,
+        ray: impl Fn(usize) -> Ray + Sync,
+    ) -> Tally {
+        let parts = parts(count);
+        self.parts.resize_with(parts.max(self.parts.len()), BrickMasks::default);
+        let range = |part: usize| part * count / parts..(part + 1) * count / parts;
+        let (first, last) = reach(lattice, bounds, (0..count).map(&ray));
+        let mut tallies = vec![Tally::default(); parts];
+        let jobs =
+            self.parts[..parts].iter_mut().zip(&mut tallies).enumerate().map(|(i, (m, t))| (range(i), m, t));
+        in_parallel(jobs, |(range, masks, tally)| {
+            masks.begin(first, last);
+            range.for_each(|i| mark(masks, lattice, bounds, ray(i), tally));
+        });
+        let (whole, others) = self.parts[..parts].split_at_mut(1);
+        others.iter().for_each(|part| whole[0].merge(part));
+        (self.keys, self.slots) = whole[0].sorted().into_iter().unzip();
+        tallies.iter().fold(Tally::default(), |a, b| Tally {
+            hits_outside: a.hits_outside + b.hits_outside,
+            unusable: a.unusable + b.unusable,
+        })
+    }
+
+    /// The bricks that were touched, ascending.
+    pub(crate) fn keys(&self) -> &[BlockKey<3>] {
+        &self.keys
+    }
+
+    /// The bits of the `i`-th brick.
+    pub(crate) fn bits(&self, i: usize) -> &Bits {
+        self.parts[0].bits(self.slots[i])
+    }
+}
+
+/// Marks one ray.
+#[inline]
+fn mark(masks: &mut BrickMasks, lattice: &Lattice<3>, bounds: Option<&Aabb<3>>, ray: Ray, tally: &mut Tally) {
+    let end = match bounds {
+        None => trace(masks, lattice, ray.origin, ray.end),
+        Some(bounds) => trace_inside(masks, lattice, bounds, ray, tally),
+    };
+    match end {
+        Some(cell) if ray.hit && bounds.is_none_or(|b| b.contains(ray.end)) => masks.mark_hit(cell),
+        Some(_) => {}
+        None => tally.unusable += 1,
+    }
+}
+
+/// As [`trace`], but only the part of a ray inside of the bounds: a far sensor costs nothing.
+fn trace_inside(
+    masks: &mut BrickMasks,
+    lattice: &Lattice<3>,
+    bounds: &Aabb<3>,
+    ray: Ray,
+    tally: &mut Tally,
+) -> Option<[i32; 3]> {
+    let end = lattice.cell_of(ray.end)?;
+    tally.hits_outside += u64::from(ray.hit && !bounds.contains(ray.end));
+    let length = distance(ray.end, ray.origin);
+    if !(length > 0.0) {
+        return Some(end);
+    }
+    let direction = scale(sub(ray.end, ray.origin), 1.0 / length);
+    if let Some((near, far)) = clip(bounds, ray.origin, direction, length) {
+        let start = if near > 0.0 { along(ray.origin, direction, near) } else { ray.origin };
+        walk(masks, RayWalk::new(lattice, start, direction)?, end, far - near);
+    }
+    Some(end)
+}
+
+/// The bricks between which all rays run, with a margin for rounding.
+fn reach(
+    lattice: &Lattice<3>,
+    bounds: Option<&Aabb<3>>,
+    rays: impl Iterator<Item = Ray>,
+) -> (BlockKey<3>, BlockKey<3>) {
+    let mut all = Aabb::EMPTY;
+    for ray in rays {
+        // `min` and `max` pass NaN over.
+        all.include(ray.origin);
+        all.include(ray.end);
+    }
+    if let Some(b) = bounds {
+        all.min = std::array::from_fn(|k| all.min[k].max(b.min[k]));
+        all.max = std::array::from_fn(|k| all.max[k].min(b.max[k]));
+    }
+    let cell = |p| lattice.to_cells(p).map(|v: f64| v.floor().clamp(-1e9, 1e9) as i32);
+    let (low, high) = (BlockKey::of_cell(cell(all.min)), BlockKey::of_cell(cell(all.max)));
+    (BlockKey(low.0.map(|v| v - 1)), BlockKey(high.0.map(|v| v + 1)))
+}
+
+#[cfg(feature = "parallel")]
+fn parts(count: usize) -> usize {
+    rayon::current_num_threads().min(count / RAYS_A_PART).max(1)
+}
+
+#[cfg(not(feature = "parallel"))]
+fn parts(_: usize) -> usize {
+    1
+}
+
+#[cfg(feature = "parallel")]
+pub(super) fn in_parallel<T: Send>(jobs: impl Iterator<Item = T>, job: impl Fn(T) + Sync) {
+    let mut jobs: Vec<T> = jobs.collect();
+    match jobs.pop() {
+        Some(only) if jobs.is_empty() => job(only),
+        Some(last) => rayon::scope(|scope| {
+            let job = &job;
+            jobs.into_iter().for_each(|j| scope.spawn(move |_| job(j)));
+            job(last);
+        }),
+        None => {}
+    }
+}
+
+#[cfg(not(feature = "parallel"))]
+pub(super) fn in_parallel<T: Send>(jobs: impl Iterator<Item = T>, job: impl Fn(T) + Sync) {
+    jobs.for_each(job);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashSet;
+
+    /// The definition, with sets of cells.
+    fn oracle(lattice: &Lattice<3>, rays: &[Ray]) -> (HashSet<[i32; 3]>, HashSet<[i32; 3]>) {
+        let (mut hits, mut misses) = (HashSet::new(), HashSet::new());
+        for ray in rays {
+            let end = lattice.cell_of(ray.end).unwrap();
+            if ray.hit {
+                hits.insert(end);
+            }
+            let length = distance(ray.end, ray.origin);
+            if length == 0.0 {
+                continue;
+            }
+            let direction = scale(sub(ray.end, ray.origin), 1.0 / length);
+            let mut walk = RayWalk::new(lattice, ray.origin, direction).unwrap();
+            while walk.cell() != end {
+                misses.insert(walk.cell());
+                if walk.exit() >= length {
+                    break;
+                }
+                walk.advance();
+            }
+        }
+        misses.retain(|c| !hits.contains(c));
+        (hits, misses)
+    }
+
+    fn equals_the_oracle(lattice: &Lattice<3>, rays: &[Ray]) {
+        let mut sweep = ExactRays::default();
+        for _ in 0..2 {
+            assert_eq!(sweep.plan(lattice, None, rays.len(), |i| rays[i]), Tally::default());
+        }
+        assert!(sweep.keys().is_sorted());
+        let (mut hits, mut misses) = (HashSet::new(), HashSet::new());
+        for (i, key) in sweep.keys().iter().enumerate() {
+            let bits = sweep.bits(i);
+            for k in 0..512 {
+                if bits.hit[k >> 6] >> (k & 63) & 1 != 0 {
+                    hits.insert(key.cell(k));
+                } else if bits.miss[k >> 6] >> (k & 63) & 1 != 0 {
+                    misses.insert(key.cell(k));
+                }
+            }
+        }
+        assert!((hits, misses) == oracle(lattice, rays));
+    }
+
+    const UTM: [f64; 3] = [500_000.0, 4_000_000.0, 300.0];
+
+    proptest! {
+        #[test]
+        fn equals_sets_of_cells(
+            ends in prop::collection::vec((prop::array::uniform3(-3.0..3.0f64), any::<bool>()), 1..60),
+            o in prop::array::uniform3(-1.0..1.0f64), utm in any::<bool>(),
+        ) {
+            let zero = if utm { UTM } else { [0.0; 3] };
+            let shift = |p: [f64; 3]| std::array::from_fn(|k| p[k] + zero[k]);
+            let rays: Vec<_> = ends.iter().map(|&(e, hit)| Ray { origin: shift(o), end: shift(e), hit }).collect();
+            equals_the_oracle(&Lattice::new(shift([-0.3; 3]), 0.1), &rays);
+        }
+
+        /// Everything on a raster of half a cell: along axes, through edges and corners, on faces, from origins of their own.
+        #[test]
+        fn equals_sets_of_cells_on_faces_and_corners(
+            ends in prop::collection::vec((prop::array::uniform3(-24..24i32), prop::array::uniform3(-9..9i32), any::<bool>()), 1..60),
+        ) {
+            let at = |p: [i32; 3]| p.map(|v| f64::from(v) * 0.125);
+            let rays: Vec<_> = ends.iter().map(|&(e, o, hit)| Ray { origin: at(o), end: at(e), hit }).collect();
+            equals_the_oracle(&Lattice::new([0.0; 3], 0.25), &rays);
+        }
+    }
+
+    #[test]
+    fn along_axes_and_without_length() {
+        let ray = |end, hit| Ray { origin: [0.05, 0.05, 0.05], end, hit };
+        let rays = [
+            ray([0.05, 0.05, 4.0], true),
+            ray([0.05, 0.05, -4.0], true),
+            ray([-4.0, 0.05, 0.05], false),
+            ray([0.05, 4.0, 0.05], true),
+            ray([0.05, 0.05, 0.05], true),
+            ray([0.06, 0.05, 0.05], false),
+        ];
+        equals_the_oracle(&Lattice::new([0.0; 3], 0.1), &rays);
+    }
+
+    #[test]
+    fn far_rays_do_without_a_window() {
+        let ray = |x: f64| Ray { origin: [0.0; 3], end: [x, 0.7 * x, 0.3], hit: true };
+        let rays = [ray(900.0), ray(-900.0), ray(3.0)];
+        equals_the_oracle(&Lattice::new([0.0; 3], 0.05), &rays);
+    }
+
+    #[test]
+    fn what_has_no_cell_is_counted() {
+        let lattice = Lattice::new([0.0; 3], 0.1);
+        let rays = [[f64::NAN, 0.0, 0.0], [1e12, 0.0, 0.0], [1.0, 0.0, 0.0]].map(|end| Ray {
+            origin: [0.0; 3],
+            end,
+            hit: true,
+        });
+        let mut sweep = ExactRays::default();
+        assert_eq!(sweep.plan(&lattice, None, 3, |i| rays[i]), Tally { hits_outside: 0, unusable: 2 });
+        assert_eq!(sweep.keys().len(), 2);
+    }
+
+    #[test]
+    fn only_the_inside_of_bounds_is_walked() {
+        let lattice = Lattice::new([0.0; 3], 0.1);
+        let bounds = Aabb::new([0.0; 3], [4.0; 3]);
+        let ray = Ray { origin: [-1e6, 0.55, 0.55], end: [1e6, 0.55, 0.55], hit: true };
+        let mut sweep = ExactRays::default();
+        let tally = sweep.plan(&lattice, Some(&bounds), 1, |_| ray);
+        assert_eq!(tally, Tally { hits_outside: 1, unusable: 0 });
+        assert!((5..=7).contains(&sweep.keys().len()), "{:?}", sweep.keys());
+    }
+}

@@ -1,0 +1,14 @@
+//! Occupancy of space, whole scans at a time, brick by brick.
+//!
+//! [`super::Rays`] is the chapter's sweep in any dimension, with its depth of walls, for dense arrays and trees. Here are
+//! the fast ones for bricks: [`exact`](ExactRays) rays with the meaning that OctoMap gave them (what is passed is missed
+//! once a scan, the cell of the end point is hit, a hit overrules misses).
+
+mod cell_box;
+mod exact;
+mod masks;
+mod trace;
+
+pub(crate) use cell_box::CellBox;
+pub(crate) use exact::{ExactRays, Ray, Tally};
+pub(crate) use masks::Bits;

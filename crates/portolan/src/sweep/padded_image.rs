@@ -1,0 +1,231 @@
+//! A range image made ready for being looked up: cleaned, with a border, torn where surfaces end.
+
+use super::lens::Lens;
+use super::weight::WeightModel;
+use crate::geom::vector::{dot, norm, sub};
+use crate::scan::{BeamCounts, MAX_OPENING, MAX_SLOPE, RangeImage, RefusedBeams};
+
+/// Neighbours nearer than this say more about the noise than about the surface (metres).
+const BASELINE: f64 = 0.05;
+/// Surfaces nearer than this are none: their inverse is no number (metres).
+const NEAREST: f64 = 1e-6;
+/// How many pixels aside neighbours are looked for.
+const REACH: usize = 8;
+
+/// Values with a border of one pixel on the left and above, two on the right, one below; of a closed image the border
+/// repeats the other side.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PaddedImage {
+    pub columns: usize,
+    pub rows: usize,
+    pub stride: usize,
+    /// As in the image: a surface, 0 for nothing known, negative for free up to there. The border knows nothing.
+    pub value: Vec<f32>,
+    /// What is linear on a plane: 1 / value of a surface (the value itself where rays are parallel), else 0. The sign is
+    /// negative where this pixel, its right and lower neighbours and the one between those are not of one surface, unless
+    /// nothing at all is known of the four.
+    pub linear: Vec<f32>,
+    /// Cosine of the incidence at each pixel; empty where the weights do not ask for it.
+    pub cosine: Vec<f32>,
+    /// Colours, without border; empty where there are none.
+    pub colors: Vec<[u8; 3]>,
+}
+
+/// Which readings are used, and how far apart one surface may be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cleaning {
+    pub min_range: f64,
+    pub max_range: f64,
+    /// Neighbours that are not further apart than this are of one surface, however steep (metres).
+    pub step: f64,
+    pub weights: WeightModel,
+    pub colors: bool,
+}
+
+impl PaddedImage {
+    /// Takes an image in. Readings that are no number, too near or too far are cleaned, and counted by cause.
+    pub(super) fn fill(
+        &mut self,
+        image: &RangeImage,
+        lens: &Lens,
+        how: &Cleaning,
+    ) -> (BeamCounts, RefusedBeams) {
+        (self.columns, self.rows, self.stride) = (image.columns, image.rows, image.columns + 3);
+        let pixels = self.stride * (self.rows + 2);
+        for plane in [&mut self.value, &mut self.linear] {
+            plane.clear();
+            plane.resize(pixels, 0.0);
+        }
+        let counted = self.clean(image, lens, how);
+        self.tear(lens, how.step as f32);
+        self.cosine.clear();
+        if how.weights.parts().1 {
+            self.find_cosines(image);
+            if lens.is_closed() {
+                Self::repeat_seam(&mut self.cosine, self.stride);
+            }
+        }
+        self.colors.clear();
+        if how.colors {
+            self.colors.extend_from_slice(&image.colors);
+        }
+        counted
+    }
+
+    fn clean(&mut self, image: &RangeImage, lens: &Lens, how: &Cleaning) -> (BeamCounts, RefusedBeams) {
+        let mut refused = RefusedBeams::default();
+        let (mut hits, mut free) = (0, 0);
+        let (w, stride) = (self.columns, self.stride);
+        // Along a row the least and the most that a ray is longer than its value: whole rows need no closer look.
+        let all_fit = |row: usize, values: &[f32]| {
+            let stretch = [0, w / 2, w - 1].map(|c| lens.stretch(c, row));
+            let most = stretch.into_iter().fold(1.0, f64::max);
+            let (low, high) =
+                (how.min_range.max(NEAREST) as f32, (how.max_range / most * (1.0 - 1e-6)) as f32);
+            values.iter().all(|v| (*v == 0.0) | (v.abs() > low) & (v.abs() < high))
+        };
+        for row in 0..self.rows {
+            let from = &image.values[row * w..][..w];
+            let to = &mut self.value[(row + 1) * stride + 1..][..w];
+            if from.iter().all(|v| v.is_finite()) && all_fit(row, from) {
+                to.copy_from_slice(from);
+            } else {
+                for (column, (to, &v)) in to.iter_mut().zip(from).enumerate() {
+                    *to = clean(v, lens.stretch(column, row), how, &mut refused);
+                }
+            }
+            hits += to.iter().map(|v| u32::from(*v > 0.0)).sum::<u32>();
+            free += to.iter().map(|v| u32::from(*v < 0.0)).sum::<u32>();
+            let linear = &mut self.linear[(row + 1) * stride + 1..][..w];
+            let parallel = lens.is_parallel();
+            for (q, &v) in linear.iter_mut().zip(&*to) {
+                *q = if v > 0.0 { if parallel { v } else { 1.0 / v } } else { 0.0 };
+            }
+        }
+        if lens.is_closed() {
+            Self::repeat_seam(&mut self.value, stride);
+            Self::repeat_seam(&mut self.linear, stride);
+        }
+        let dropped = (w * self.rows) as u64 - u64::from(hits) - u64::from(free);
+        let counts =
+            BeamCounts { hit: hits.into(), max_range: free.into(), dropped, ..BeamCounts::default() };
+        (counts, refused)
+    }
+
+    /// Marks in the sign where four neighbours are not of one surface.
+    fn tear(&mut self, lens: &Lens, step: f32) {
+        let stride = self.stride;
+        let parallel = lens.is_parallel();
+        // Neighbours of one surface are not further apart than `slope` times the nearer one, and `step`.
+        let slope = |opening: f64| match (parallel, opening <= MAX_OPENING) {
+            (true, _) => (0.0, (MAX_SLOPE * opening) as f32 + step),
+            (false, true) => ((MAX_SLOPE * opening) as f32, step),
+            (false, false) => (0.0, f32::NEG_INFINITY),
+        };
+        for row in 0..=self.rows {
+            let [across, _] = lens.openings(row.saturating_sub(1).min(self.rows - 1));
+            let [_, down] = lens.openings(row.saturating_sub(1).min(self.rows - 1));
+            let ((ax, bx), (ay, by)) = (slope(across), slope(down));
+            let (v0, v1) =
+                (&self.value[row * stride..][..stride], &self.value[(row + 1) * stride..][..stride]);
+            let linear = &mut self.linear[row * stride..][..stride - 1];
+            for (i, q) in linear.iter_mut().enumerate() {
+                let (a, b, c, d) = (v0[i], v0[i + 1], v1[i], v1[i + 1]);
+                let near = |x: f32, y: f32, k: f32, s: f32| (x - y).abs() <= k * x.min(y) + s;
+                let hits = (a > 0.0) & (b > 0.0) & (c > 0.0) & (d > 0.0);
+                let whole =
+                    hits & near(a, b, ax, bx) & near(c, d, ax, bx) & near(a, c, ay, by) & near(b, d, ay, by);
+                let silent = (a == 0.0) & (b == 0.0) & (c == 0.0) & (d == 0.0);
+                *q = if whole | silent { *q } else { -*q };
+            }
+        }
+    }
+
+    fn repeat_seam(plane: &mut [f32], stride: usize) {
+        let w = stride - 3;
+        for row in plane.chunks_exact_mut(stride) {
+            row[0] = row[w];
+            row[w + 1] = row[1];
+            row[w + 2] = row[2.min(w)];
+        }
+    }
+
+    /// Cosines from the surface through the neighbours on all four sides, as far as they are of one surface.
+    fn find_cosines(&mut self, image: &RangeImage) {
+        let (w, h, stride) = (self.columns, self.rows, self.stride);
+        self.cosine.resize(self.value.len(), 1.0);
+        let value = |c: usize, r: usize| f64::from(self.value[(r + 1) * stride + c + 1]);
+        for row in 0..h {
+            for column in 0..w {
+                let v = value(column, row);
+                if v <= 0.0 {
+                    continue;
+                }
+                let here = image.point(column, row, v);
+                let neighbour = |dc: isize, dr: isize| {
+                    let mut last = None;
+                    for n in 1..=REACH as isize {
+                        let (Some(c), Some(r)) =
+                            (column.checked_add_signed(dc * n), row.checked_add_signed(dr * n))
+                        else {
+                            break;
+                        };
+                        if c >= w || r >= h || value(c, r) <= 0.0 {
+                            break;
+                        }
+                        let p = image.point(c, r, value(c, r));
+                        let far = norm(sub(p, here));
+                        // As steep as 80 degrees at most: the chord is longer than what it spans across the rays.
+                        let across = norm(sub(image.point(c, r, v), image.point(column, row, v)));
+                        if far > MAX_SLOPE * across + 0.03 {
+                            break;
+                        }
+                        last = Some(p);
+                        if far >= BASELINE {
+                            break;
+                        }
+                    }
+                    last
+                };
+                let side = |a: Option<[f64; 3]>, b: Option<[f64; 3]>| match (a, b) {
+                    (None, None) => None,
+                    (a, b) => Some(sub(a.unwrap_or(here), b.unwrap_or(here))),
+                };
+                let along = side(neighbour(1, 0), neighbour(-1, 0));
+                let down = side(neighbour(0, 1), neighbour(0, -1));
+                let ray = sub(here, image.point(column, row, 0.5 * v));
+                let cosine = match (along, down) {
+                    (Some(a), Some(b)) => {
+                        let normal =
+                            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+                        dot(normal, ray).abs() / (norm(normal) * norm(ray)).max(1e-30)
+                    }
+                    // A line of neighbours: the sine of the angle to it.
+                    (Some(a), None) | (None, Some(a)) => {
+                        let along = dot(a, ray) / (norm(a) * norm(ray)).max(1e-30);
+                        (1.0 - along * along).max(0.0).sqrt()
+                    }
+                    (None, None) => 1.0,
+                };
+                // Never quite 0: a grazing beam still knows that there is something.
+                self.cosine[(row + 1) * stride + column + 1] = cosine.clamp(0.02, 1.0) as f32;
+            }
+        }
+    }
+}
+
+/// One reading; `stretch` is the length of its ray per unit of its value.
+fn clean(v: f32, stretch: f64, how: &Cleaning, refused: &mut RefusedBeams) -> f32 {
+    let range = f64::from(v.abs()) * stretch;
+    if !v.is_finite() {
+        refused.not_finite += 1;
+        0.0
+    } else if v > 0.0 && range <= how.min_range.max(NEAREST) {
+        refused.too_near += 1;
+        0.0
+    } else if range > how.max_range {
+        -(how.max_range / stretch) as f32
+    } else {
+        v
+    }
+}

@@ -1,0 +1,406 @@
+//! The sweep for organised scans of space: every cell's centre is looked up in the range image.
+
+use super::WeightModel;
+use super::lens::{BAD_IMAGE, LANES, Lens, Window};
+use super::observe::{Centres, View, nearest, observe_block, places};
+use super::padded_image::{Cleaning, PaddedImage};
+use super::range_pyramid::RangePyramid;
+use crate::cell::{ColorObservation, Colors, Distances, Evidence};
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
+use crate::scan::{BeamCounts, RangeImage, RefusedBeams};
+
+/// How a range image becomes distances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProjectiveSettings {
+    /// Truncation tau (metres): nothing is said further behind a surface.
+    pub truncation: f64,
+    /// Weight of free space before the truncation, times that of its ray; 0: nothing is said of it.
+    pub carve_weight: f32,
+    /// How much each ray is trusted.
+    pub weights: WeightModel,
+    /// Surfaces nearer than this are not used (metres along the ray).
+    pub min_range: f64,
+    /// Surfaces further than this are not used; the space up to there is free (metres along the ray).
+    pub max_range: f64,
+}
+
+/// Why an image cannot be swept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PlanError {
+    /// It contradicts itself.
+    BadImage(&'static str),
+    /// It sees more blocks than there may be.
+    TooManyBlocks,
+}
+
+/// Gives every cell the distance at its **centre**, measured along the ray through it.
+///
+/// The centre is projected into the image. If the four pixels around it are of one surface, the range there is
+/// interpolated between them: `1 / z` linearly, which is exact on a plane. (Along a steep surface linear depths would be
+/// off by centimetres.) Else the nearest pixel speaks, of its surface no further aside than half a cell, so that nothing is
+/// drawn across gaps and thin things stay. Depths become distances along the ray, so that weights and truncation mean the
+/// same in the image's corners as in its middle.
+///
+/// Blocks are found from the other side: boxes of blocks are projected, largest first, and compared with the
+/// smallest and the largest depth that the image has there. No block that is seen can be missing.
+#[derive(Clone, Debug)]
+pub struct Projective {
+    settings: ProjectiveSettings,
+    lens: Option<Lens>,
+    image: PaddedImage,
+    pyramid: RangePyramid,
+    lattice: Lattice<3>,
+    /// Where the sensor is (world).
+    origin: [f64; 3],
+    image_from_world: [[f64; 3]; 3],
+    bounds: Option<Aabb<3>>,
+    keys: Vec<BlockKey<3>>,
+    /// Blocks whose every cell is free beyond the truncation.
+    free: Vec<bool>,
+}
+
+impl Projective {
+    /// A sweep with these settings, which has seen nothing yet.
+    pub fn new(settings: ProjectiveSettings) -> Self {
+        Self {
+            settings,
+            lens: None,
+            image: PaddedImage::default(),
+            pyramid: RangePyramid::default(),
+            lattice: Lattice::new([0.0; 3], 1.0),
+            origin: [0.0; 3],
+            image_from_world: Pose::<3>::IDENTITY.rotation,
+            bounds: None,
+            keys: Vec::new(),
+            free: Vec::new(),
+        }
+    }
+
+    /// Looks at an image, taken at a rigid pose, and finds the blocks that it says something about: no more than `most`,
+    /// no cells but those whose centre lies in `bounds` (world). Says what became of the pixels.
+    pub(crate) fn plan(
+        &mut self,
+        image: &RangeImage,
+        world_from_image: &Pose<3>,
+        lattice: &Lattice<3>,
+        bounds: Option<&Aabb<3>>,
+        (colors, most): (bool, usize),
+    ) -> Result<(BeamCounts, RefusedBeams), PlanError> {
+        self.keys.clear();
+        self.free.clear();
+        let lens = Lens::of(image).ok_or(PlanError::BadImage(BAD_IMAGE))?;
+        let tau = self.settings.truncation;
+        let cleaning = Cleaning {
+            min_range: self.settings.min_range,
+            max_range: self.settings.max_range,
+            step: (0.5 * tau).min(0.03),
+            weights: self.settings.weights,
+            colors,
+        };
+        let counted = self.image.fill(image, &lens, &cleaning);
+        if self.carves() {
+            self.pyramid.build(self.image.stride, &self.image.value, |v| [v.abs(); 2]);
+        } else {
+            let hit = |v: f32| if v > 0.0 { [v; 2] } else { [f32::INFINITY, f32::NEG_INFINITY] };
+            self.pyramid.build(self.image.stride, &self.image.value, hit);
+        }
+        self.lens = Some(lens);
+        self.lattice = *lattice;
+        self.origin = world_from_image.translation;
+        self.image_from_world = world_from_image.inverse().rotation;
+        self.bounds = bounds.copied();
+        self.find_blocks(world_from_image, most)?;
+        Ok(counted)
+    }
+
+    fn carves(&self) -> bool {
+        self.settings.carve_weight > 0.0
+    }
+
+    /// The planned blocks, ascending.
+    pub fn blocks(&self) -> &[BlockKey<3>] {
+        &self.keys
+    }
+
+    fn find_blocks(&mut self, world_from_image: &Pose<3>, most: usize) -> Result<(), PlanError> {
+        let Some(lens) = &self.lens else { return Ok(()) };
+        let whole = self.pyramid.extremes([0, self.image.columns + 2], [0, self.image.rows + 1]);
+        let farthest = f64::from(whole[1]);
+        if farthest <= 0.0 {
+            return Ok(());
+        }
+        let tau = self.settings.truncation;
+        let (low, high) = lens.reach(farthest + tau, tau);
+        let mut seen = Aabb::EMPTY;
+        for corner in 0..8 {
+            let p = std::array::from_fn(|k| if corner >> k & 1 == 0 { low[k] } else { high[k] });
+            seen.include(world_from_image.transform_point(p));
+        }
+        let mut seen = seen.grown(self.lattice.resolution);
+        if let Some(bounds) = &self.bounds {
+            for k in 0..3 {
+                seen.min[k] = seen.min[k].max(bounds.min[k]);
+                seen.max[k] = seen.max[k].min(bounds.max[k]);
+            }
+        }
+        if seen.is_empty() {
+            return Ok(());
+        }
+        let edge = self.lattice.resolution * BLOCK_EDGE as f64;
+        let block = |p: [f64; 3], k: usize| ((p[k] - self.lattice.origin[k]) / edge).floor();
+        // Indices that cells may have, with room for their neighbours.
+        const LIMIT: f64 = (1u32 << 27) as f64;
+        let first: [i64; 3] = std::array::from_fn(|k| block(seen.min, k).max(-LIMIT) as i64);
+        let last: [i64; 3] = std::array::from_fn(|k| block(seen.max, k).min(LIMIT - 1.0) as i64);
+        let span = (0..3).map(|k| last[k] - first[k] + 1).fold(i64::MIN, i64::max);
+        if (0..3).any(|k| last[k] < first[k]) {
+            return Ok(());
+        }
+        if span > 1 << 20 {
+            return Err(PlanError::TooManyBlocks);
+        }
+        let search = Search { sweep: self, lens, first, last, most };
+        let found = search.run(span);
+        if found.len() > most {
+            return Err(PlanError::TooManyBlocks);
+        }
+        self.keys.extend(found.iter().map(|&packed| {
+            let index = |k: u64| ((packed >> (1 + 20 * k)) & 0xf_ffff) as i64;
+            BlockKey([0, 1, 2].map(|k| (first[k as usize] + index(k)) as i32))
+        }));
+        self.free.extend(found.iter().map(|packed| packed & 1 == 1));
+        Ok(())
+    }
+
+    fn view<'a>(&'a self, lens: &'a Lens) -> View<'a> {
+        View {
+            lens,
+            image: &self.image,
+            truncation: self.settings.truncation as f32,
+            carve_weight: self.settings.carve_weight,
+            inverse_square: self.settings.weights.parts().0,
+            aside: 0.5 * self.lattice.resolution as f32,
+        }
+    }
+
+    /// From the lattice to the sensor in f64, then f32: near a UTM origin nothing is lost.
+    fn centres(&self, key: BlockKey<3>) -> Centres {
+        let centre = self.lattice.center(key.first_cell());
+        let offset: [f64; 3] = std::array::from_fn(|k| centre[k] - self.origin[k]);
+        let rows = &self.image_from_world;
+        Centres {
+            first: rows.map(|row| (0..3).map(|k| row[k] * offset[k]).sum::<f64>() as f32),
+            steps: std::array::from_fn(|axis| rows.map(|row| (row[axis] * self.lattice.resolution) as f32)),
+        }
+    }
+
+    /// Whether all cells of the `i`-th planned block are free beyond the truncation.
+    pub(crate) fn is_free(&self, i: usize) -> bool {
+        self.free[i]
+    }
+
+    /// The evidence about the `i`-th planned block, into `evidence`; returns for how many cells there is some.
+    pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
+        let Some(lens) = &self.lens else { return 0 };
+        let (distance, weight) = evidence.planes_mut();
+        if self.free[i] && self.settings.weights == WeightModel::Constant {
+            distance.fill(self.settings.truncation as f32);
+            weight.fill(self.settings.carve_weight);
+        } else {
+            observe_block(&self.view(lens), &self.centres(self.keys[i]), distance, weight);
+        }
+        if let Some(bounds) = &self.bounds {
+            keep_inside(&self.lattice, bounds, self.keys[i], weight);
+        }
+        evidence.observed()
+    }
+
+    /// The colours of the `i`-th planned block: those of the nearest pixels, for cells within `band` metres of the surface,
+    /// with the weight of their distances. `distances` is the block's evidence. Returns for how many cells there is one.
+    pub fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) -> usize {
+        colors.clear();
+        let Some(lens) = self.lens.as_ref().filter(|_| !self.image.colors.is_empty()) else { return 0 };
+        let near = |cell: usize| distances.weights()[cell] > 0.0 && distances.distances()[cell].abs() <= band;
+        let centres = self.centres(self.keys[i]);
+        let image = &self.image;
+        let mut found = 0;
+        for z in 0..BLOCK_EDGE {
+            if !(0..LANES).any(|l| near(z * LANES + l)) {
+                continue;
+            }
+            let seen = lens.project(&centres.layer(z));
+            let at = places(&seen.u, &seen.v, image.stride);
+            for l in (0..LANES).filter(|l| near(z * LANES + l)) {
+                let pixel = nearest(at.index[l] as usize, at.right[l], at.below[l], image.stride);
+                if image.value[pixel] > 0.0 {
+                    let (row, column) = (pixel / image.stride - 1, pixel % image.stride);
+                    let column = (column + image.columns - 1) % image.columns;
+                    let rgb = image.colors[row * image.columns + column];
+                    let weight = distances.weights()[z * LANES + l];
+                    colors.set(z * LANES + l, ColorObservation { rgb, weight });
+                    found += 1;
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Silences the cells whose centre is not inside.
+pub(super) fn keep_inside(lattice: &Lattice<3>, bounds: &Aabb<3>, key: BlockKey<3>, weight: &mut [f32]) {
+    let (low, high) = (lattice.center(key.first_cell()), lattice.center(key.cell(weight.len() - 1)));
+    if bounds.contains(low) && bounds.contains(high) {
+        return;
+    }
+    for (i, w) in weight.iter_mut().enumerate() {
+        if !bounds.contains(lattice.center(key.cell(i))) {
+            *w = 0.0;
+        }
+    }
+}
+
+/// The search for blocks, from large boxes of blocks to single ones.
+struct Search<'a> {
+    sweep: &'a Projective,
+    lens: &'a Lens,
+    first: [i64; 3],
+    last: [i64; 3],
+    most: usize,
+}
+
+/// What the image says of a box of blocks.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Class {
+    Nothing,
+    Free,
+    Mixed,
+}
+
+/// A cube of `2^level` blocks from `at`, counted from the search's first block.
+#[derive(Clone, Copy)]
+struct Node {
+    at: [i64; 3],
+    level: u32,
+}
+
+impl Node {
+    fn children(self) -> impl Iterator<Item = Self> {
+        let (level, half) = (self.level - 1, 1i64 << (self.level - 1));
+        (0..8).map(move |c| Self { at: std::array::from_fn(|k| self.at[k] + half * (c >> k & 1)), level })
+    }
+}
+
+impl Search<'_> {
+    /// Blocks as x, y, z in 20 bits each above the bit that says that all is free; in the order of keys.
+    fn run(&self, span: i64) -> Vec<u64> {
+        let level = span.max(1).ilog2() + u32::from(span.count_ones() > 1);
+        let mut nodes = vec![Node { at: [0; 3], level }];
+        // Enough parts for every core, the same ones for any number of them.
+        while nodes.len() < 256 && nodes.iter().any(|n| n.level > 2) {
+            nodes = nodes
+                .into_iter()
+                .flat_map(|n| match (n.level > 2).then(|| self.class(n)) {
+                    None => vec![n],
+                    Some(Class::Nothing) => vec![],
+                    Some(Class::Free | Class::Mixed) => n.children().collect(),
+                })
+                .collect();
+        }
+        let each = |node: &Node| {
+            let mut found = Vec::new();
+            self.descend(*node, &mut found);
+            found
+        };
+        #[cfg(feature = "parallel")]
+        let parts: Vec<Vec<u64>> = {
+            use rayon::prelude::*;
+            if rayon::current_num_threads() == 1 {
+                nodes.iter().map(each).collect()
+            } else {
+                nodes.par_iter().map(each).collect()
+            }
+        };
+        #[cfg(not(feature = "parallel"))]
+        let parts: Vec<Vec<u64>> = nodes.iter().map(each).collect();
+        let mut all = parts.concat();
+        all.sort_unstable();
+        all
+    }
+
+    fn descend(&self, node: Node, found: &mut Vec<u64>) {
+        if found.len() > self.most {
+            return;
+        }
+        match self.class(node) {
+            Class::Nothing => {}
+            Class::Free => self.all(node, found),
+            Class::Mixed if node.level == 0 => found.push(pack(node.at, false)),
+            Class::Mixed => node.children().for_each(|child| self.descend(child, found)),
+        }
+    }
+
+    fn all(&self, node: Node, found: &mut Vec<u64>) {
+        let end: [i64; 3] =
+            std::array::from_fn(|k| (node.at[k] + (1 << node.level)).min(self.last[k] - self.first[k] + 1));
+        for z in node.at[2]..end[2] {
+            for y in node.at[1]..end[1] {
+                if found.len() > self.most {
+                    return;
+                }
+                found.extend((node.at[0]..end[0]).map(|x| pack([x, y, z], true)));
+            }
+        }
+    }
+
+    fn class(&self, node: Node) -> Class {
+        let sweep = self.sweep;
+        if (0..3).any(|k| node.at[k] > self.last[k] - self.first[k]) {
+            return Class::Nothing;
+        }
+        let edge = (BLOCK_EDGE as i64) << node.level;
+        let r = sweep.lattice.resolution;
+        let offset: [f64; 3] = std::array::from_fn(|k| {
+            let cell = (self.first[k] + node.at[k]) * BLOCK_EDGE as i64;
+            (sweep.lattice.origin[k] - sweep.origin[k]) + (cell as f64 + 0.5 * edge as f64) * r
+        });
+        // The box of the centres of its cells.
+        let half = 0.5 * (edge - 1) as f64 * r;
+        let square = |v: f64| v * v;
+        let near: f64 = offset.iter().map(|o| square((o.abs() - half).max(0.0))).sum();
+        let far: f64 = offset.iter().map(|o| square(o.abs() + half)).sum();
+        let rows = &sweep.image_from_world;
+        let centre = rows.map(|row| (0..3).map(|k| row[k] * offset[k]).sum::<f64>());
+        let halves = rows.map(|row| half * (row[0].abs() + row[1].abs() + row[2].abs()));
+        let Some(window) = self.lens.window(centre, halves, near.sqrt(), far.sqrt()) else {
+            return Class::Nothing;
+        };
+        let [least, most] = self.extremes(&window);
+        let tau = sweep.settings.truncation;
+        let slack = 1e-4 * r + 1e-6 * (window.depth[1].abs() + far.sqrt());
+        if window.depth[0] > f64::from(most) + tau + slack {
+            return Class::Nothing;
+        }
+        let before = window.depth[1] < f64::from(least) - tau - slack;
+        match (before, sweep.carves()) {
+            (true, false) => Class::Nothing,
+            (true, true) if window.depth[0] >= 0.0 => Class::Free,
+            _ => Class::Mixed,
+        }
+    }
+
+    fn extremes(&self, window: &Window) -> [f32; 2] {
+        let (pyramid, columns) = (&self.sweep.pyramid, self.sweep.image.columns);
+        let [from, to] = window.columns;
+        if to <= columns + 2 {
+            return pyramid.extremes([from, to], window.rows);
+        }
+        // Past the seam: the rest is at the other end.
+        let a = pyramid.extremes([from.min(columns + 1), columns + 1], window.rows);
+        let b = pyramid.extremes([1, (to - columns).min(columns + 1)], window.rows);
+        [a[0].min(b[0]), a[1].max(b[1])]
+    }
+}
+
+fn pack(at: [i64; 3], free: bool) -> u64 {
+    ((at[2] as u64) << 41) | ((at[1] as u64) << 21) | ((at[0] as u64) << 1) | u64::from(free)
+}

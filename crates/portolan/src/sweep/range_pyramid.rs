@@ -1,0 +1,129 @@
+//! The nearest and the farthest value of any part of an image in a few reads.
+
+/// Smallest and largest values of squares of 2, 4, 8 ... pixels. Windows are looked up in the level whose squares are no
+/// more than a third of it, so that what is read is little more than the window.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RangePyramid {
+    levels: Vec<Level>,
+    used: usize,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Level {
+    columns: usize,
+    rows: usize,
+    extremes: Vec<[f32; 2]>,
+}
+
+/// Squares along either side of a window that are read.
+const SQUARES: usize = 4;
+
+impl RangePyramid {
+    /// Builds it from an image of `columns` a row, of which each value is turned into what counts as its smallest and
+    /// its largest.
+    pub(super) fn build(&mut self, columns: usize, values: &[f32], extremes: impl Fn(f32) -> [f32; 2]) {
+        let rows = values.len() / columns;
+        let first = self.level(0, columns.div_ceil(2), rows.div_ceil(2));
+        for (y, out) in first.extremes.chunks_exact_mut(columns.div_ceil(2)).enumerate() {
+            let top = &values[2 * y * columns..][..columns];
+            let bottom = values.get((2 * y + 1) * columns..(2 * y + 2) * columns).unwrap_or(top);
+            let of = |x: usize| join(extremes(top[x]), extremes(bottom[x]));
+            let pairs = columns / 2;
+            for (x, out) in out[..pairs].iter_mut().enumerate() {
+                *out = join(of(2 * x), of(2 * x + 1));
+            }
+            if columns % 2 == 1 {
+                out[pairs] = of(columns - 1);
+            }
+        }
+        self.used = 1;
+        loop {
+            let below = &self.levels[self.used - 1];
+            let (w, h) = (below.columns, below.rows);
+            if w.max(h) <= SQUARES {
+                break;
+            }
+            self.level(self.used, w.div_ceil(2), h.div_ceil(2));
+            let (fine, coarse) = self.levels.split_at_mut(self.used);
+            let (fine, coarse) = (&fine[self.used - 1], &mut coarse[0]);
+            for y in 0..coarse.rows {
+                for x in 0..coarse.columns {
+                    let (x1, y1) = ((2 * x + 1).min(w - 1), (2 * y + 1).min(h - 1));
+                    let at = |x: usize, y: usize| fine.extremes[y * w + x];
+                    coarse.extremes[y * coarse.columns + x] =
+                        join(join(at(2 * x, 2 * y), at(x1, 2 * y)), join(at(2 * x, y1), at(x1, y1)));
+                }
+            }
+            self.used += 1;
+        }
+    }
+
+    fn level(&mut self, i: usize, columns: usize, rows: usize) -> &mut Level {
+        if i == self.levels.len() {
+            self.levels.push(Level::default());
+        }
+        let level = &mut self.levels[i];
+        (level.columns, level.rows) = (columns, rows);
+        level.extremes.resize(columns * rows, [0.0; 2]);
+        level
+    }
+
+    /// Bounds of the smallest and the largest value in `columns` x `rows`, both ends included; they must lie in the image.
+    #[inline]
+    pub(super) fn extremes(&self, columns: [usize; 2], rows: [usize; 2]) -> [f32; 2] {
+        let mut k = 1;
+        let wide = |k: usize| (columns[1] >> k) - (columns[0] >> k) >= SQUARES;
+        let high = |k: usize| (rows[1] >> k) - (rows[0] >> k) >= SQUARES;
+        while k < self.used && (wide(k) || high(k)) {
+            k += 1;
+        }
+        let level = &self.levels[k - 1];
+        let mut found = [f32::INFINITY, f32::NEG_INFINITY];
+        for y in rows[0] >> k..=rows[1] >> k {
+            for e in &level.extremes[y * level.columns..][columns[0] >> k..=columns[1] >> k] {
+                found = join(found, *e);
+            }
+        }
+        found
+    }
+}
+
+#[inline(always)]
+fn join(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn bounds_hold_and_are_near(columns in 1usize..70, rows in 1usize..40, seed in any::<u32>(), w in prop::array::uniform4(0.0..1.0f64)) {
+            let values: Vec<f32> =
+                (0..columns * rows).map(|i| ((i as u32).wrapping_mul(2_654_435_761).wrapping_add(seed) >> 20) as f32).collect();
+            let mut pyramid = RangePyramid::default();
+            for _ in 0..2 {
+                pyramid.build(columns, &values, |v| [v, v]);
+            }
+            let at = |t: f64, n: usize| ((t * n as f64) as usize).min(n - 1);
+            let (mut u, mut v) = ([at(w[0], columns), at(w[1], columns)], [at(w[2], rows), at(w[3], rows)]);
+            u.sort_unstable();
+            v.sort_unstable();
+            let of = |u: [usize; 2], v: [usize; 2]| (v[0]..=v[1].min(rows - 1))
+                .flat_map(|y| (u[0]..=u[1].min(columns - 1)).map(move |x| (x, y)))
+                .fold([f32::INFINITY, f32::NEG_INFINITY], |e, (x, y)| join(e, [values[y * columns + x]; 2]));
+            let [low, high] = pyramid.extremes(u, v);
+            let [least, most] = of(u, v);
+            prop_assert!(low <= least && high >= most);
+            // No further than the window's own size around it.
+            let grown = |w: [usize; 2]| {
+                let size = (u[1] - u[0]).max(v[1] - v[0]) + 2;
+                [w[0].saturating_sub(size), w[1] + size]
+            };
+            let [least, most] = of(grown(u), grown(v));
+            prop_assert!(low >= least && high <= most);
+        }
+    }
+}
