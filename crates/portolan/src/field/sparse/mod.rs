@@ -4,6 +4,7 @@
 //! looks at, no further than an upper bound of what will be found. Nothing is computed twice, as it is where tiles
 //! with a halo are solved one by one.
 
+mod dense;
 mod kernels;
 mod min_plus;
 mod pass;
@@ -12,4 +13,5 @@ mod seeds;
 mod sparse_esdf;
 mod transform;
 
+pub use dense::DenseEsdf;
 pub use sparse_esdf::{SparseEsdf, SparseEsdfSettings};

@@ -221,10 +221,14 @@ impl Scratch {
 
     /// Puts a brick's values into the panels, from row `first` on.
     fn put(&mut self, source: &impl Source, first: usize, rows: &Rows, length: usize) {
-        for (r, row) in source.values(&mut self.brick).chunks_exact(rows.lines).enumerate() {
-            for (panel, lanes) in row.chunks(LANES).enumerate() {
-                self.rows[panel * length + first + r][..lanes.len()].copy_from_slice(lanes);
+        let Self { rows: to, brick, .. } = self;
+        for (r, row) in source.values(brick).chunks_exact(rows.lines).enumerate() {
+            let (whole, rest) = row.as_chunks::<LANES>();
+            for (panel, lanes) in whole.iter().enumerate() {
+                to[panel * length + first + r] = *lanes;
             }
+            // In the plane eight lines go through a brick.
+            to[(rows.panels - 1) * length + first + r][..rest.len()].copy_from_slice(rest);
         }
     }
 }

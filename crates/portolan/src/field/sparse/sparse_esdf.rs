@@ -36,10 +36,10 @@ impl Default for SparseEsdfSettings {
 #[derive(Clone, Debug)]
 pub struct SparseEsdf<const D: usize> {
     pub(super) lattice: Lattice<D>,
-    pub(super) max_distance: f32,
+    max_distance: f32,
     slots: FxHashMap<BlockKey<D>, u32>,
     /// In the order of slots.
-    keys: Vec<BlockKey<D>>,
+    pub(super) keys: Vec<BlockKey<D>>,
     /// Brick by brick, x fastest: metres; infinite (with the side's sign) beyond `max_distance`; NaN: unknown. Stays
     /// inside: answers are typed.
     distance: Vec<f32>,
@@ -166,19 +166,19 @@ impl<const D: usize> SparseEsdf<D> {
         Some((corners.map(|v| self.clamped(v)), saturated))
     }
 
-    fn clamped(&self, value: f32) -> f32 {
+    pub(super) fn clamped(&self, value: f32) -> f32 {
         value.clamp(-self.max_distance, self.max_distance)
     }
 
     #[inline]
-    fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
+    pub(super) fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
         let slot = *self.slots.get(&key)? as usize;
         self.distance.get(slot * block_cells::<D>()..(slot + 1) * block_cells::<D>())
     }
 
     /// The stored value of a cell; `None` where there is no brick.
     #[inline]
-    pub(super) fn value(&self, cell: [i32; D]) -> Option<f32> {
+    fn value(&self, cell: [i32; D]) -> Option<f32> {
         Some(self.brick(BlockKey::of_cell(cell))?[BlockKey::offset(cell)])
     }
 
