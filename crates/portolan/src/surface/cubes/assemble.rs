@@ -1,0 +1,228 @@
+//! Pieces of bricks joined into one mesh.
+
+use super::parallel::for_each;
+use super::piece::{Attributes, EdgeCode, Part, Piece, WORDS, bits};
+use crate::geom::BlockKey;
+use crate::surface::Mesh;
+
+/// Where nodes sit: node `i` at `origin + (i + offset) * resolution`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placement {
+    pub(super) origin: [f64; 3],
+    pub(super) resolution: f64,
+    pub(super) offset: f64,
+    /// The brick whose lower corner is the mesh's origin; `None`: the corner of the box of all bricks with a piece.
+    pub(super) first: Option<[i32; 3]>,
+}
+
+/// Pieces that one worker fills in before it asks for more.
+const TOGETHER: usize = 128;
+
+/// No piece, or no vertex.
+const NONE: u32 = u32::MAX;
+
+/// Joins pieces, which come in ascending order of keys. Every crossing belongs to the brick where its edge starts, and
+/// pieces below find it by its place there: no positions are compared.
+pub(super) fn assemble(pieces: &[(&Part, &Piece)], placement: &Placement, want: Attributes) -> Mesh {
+    let lowest = |k: usize| pieces.iter().map(|(_, p)| p.key.0[k]).min().unwrap_or(0);
+    let first = placement.first.unwrap_or_else(|| [0, 1, 2].map(lowest));
+    let owners = owners(pieces);
+    let kept = kept(pieces, &owners);
+    let joint = Joint { pieces, owners, starts: starts(pieces, &kept), kept, placement, first, want };
+    let (vertices, triangles) = joint.starts[pieces.len()];
+    let mut mesh = Mesh {
+        origin: std::array::from_fn(|k| {
+            placement.origin[k] + f64::from(first[k]) * 8.0 * placement.resolution
+        }),
+        vertices: vec![[0.0; 3]; vertices as usize],
+        triangles: vec![[0; 3]; triangles],
+        normals: vec![[0.0; 3]; if want.normals { vertices as usize } else { 0 }],
+        colors: vec![[0; 3]; if want.colors { vertices as usize } else { 0 }],
+    };
+    let (mut v, mut t) = (&mut mesh.vertices[..], &mut mesh.triangles[..]);
+    let (mut n, mut c) = (&mut mesh.normals[..], &mut mesh.colors[..]);
+    let mut places: Vec<Place> = (0..pieces.len().div_ceil(TOGETHER))
+        .map(|chunk| {
+            let (from, to) = (chunk * TOGETHER, ((chunk + 1) * TOGETHER).min(pieces.len()));
+            let count = (joint.starts[to].0 - joint.starts[from].0) as usize;
+            let triangles = joint.starts[to].1 - joint.starts[from].1;
+            Place {
+                pieces: from..to,
+                vertices: v.split_off_mut(..count).unwrap_or_default(),
+                triangles: t.split_off_mut(..triangles).unwrap_or_default(),
+                normals: n.split_off_mut(..count).unwrap_or_default(),
+                colors: c.split_off_mut(..count).unwrap_or_default(),
+            }
+        })
+        .collect();
+    for_each(&mut places, Vec::new, |numbers, place| joint.fill(place, numbers));
+    super::normals::complete(&mut mesh);
+    mesh
+}
+
+/// The vertices of a brick where not every crossing is one.
+struct Kept {
+    words: [u64; WORDS],
+    rank: [u16; WORDS],
+    count: u32,
+}
+
+/// Everything that is known before vertices and triangles are written.
+struct Joint<'a> {
+    pieces: &'a [(&'a Part, &'a Piece)],
+    /// By piece and octant: the piece of the upper neighbour.
+    owners: Vec<[u32; 8]>,
+    kept: Vec<Option<Box<Kept>>>,
+    /// First vertex and first triangle of every piece, and the totals.
+    starts: Vec<(u32, usize)>,
+    placement: &'a Placement,
+    first: [i32; 3],
+    want: Attributes,
+}
+
+/// The part of the mesh that some pieces fill.
+struct Place<'a> {
+    pieces: std::ops::Range<usize>,
+    vertices: &'a mut [[f32; 3]],
+    triangles: &'a mut [[u32; 3]],
+    normals: &'a mut [[f32; 3]],
+    colors: &'a mut [[u8; 3]],
+}
+
+impl Joint<'_> {
+    fn fill(&self, place: &mut Place, numbers: &mut Vec<u32>) {
+        let (vertex_0, triangle_0) = self.starts[place.pieces.start];
+        for i in place.pieces.clone() {
+            let (part, piece) = self.pieces[i];
+            self.number(i, numbers);
+            let (own, foreign) = (piece.own as usize, piece.foreign as usize);
+            let base = [0, 1, 2].map(|k| {
+                8.0 * (f64::from(piece.key.0[k]) - f64::from(self.first[k])) + self.placement.offset
+            });
+            let scale = self.placement.resolution;
+            let from = piece.first_vertex as usize;
+            for j in 0..own + piece.centres as usize {
+                let number = numbers[if j < own { j } else { j + foreign }];
+                if number == NONE {
+                    continue;
+                }
+                let to = (number - vertex_0) as usize;
+                let p = part.vertices[from + j];
+                place.vertices[to] = std::array::from_fn(|k| ((base[k] + f64::from(p[k])) * scale) as f32);
+                if self.want.normals {
+                    place.normals[to] = super::normals::unit(part.gradients[from + j]);
+                }
+                if self.want.colors {
+                    place.colors[to] = part.colors[from + j];
+                }
+            }
+            let from = piece.first_triangle as usize;
+            let triangles = &part.triangles[from..from + piece.triangles as usize];
+            let to = self.starts[i].1 - triangle_0;
+            for (out, t) in place.triangles[to..].iter_mut().zip(triangles) {
+                *out = t.map(|v| numbers[usize::from(v)]);
+            }
+        }
+    }
+
+    /// The mesh's numbers of a piece's vertices.
+    fn number(&self, i: usize, numbers: &mut Vec<u32>) {
+        let (part, piece) = self.pieces[i];
+        let start = self.starts[i].0;
+        numbers.clear();
+        let own = match &self.kept[i] {
+            None => {
+                numbers.extend(start..start + piece.own);
+                piece.own
+            }
+            Some(kept) => {
+                let mut next = start;
+                for (crossing, kept) in piece.crossing.iter().zip(&kept.words) {
+                    numbers.extend(bits(*crossing).map(|bit| {
+                        let is_kept = kept >> bit & 1 == 1;
+                        next += u32::from(is_kept);
+                        if is_kept { next - 1 } else { NONE }
+                    }));
+                }
+                kept.count
+            }
+        };
+        let first = piece.first_foreign as usize;
+        for &code in &part.foreign[first..first + piece.foreign as usize] {
+            let owner = self.owners[i][usize::from(code >> 11)] as usize;
+            let (word, bit) = place_of(code);
+            let (words, rank) = match &self.kept[owner] {
+                None => (&self.pieces[owner].1.crossing, &self.pieces[owner].1.rank),
+                Some(kept) => (&kept.words, &kept.rank),
+            };
+            let below = (words[word] & ((1 << bit) - 1)).count_ones();
+            numbers.push(self.starts[owner].0 + u32::from(rank[word]) + below);
+        }
+        numbers.extend(start + own..start + own + piece.centres);
+    }
+}
+
+/// Word and bit of an edge in its brick.
+fn place_of(code: EdgeCode) -> (usize, u32) {
+    (usize::from(code >> 6 & 31), u32::from(code & 63))
+}
+
+/// The upper neighbours of every piece. Keys ascend, so that one walk per octant finds them all.
+fn owners(pieces: &[(&Part, &Piece)]) -> Vec<[u32; 8]> {
+    let mut owners = vec![[NONE; 8]; pieces.len()];
+    for octant in 1..8 {
+        let mut at = 0;
+        for (i, (_, piece)) in pieces.iter().enumerate() {
+            let key = BlockKey(std::array::from_fn(|k| piece.key.0[k] + (octant >> k & 1)));
+            let order = |key: BlockKey<3>| (key.0[2], key.0[1], key.0[0]);
+            while at < pieces.len() && order(pieces[at].1.key) < order(key) {
+                at += 1;
+            }
+            if at < pieces.len() && pieces[at].1.key == key {
+                owners[i][octant as usize] = at as u32;
+            }
+        }
+    }
+    owners
+}
+
+/// Where a piece has crossings that its own cubes do not use: those that some cube uses.
+fn kept(pieces: &[(&Part, &Piece)], owners: &[[u32; 8]]) -> Vec<Option<Box<Kept>>> {
+    let kept = |(_, piece): &(&Part, &Piece)| {
+        let words = piece.used.as_deref().copied()?;
+        Some(Box::new(Kept { words, rank: [0; WORDS], count: 0 }))
+    };
+    let mut kept: Vec<Option<Box<Kept>>> = pieces.iter().map(kept).collect();
+    if kept.iter().all(Option::is_none) {
+        return kept;
+    }
+    for (i, (part, piece)) in pieces.iter().enumerate() {
+        let first = piece.first_foreign as usize;
+        for &code in &part.foreign[first..first + piece.foreign as usize] {
+            let (word, bit) = place_of(code);
+            if let Some(owner) = &mut kept[owners[i][usize::from(code >> 11)] as usize] {
+                owner.words[word] |= 1 << bit;
+            }
+        }
+    }
+    for kept in kept.iter_mut().flatten() {
+        for word in 0..WORDS {
+            kept.rank[word] = kept.count as u16;
+            kept.count += kept.words[word].count_ones();
+        }
+    }
+    kept
+}
+
+fn starts(pieces: &[(&Part, &Piece)], kept: &[Option<Box<Kept>>]) -> Vec<(u32, usize)> {
+    let (mut vertices, mut triangles) = (0usize, 0usize);
+    let mut starts = Vec::with_capacity(pieces.len() + 1);
+    for ((_, piece), kept) in pieces.iter().zip(kept) {
+        starts.push((vertices as u32, triangles));
+        vertices += (kept.as_ref().map_or(piece.own, |k| k.count) + piece.centres) as usize;
+        triangles += piece.triangles as usize;
+        assert!(vertices < NONE as usize, "a mesh has less than 2^32 vertices");
+    }
+    starts.push((vertices as u32, triangles));
+    starts
+}

@@ -1,0 +1,318 @@
+//! Meshes of dense arrays.
+
+use super::assemble::{Placement, assemble};
+use super::parallel::map;
+use super::piece::{Attributes, Numbers, Part};
+use super::samples::DenseSamples;
+use super::signs::{Layers, Signs, byte};
+use crate::geom::BlockKey;
+use crate::surface::Mesh;
+
+/// The level set of samples on a grid as triangles whose normals point to larger values.
+///
+/// `samples` are x fastest, `shape` of them along each axis; the mesh is in units of the grid with sample (0, 0, 0) at
+/// the origin. Otherwise [`marching_cubes`](super::marching_cubes): samples below the level are inside, those that are
+/// not finite were not observed; the same code does the work. O(samples), at the speed of memory where no surface is.
+///
+/// # Panics
+/// Where the length of `samples` is not the product of `shape`, or an axis has more than 2^30 samples.
+pub fn isosurface(samples: &[f32], shape: [usize; 3], level: f32, normals: bool) -> Mesh {
+    let product = shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s));
+    assert_eq!(product, Some(samples.len()), "one sample per node");
+    assert!(shape.iter().all(|&n| n <= 1 << 30), "an index of a node is an i32");
+    let want = Attributes { normals, colors: false };
+    let [nx, ny, nz] = shape.map(|n| n.div_ceil(8));
+    // Rows of bricks along x.
+    let signs = map(ny * nz, || (), |(), row| signs_of_row(samples, shape, level, [row % ny, row / ny], nx));
+    let sign = |x: usize, y: usize, z: usize| {
+        if x < nx && y < ny && z < nz { &signs[y + ny * z][x] } else { &Signs::NOTHING }
+    };
+    let parts = map(ny * nz, Numbers::new, |numbers, row| {
+        let mut part = Part::default();
+        let (y, z) = (row % ny, row / ny);
+        for x in 0..nx {
+            let octant = |o: usize| sign(x + (o & 1), y + (o >> 1 & 1), z + (o >> 2));
+            let layers = Layers::new(std::array::from_fn(octant));
+            if layers.any_crossing() {
+                let samples = DenseSamples { samples, shape, level, first: [8 * x, 8 * y, 8 * z] };
+                let key = BlockKey([x, y, z].map(|k| k as i32));
+                part.add(key, &layers, &samples, want, numbers);
+            }
+        }
+        part
+    });
+    let pieces: Vec<_> = parts.iter().flat_map(|part| part.pieces.iter().map(move |p| (part, p))).collect();
+    let placement = Placement { origin: [0.0; 3], resolution: 1.0, offset: 0.0, first: Some([0; 3]) };
+    assemble(&pieces, &placement, want)
+}
+
+/// Signs of a row of bricks.
+fn signs_of_row(
+    samples: &[f32],
+    shape: [usize; 3],
+    level: f32,
+    [by, bz]: [usize; 2],
+    nx: usize,
+) -> Vec<Signs> {
+    let mut signs = vec![Signs::NOTHING; nx];
+    for (y, z) in (0..64).map(|i| (8 * by + i % 8, 8 * bz + i / 8)) {
+        if y >= shape[1] || z >= shape[2] {
+            continue;
+        }
+        let row = &samples[(y + shape[1] * z) * shape[0]..][..shape[0]];
+        let (whole, rest) = row.as_chunks::<8>();
+        let shift = 8 * (y & 7);
+        for (signs, values) in signs.iter_mut().zip(whole) {
+            let values = values.map(|v| v - level);
+            signs.inside[z & 7] |= u64::from(byte(&values, |v| v < 0.0)) << shift;
+            signs.observed[z & 7] |= u64::from(byte(&values, f32::is_finite)) << shift;
+        }
+        for (k, v) in rest.iter().map(|v| v - level).enumerate() {
+            signs[nx - 1].inside[z & 7] |= u64::from(v < 0.0 && v.is_finite()) << (shift + k);
+            signs[nx - 1].observed[z & 7] |= u64::from(v.is_finite()) << (shift + k);
+        }
+    }
+    signs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::EdgeCounts;
+    use crate::surface::cubes::testing::{Random, bricks};
+    use crate::surface::{MeshSettings, marching_cubes};
+    use proptest::prelude::*;
+
+    fn field(shape: [usize; 3], mut value: impl FnMut([f64; 3]) -> f64) -> Vec<f32> {
+        let at = |i: usize| [i % shape[0], i / shape[0] % shape[1], i / shape[0] / shape[1]];
+        (0..shape.iter().product()).map(|i| value(at(i).map(|v| v as f64)) as f32).collect()
+    }
+
+    fn closed(mesh: &Mesh) {
+        let counts = mesh.edge_counts();
+        assert_eq!((counts.border, counts.faulty), (0, 0));
+        assert_eq!(mesh.components().0.len(), mesh.vertices.len());
+        let mut used = vec![false; mesh.vertices.len()];
+        mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        assert!(used.iter().all(|&u| u), "a vertex without triangle");
+    }
+
+    #[test]
+    fn a_sphere_is_a_sphere() {
+        let shape = [37, 40, 33];
+        let samples = field(shape, |p| {
+            ((p[0] - 18.2).powi(2) + (p[1] - 19.1).powi(2) + (p[2] - 16.4).powi(2)).sqrt() - 13.3
+        });
+        let mesh = isosurface(&samples, shape, 0.0, true);
+        closed(&mesh);
+        assert_eq!((mesh.euler_characteristic(), mesh.components().1), (2, 1));
+        // The chords of cells of 1 at radius 13.3 lie up to 1/(8 r) * 3 inside.
+        assert!((mesh.area() / (4.0 * std::f64::consts::PI * 13.3 * 13.3) - 1.0).abs() < 0.005);
+        assert!((mesh.volume() / (4.0 / 3.0 * std::f64::consts::PI * 13.3f64.powi(3)) - 1.0).abs() < 0.005);
+        for (i, n) in mesh.normals.iter().enumerate() {
+            let p = mesh.vertex_world(i);
+            let out = [p[0] - 18.2, p[1] - 19.1, p[2] - 16.4].map(|v| v / 13.3);
+            let cosine: f64 = (0..3).map(|k| out[k] * f64::from(n[k])).sum();
+            assert!(cosine > 0.998, "{cosine}");
+        }
+        // Another level is another sphere.
+        let larger = isosurface(&samples, shape, 1.5, false);
+        assert!((larger.area() / (4.0 * std::f64::consts::PI * 14.8 * 14.8) - 1.0).abs() < 0.005);
+    }
+
+    #[test]
+    fn a_torus_has_a_hole() {
+        let shape = [50, 48, 20];
+        let samples = field(shape, |p| {
+            let ring = (p[0] - 24.6).hypot(p[1] - 23.7) - 15.2;
+            ring.hypot(p[2] - 9.9) - 5.1
+        });
+        let mesh = isosurface(&samples, shape, 0.0, false);
+        closed(&mesh);
+        assert_eq!((mesh.euler_characteristic(), mesh.components().1), (0, 1));
+        let area = 4.0 * std::f64::consts::PI.powi(2) * 15.2 * 5.1;
+        assert!((mesh.area() / area - 1.0).abs() < 0.01);
+    }
+
+    /// The gyroid has genus 3 per primitive cell, which is half of the cubic one: characteristic -8 per cubic cell.
+    /// On a torus of one cell, made by joining the vertices at opposite sides, all of it is there.
+    #[test]
+    fn a_gyroid_has_genus_five_per_cell() {
+        let n = 24;
+        let shape = [n + 1; 3];
+        let samples = field(shape, |p| {
+            // One period; opposite sides get the same bits.
+            let [x, y, z] = p.map(|v| std::f64::consts::TAU * ((v % n as f64) + 0.1) / n as f64);
+            x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos()
+        });
+        let mesh = isosurface(&samples, shape, 0.0, false);
+        assert_eq!(mesh.edge_counts().faulty, 0);
+        // Vertices of opposite sides become one.
+        let wrapped =
+            |v: [f32; 3]| v.map(|c| if c >= n as f32 { (c - n as f32).to_bits() } else { c.to_bits() });
+        let mut names = std::collections::HashMap::new();
+        let number: Vec<u32> = mesh
+            .vertices
+            .iter()
+            .map(|v| {
+                let next = names.len() as u32;
+                *names.entry(wrapped(*v)).or_insert(next)
+            })
+            .collect();
+        let joined = Mesh {
+            vertices: vec![[0.0; 3]; names.len()],
+            triangles: mesh.triangles.iter().map(|t| t.map(|v| number[v as usize])).collect(),
+            ..Mesh::default()
+        };
+        closed(&joined);
+        assert_eq!(joined.euler_characteristic(), -8);
+    }
+
+    /// Noise in a box of positive values: nothing is open, whatever the topology.
+    fn noise(seed: u64, n: usize, zeros: bool) -> Vec<f32> {
+        let mut random = Random(seed);
+        field([n; 3], |p| {
+            let v = f64::from(random.value());
+            let v = if zeros && v.abs() < 0.3 { 0.0 } else { v };
+            if p.iter().any(|&c| c == 0.0 || c == (n - 1) as f64) { 1.0 } else { v }
+        })
+    }
+
+    #[test]
+    fn noise_is_a_closed_manifold() {
+        for seed in 0..6 {
+            let mesh = isosurface(&noise(seed, 27, seed % 2 == 1), [27; 3], 0.0, true);
+            closed(&mesh);
+            assert!(mesh.triangles.len() > 20_000);
+            assert!(mesh.vertices.iter().flatten().all(|v| v.is_finite()));
+            // Around every vertex the triangles are one ring: as many corners as there are edges.
+            let mut degree = vec![0i64; mesh.vertices.len()];
+            mesh.triangles.iter().flatten().for_each(|&v| degree[v as usize] += 1);
+            assert!(degree.iter().all(|&d| d >= 3));
+        }
+    }
+
+    #[test]
+    fn zeros_at_nodes_make_no_degenerate_triangles() {
+        // Planes, a cone's tip and a cross of zeros, all through nodes.
+        for value in [
+            (|p: [f64; 3]| p[0] - 8.0) as fn([f64; 3]) -> f64,
+            |p| 8.0 - p[1],
+            |p| (p[0] - 8.0) * (p[1] - 8.0),
+            |p| (p[0] - 8.0).hypot(p[1] - 8.0) - (p[2] - 8.0).abs(),
+            |p| (p[0] - 8.0).abs() + (p[1] - 8.0).abs() + (p[2] - 8.0).abs() - 4.0,
+        ] {
+            let mesh = isosurface(&field([17; 3], value), [17; 3], 0.0, true);
+            assert_eq!(mesh.edge_counts().faulty, 0);
+            assert!(!mesh.triangles.is_empty());
+            for t in &mesh.triangles {
+                let n = mesh.area_normal(*t);
+                assert!(n.iter().map(|v| v * v).sum::<f64>() > 1e-10, "a triangle without area");
+            }
+            assert!(mesh.normals.iter().flatten().all(|v| v.is_finite()));
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_a_hole() {
+        let shape = [20; 3];
+        let samples = field(shape, |p| match p[0] as usize {
+            5 if p[1] == 5.0 => f64::NAN,
+            9 if p[1] == 9.0 => f64::INFINITY,
+            14 if p[1] == 14.0 => f64::NEG_INFINITY,
+            _ => p[2] - 9.5,
+        });
+        let mesh = isosurface(&samples, shape, 0.0, true);
+        assert_eq!(mesh.edge_counts().faulty, 0);
+        assert_eq!(mesh.triangles.len(), 2 * (19 * 19 - 3 * 4));
+        assert!(mesh.vertices.iter().all(|v| v[2] == 9.5));
+    }
+
+    #[test]
+    fn empty_and_flat_arrays_have_no_surface() {
+        for shape in [[0, 3, 3], [1, 9, 9], [1, 1, 1], [9, 1, 9]] {
+            let n = shape.iter().product();
+            let samples: Vec<f32> = (0..n).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+            let mesh = isosurface(&samples, shape, 0.0, true);
+            assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (0, 0));
+        }
+    }
+
+    /// Counts that do not depend on how the axes are named.
+    fn counts(mesh: &Mesh) -> (EdgeCounts, usize, usize, Vec<[u32; 3]>) {
+        let mut vertices: Vec<_> = mesh.vertices.iter().map(|v| v.map(f32::to_bits)).collect();
+        vertices.sort_unstable();
+        (mesh.edge_counts(), mesh.triangles.len(), mesh.components().1, vertices)
+    }
+
+    proptest! {
+        #[test]
+        fn axes_can_be_exchanged(seed: u64, turn in 0..6usize) {
+            let n = 11;
+            let samples = noise(seed, n, false);
+            let axes = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]][turn];
+            let turned = field([n; 3], |p| {
+                let q: [usize; 3] = std::array::from_fn(|k| p[axes[k]] as usize);
+                f64::from(samples[q[0] + n * (q[1] + n * q[2])])
+            });
+            let mut mesh = isosurface(&samples, [n; 3], 0.0, false);
+            let (edges, triangles, components, _) = counts(&mesh);
+            mesh.vertices.iter_mut().for_each(|v| {
+                let old = *v;
+                (0..3).for_each(|k| v[axes[k]] = old[k]);
+            });
+            let other = isosurface(&turned, [n; 3], 0.0, false);
+            prop_assert_eq!((edges, triangles, components), { let c = counts(&other); (c.0, c.1, c.2) });
+            prop_assert!((mesh.volume().abs() - other.volume().abs()).abs() < 0.02 * mesh.volume().abs());
+        }
+
+        #[test]
+        fn an_axis_can_be_turned_round(seed: u64, axis in 0..3usize) {
+            let n = 11;
+            let samples = noise(seed, n, false);
+            let turned = field([n; 3], |p| {
+                let mut q = p.map(|v| v as usize);
+                q[axis] = n - 1 - q[axis];
+                f64::from(samples[q[0] + n * (q[1] + n * q[2])])
+            });
+            let (mesh, other) = (isosurface(&samples, [n; 3], 0.0, false), isosurface(&turned, [n; 3], 0.0, false));
+            prop_assert_eq!((mesh.edge_counts(), mesh.components().1), (other.edge_counts(), other.components().1));
+            prop_assert!((mesh.area() - other.area()).abs() < 0.02 * mesh.area());
+        }
+
+        #[test]
+        fn bricks_and_arrays_give_one_mesh(seed: u64, first in prop::array::uniform3(-20..20i32)) {
+            let n = 19;
+            let samples = noise(seed, n, seed % 2 == 0);
+            let lattice = crate::geom::Lattice::new([0.0; 3], 1.0);
+            let index = |c: [i32; 3]| (0..3).rev().fold(0, |i, k| i * n + (c[k] - first[k]) as usize);
+            let store = bricks(lattice, first, [n; 3], |c| samples[index(c)]);
+            let settings = MeshSettings { normals: false, ..Default::default() };
+            let (dense, sparse) = (isosurface(&samples, [n; 3], 0.0, false), marching_cubes(&store, None, &settings));
+            // As sets of triangles, each from its lowest corner on. A corner is named by the place that it is in, which
+            // the margin at nodes keeps unique: the cell, and the axes along which it is between nodes.
+            let set = |mesh: &Mesh, offset: [f64; 3]| {
+                let corner = |v: u32| {
+                    let p = mesh.vertex_world(v as usize);
+                    std::array::from_fn::<i64, 3, _>(|k| {
+                        let c = p[k] - offset[k];
+                        let near = (c - c.round()).abs() < 1e-4;
+                        if near { 2 * c.round() as i64 } else { 2 * c.floor() as i64 + 1 }
+                    })
+                };
+                let mut all: Vec<_> = mesh.triangles.iter().map(|t| {
+                    let mut t = t.map(corner);
+                    let low = (0..3).min_by_key(|&k| (t[k], t[(k + 1) % 3])).unwrap_or(0);
+                    t.rotate_left(low);
+                    t
+                }).collect();
+                all.sort_unstable();
+                all
+            };
+            prop_assert_eq!(dense.vertices.len(), sparse.vertices.len());
+            let offset = first.map(|v| f64::from(v) + 0.5);
+            prop_assert!(set(&dense, [0.0; 3]) == set(&sparse, offset));
+            prop_assert!((dense.area() - sparse.area()).abs() < 1e-5 * dense.area());
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! Marching cubes: triangles with the topology of the trilinear level set, brick by brick.
+//!
+//! | file | step |
+//! |---|---|
+//! | `signs` | the signs of a brick as bits; cubes and edges with surface by shifts |
+//! | `numbering`, `loops`, `patch`, `tunnel`, `table` | what one cube looks like |
+//! | `samples`, `piece` | the vertices and triangles of one brick |
+//! | `assemble`, `normals` | pieces joined into a mesh |
+//! | `extract`, `dense` | from bricks of distances, from arrays |
+
+mod assemble;
+mod dense;
+mod extract;
+mod loops;
+mod normals;
+mod numbering;
+mod parallel;
+mod patch;
+mod piece;
+mod samples;
+mod signs;
+mod table;
+#[cfg(test)]
+mod testing;
+mod tunnel;
+
+pub use dense::isosurface;
+pub use extract::{MeshSettings, marching_cubes};
