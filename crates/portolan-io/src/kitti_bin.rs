@@ -40,6 +40,17 @@ pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
     Ok(builder.finish())
 }
 
+/// Whether a file, which has no magic, may be a scan: by its length, and by its first numbers, which are metres.
+pub(crate) fn may_be_scan(path: &Path) -> bool {
+    let whole = std::fs::metadata(path).is_ok_and(|m| m.len() > 0 && m.len() % STRIDE as u64 == 0);
+    let head = || open(path).and_then(|mut input| input.read_up_to(4096)).unwrap_or_default();
+    whole && {
+        let head = head();
+        let mut values = head.chunks_exact(4).map(|b| Scalar::F32.read(b, Endian::Little).abs());
+        values.clone().any(|v| v > 1e-3) && values.all(|v| v == 0.0 || (1e-12..1e4).contains(&v))
+    }
+}
+
 /// Writes a scan; points without an intensity get 0. The offset is added, in `f32`.
 ///
 /// # Errors

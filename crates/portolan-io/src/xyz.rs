@@ -102,6 +102,16 @@ pub(crate) fn parse(input: Input) -> Result<PointCloudFile, IoError> {
     Ok(builder.finish())
 }
 
+/// Whether the first lines of a file are points: at least two.
+pub(crate) fn may_be_points(path: &Path) -> bool {
+    let head = open(path).and_then(|mut input| input.read_up_to(4096)).unwrap_or_default();
+    // The last line may be cut.
+    let whole =
+        if head.len() < 4096 { head.len() } else { head.iter().rposition(|b| *b == b'\n').unwrap_or(0) };
+    let lines = std::io::Cursor::new(head[..whole].to_vec());
+    Input::from_reader(lines, path).and_then(parse).is_ok_and(|cloud| cloud.points.len() >= 2)
+}
+
 /// What stands before a comment, and the comment without its mark.
 fn split_comment(line: &[u8]) -> (&[u8], &[u8]) {
     // A byte order mark, as spreadsheets write it.

@@ -23,6 +23,6 @@ mod read;
 mod tests;
 mod write;
 
-pub(crate) use read::parse;
 pub use read::read_pcd;
+pub(crate) use read::{parse, read_viewpoint};
 pub use write::write_pcd;

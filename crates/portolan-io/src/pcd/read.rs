@@ -8,10 +8,12 @@ use super::lzf;
 use crate::IoError;
 use crate::bytes::{Input, Scalar, fields, open, parse_f64};
 use crate::error::shown;
-use crate::points::{CloudBuilder, PointCloudFile, channel, is_time, time_unit};
+use crate::points::{CloudBuilder, PointCloudFile, Viewpoint, channel, is_time, time_unit};
 
 /// The most bytes of a file.
 const MOST_BYTES: u64 = 4 << 30;
+/// A header is no longer than this (bytes).
+const LONGEST_HEADER: u64 = 64 << 10;
 
 /// Reads a PCD file, plain or packed by gzip or bzip2. Points are in the file's frame: the viewpoint is reported, not applied.
 /// Points that are NaN are no reading in an organised cloud, and refused in others.
@@ -20,6 +22,12 @@ const MOST_BYTES: u64 = 4 << 30;
 /// [`IoError::Text`] for a wrong header or a wrong line, [`IoError::Binary`] for a body that is too short or damaged.
 pub fn read_pcd(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
     parse(open(path)?)
+}
+
+/// The viewpoint in a file's header.
+pub(crate) fn read_viewpoint(path: &Path) -> Result<Option<Viewpoint>, IoError> {
+    let head = open(path)?.read_up_to(LONGEST_HEADER)?;
+    Ok(header::parse(&head, path)?.viewpoint)
 }
 
 pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {

@@ -17,5 +17,13 @@ pub use cloud::read_ply_cloud;
 pub use mesh::{PlyMesh, read_ply_mesh};
 pub use write::write_ply_cloud;
 
+/// Whether a file is a PLY with faces: a mesh.
+pub(crate) fn has_faces(path: &std::path::Path) -> bool {
+    let head = crate::bytes::open(path).and_then(|mut input| input.read_up_to(64 << 10));
+    let header = head.and_then(|head| header::parse(&head, path));
+    let is_face = |e: &header::Element| matches!(e.name.as_str(), "face" | "tristrips") && e.count > 0;
+    header.is_ok_and(|h| h.elements.iter().any(is_face))
+}
+
 /// The most bytes of a file.
 const MOST_BYTES: u64 = 4 << 30;

@@ -56,12 +56,20 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
 ///
 /// # Errors
 /// As [`read_points`].
-pub fn parse_points(mut input: Input) -> Result<PointCloudFile, IoError> {
+pub fn parse_points(input: Input) -> Result<PointCloudFile, IoError> {
+    parse_as(input, None)
+}
+
+/// [`read_points`] in a format that is known.
+pub(crate) fn read_points_as(path: &Path, format: Option<PointFormat>) -> Result<PointCloudFile, IoError> {
+    parse_as(open(path)?, format)
+}
+
+fn parse_as(mut input: Input, format: Option<PointFormat>) -> Result<PointCloudFile, IoError> {
     let path = input.path().to_owned();
-    let head = input.fill_buf().map(<[u8]>::to_vec);
     // A failure to read will come again, with its place.
-    let head = head.unwrap_or_default();
-    match point_format(&path, &head) {
+    let head = input.fill_buf().map(<[u8]>::to_vec).unwrap_or_default();
+    match format.or_else(|| point_format(&path, &head)) {
         Some(PointFormat::Pcd) => pcd::parse(input),
         Some(PointFormat::Ply) => ply::parse(input),
         Some(PointFormat::KittiBin) => kitti_bin::parse(input),

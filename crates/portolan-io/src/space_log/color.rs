@@ -13,8 +13,11 @@ use crate::IoError;
 
 /// Reads a colour picture, row by row. It must have `size` (columns and rows).
 pub(super) fn read_color(path: &Path, size: [usize; 2]) -> Result<Vec<[u8; 3]>, IoError> {
-    let bytes = read_picture(path)?;
-    match Picture::open(path, &bytes)? {
+    decode_color(path, &read_picture(path)?, size)
+}
+
+fn decode_color(path: &Path, bytes: &[u8], size: [usize; 2]) -> Result<Vec<[u8; 3]>, IoError> {
+    match Picture::open(path, bytes)? {
         Picture::Jpeg(mut decoder) => {
             check_size(path, jpeg_size(path, &decoder)?, size)?;
             read_jpeg(path, &mut decoder, size)
@@ -152,15 +155,12 @@ fn read_png(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::{GREY_JPEG, RED_JPEG, bytes_of, png_of, write};
+    use crate::space_log::testing::{GREY_JPEG, RED_JPEG, bytes_of, png_of};
     use crate::testing::bad_bytes;
     use png::BitDepth;
 
     fn read(bytes: &[u8], size: [usize; 2]) -> Result<Vec<[u8; 3]>, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("c");
-        write(&path, bytes);
-        read_color(&path, size)
+        decode_color("c".as_ref(), bytes, size)
     }
 
     #[test]

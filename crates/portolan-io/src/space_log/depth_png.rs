@@ -27,8 +27,11 @@ pub(super) struct Depth {
 
 /// Reads a depth image of so many units per metre. The values 0 and 65535 are no reading.
 pub(super) fn read_depth(path: &Path, units_per_metre: f64) -> Result<Depth, IoError> {
-    let bytes = read_picture(path)?;
-    let mut reader = png_reader(path, &bytes)?;
+    decode_depth(path, &read_picture(path)?, units_per_metre)
+}
+
+fn decode_depth(path: &Path, bytes: &[u8], units_per_metre: f64) -> Result<Depth, IoError> {
+    let mut reader = png_reader(path, bytes)?;
     let [columns, rows] = depth_size(path, reader.info(), bytes.len())?;
     let mut raw = vec![0; columns * rows * 2];
     reader.next_frame(&mut raw).map_err(|e| damaged(path, &e.to_string()))?;
@@ -99,14 +102,11 @@ pub(super) fn size_within_limits(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::{grey_png, png_of, write};
+    use crate::space_log::testing::{grey_png, png_of};
     use crate::testing::bad_bytes;
 
     fn read(bytes: &[u8]) -> Result<Depth, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("d.png");
-        write(&path, bytes);
-        read_depth(&path, 1000.0)
+        decode_depth("d.png".as_ref(), bytes, 1000.0)
     }
 
     #[test]

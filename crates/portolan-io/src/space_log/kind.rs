@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::parts::Parts;
-use super::{SpaceLogOptions, bigbird, redwood, seven_scenes, tum_rgbd};
+use super::{SpaceLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
 use crate::IoError;
 
 /// A kind of log of scans of space.
@@ -18,6 +18,14 @@ pub enum SpaceLogKind {
     BigBird,
     /// A folder `depth` of pictures with a trajectory (Redwood, Open3D) or with poses in a folder `pose` (ScanNet).
     Redwood,
+    /// A folder `velodyne` of `.bin` scans with `poses.txt` and `calib.txt` (KITTI, SemanticKITTI).
+    Kitti,
+    /// A `.conf` file with range scans in PLY files (Stanford), or its folder.
+    Stanford,
+    /// A scan graph of OctoMap.
+    ScanGraph,
+    /// A folder of PCD, PLY, `.bin` or text files with a file of poses, or of PCD files in the world's frame; a single cloud.
+    Clouds,
 }
 
 /// What the crate knows of a kind.
@@ -31,7 +39,16 @@ struct Format {
 
 impl SpaceLogKind {
     /// All kinds, in the order in which they are tried.
-    pub const ALL: [Self; 4] = [Self::SevenScenes, Self::TumRgbd, Self::BigBird, Self::Redwood];
+    pub const ALL: [Self; 8] = [
+        Self::SevenScenes,
+        Self::TumRgbd,
+        Self::BigBird,
+        Self::Redwood,
+        Self::Kitti,
+        Self::Stanford,
+        Self::ScanGraph,
+        Self::Clouds,
+    ];
 
     fn format(self) -> Format {
         match self {
@@ -59,6 +76,27 @@ impl SpaceLogKind {
                 is_it: redwood::is_it,
                 open: redwood::open,
             },
+            Self::Kitti => Format {
+                word: "kitti",
+                label: "lidar scans with poses (KITTI)",
+                is_it: kitti::is_it,
+                open: kitti::open,
+            },
+            Self::Stanford => Format {
+                word: "stanford",
+                label: "range scans with a .conf file (Stanford)",
+                is_it: stanford::is_it,
+                open: stanford::open,
+            },
+            Self::ScanGraph => Format {
+                word: "scan-graph",
+                label: "scan graph (OctoMap)",
+                is_it: graph::is_it,
+                open: graph::open,
+            },
+            Self::Clouds => {
+                Format { word: "clouds", label: "clouds of points", is_it: clouds::is_it, open: clouds::open }
+            }
         }
     }
 

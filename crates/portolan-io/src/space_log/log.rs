@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use portolan::geom::vector::distance;
 use portolan::geom::{Aabb, Pose};
 use portolan::scan::Frame;
 
@@ -124,6 +125,13 @@ impl SpaceLog {
         &self.entries[i].world_from_sensor
     }
 
+    /// Where the sensor stood in the world when it took scan `i` (metres). Not always the pose's translation: clouds that are
+    /// in the world's frame already have the identity as their pose. Panics where there is no such scan.
+    pub fn sensor_position(&self, i: usize) -> [f64; 3] {
+        let entry = &self.entries[i];
+        entry.world_from_sensor.transform_point(self.source.origin(entry.place))
+    }
+
     /// The stamp of scan `i` (seconds of some clock), if there is one. Panics where there is no such scan.
     pub fn time(&self, i: usize) -> Option<f64> {
         self.entries[i].time
@@ -150,13 +158,13 @@ impl SpaceLog {
     /// The box of the sensor's positions (metres).
     pub fn extent(&self) -> Aabb<3> {
         let mut all = Aabb::EMPTY;
-        self.entries.iter().for_each(|e| all.include(e.world_from_sensor.translation));
+        (0..self.len()).for_each(|i| all.include(self.sensor_position(i)));
         all
     }
 
     /// The length of the way from scan to scan (metres).
     pub fn path_length(&self) -> f64 {
-        self.entries.windows(2).map(|w| w[0].world_from_sensor.translation_to(&w[1].world_from_sensor)).sum()
+        (1..self.len()).map(|i| distance(self.sensor_position(i - 1), self.sensor_position(i))).sum()
     }
 
     /// The first and the last stamp (seconds), where every scan has one.

@@ -3,6 +3,10 @@
 //! | kind | layout | poses |
 //! |---|---|---|
 //! | [`SevenScenes`](SpaceLogKind::SevenScenes) | `frame-NNNNNN.depth.png`, `.color.jpg` or `.color.png` | `frame-NNNNNN.pose.txt` |
+//! | [`Kitti`](SpaceLogKind::Kitti) | `velodyne/*.bin`, `times.txt` | `poses.txt` of the camera, `Tr` of `calib.txt` |
+//! | [`Stanford`](SpaceLogKind::Stanford) | PLY files with a `range_grid` | `.conf`: conjugated quaternions |
+//! | [`ScanGraph`](SpaceLogKind::ScanGraph) | a `.graph` file | in the file |
+//! | [`Clouds`](SpaceLogKind::Clouds) | `*.pcd`, `*.ply`, `*.bin` or `*.xyz`; one such file | a file like `*pose*.csv`, or none: PCD viewpoints |
 //! | [`TumRgbd`](SpaceLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
 //! | [`Redwood`](SpaceLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
 //! | [`BigBird`](SpaceLogKind::BigBird) | `masked_depth/frameF_camC.png` | `pose/poses.txt` |
@@ -14,19 +18,27 @@
 //! scans and where their poses are, and a kind in `kind.rs`. Matching poses with scans, conventions, mending and refusing
 //! happen once, in `log.rs`.
 
+mod agreement;
 mod bigbird;
+mod cloud_frames;
+mod clouds;
 mod color;
 mod depth_frames;
 mod depth_png;
 mod files;
+mod graph;
 mod intrinsics;
 mod kind;
+mod kitti;
+#[cfg(test)]
+mod lidar_tests;
 mod log;
 mod matching;
 mod options;
 mod parts;
 mod redwood;
 mod seven_scenes;
+mod stanford;
 mod stats;
 #[cfg(test)]
 mod testing;

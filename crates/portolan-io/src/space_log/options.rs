@@ -14,6 +14,9 @@ pub struct SpaceLogOptions {
     pub poses: Option<PathBuf>,
     /// What the numbers of the poses mean; default: what the format says, and world from sensor for `poses`.
     pub pose_convention: Option<PoseConvention>,
+    /// Where rays begin in the frame of a cloud's points (metres), for lidars whose zero is not the sensor and for single clouds
+    /// in the world's frame; default: the viewpoint of a PCD file where points are in the world's frame, else zero.
+    pub origin: Option<[f64; 3]>,
     /// The camera instead of what the layout has.
     pub intrinsics: Option<Intrinsics>,
     /// Units of a depth image per metre (1000: millimetres); default: what the format says.
@@ -30,6 +33,7 @@ impl Default for SpaceLogOptions {
             format: None,
             poses: None,
             pose_convention: None,
+            origin: None,
             intrinsics: None,
             depth_scale: None,
             color: true,

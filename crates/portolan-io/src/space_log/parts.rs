@@ -13,6 +13,11 @@ use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
 pub(crate) trait FrameSource: Send + Sync {
     /// Scan `i` of those that the format found.
     fn frame(&self, i: usize) -> Result<Frame, IoError>;
+
+    /// Where the sensor stood in the frame of scan `i` (metres): not in its zero where clouds are in the world's frame.
+    fn origin(&self, _i: usize) -> [f64; 3] {
+        [0.0; 3]
+    }
 }
 
 /// A scan that was found but not read.

@@ -206,7 +206,7 @@ mod tests {
         for name in ["frame-000003.pose.txt", "frame-000000.depth.png", "camera-intrinsics.txt"] {
             let path = folder.path().join(name);
             let good = std::fs::read(&path).unwrap();
-            for bytes in bad_bytes(&good, 7, 300) {
+            for bytes in bad_bytes(&good, 7, 60) {
                 std::fs::write(&path, bytes).unwrap();
                 let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default());
                 let all =
