@@ -304,8 +304,6 @@ impl SparseTsdf {
         if !self.watched.is_empty() {
             self.events = look(&sweep, &self.watched, &self.distances, &self.rule);
         }
-            eprintln!("blocks {}", sweep.blocks().len());
-        }
         let cells = block_cells::<3>();
         let others = self.colors.as_ref().map_or(0, Store::memory_bytes);
         self.distances.set_limit(self.limit.saturating_sub(others));
