@@ -8,7 +8,6 @@ mod repr;
 mod sparse_error;
 mod sparse_occupancy;
 mod sparse_tsdf;
-mod sparse_occupancy;
 mod tree_map;
 mod tsdf;
 

@@ -20,7 +20,6 @@ mod padded_image;
 mod point_rays;
 mod projective;
 mod range_pyramid;
-pub(crate) mod occupancy;
 mod rays;
 mod touched;
 mod weight;
