@@ -102,6 +102,14 @@ pub(crate) fn bounds(text: &str) -> Result<Bounds, String> {
     }
 }
 
+/// `x,y,z` in metres.
+pub(crate) fn point3(text: &str) -> Result<[f64; 3], String> {
+    match numbers(text)?[..] {
+        [x, y, z] => Ok([x, y, z]),
+        _ => Err("must be three numbers x,y,z in metres".to_owned()),
+    }
+}
+
 /// `x0,y0,z0,x1,y1,z1` in metres.
 pub(crate) fn box3(text: &str) -> Result<Aabb<3>, String> {
     match bounds(text) {

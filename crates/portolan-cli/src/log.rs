@@ -10,7 +10,7 @@ use portolan_io::poses3::PoseConvention;
 use portolan_io::space_log::{Intrinsics, SpaceLog, SpaceLogKind, SpaceLogOptions};
 use portolan_io::{CarmenLog, FileKind, detect, detect_no_return, read_poses_2d};
 
-use crate::arguments::{length, length_or_zero};
+use crate::arguments::{length, length_or_zero, point3};
 
 /// Kinds of logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +52,9 @@ pub(crate) struct LogArgs {
     /// sensor-from-world, transposed-rotation (Stanford, BigBIRD), column-major, opengl-camera
     #[arg(long, value_name = "WORD", value_parser = pose_convention)]
     pub(crate) pose_convention: Option<PoseConvention>,
+    /// Clouds: where rays begin in the frame of the points, x,y,z (metres), where it is not zero or the file's viewpoint
+    #[arg(long, value_name = "POINT", value_parser = point3, allow_hyphen_values = true)]
+    pub(crate) origin: Option<[f64; 3]>,
     /// Depth images: the camera, fx,fy,cx,cy (pixels) or a file
     #[arg(long, value_name = "CAMERA")]
     pub(crate) intrinsics: Option<String>,
@@ -111,6 +114,7 @@ pub(crate) fn read_space(path: &Path, args: &LogArgs, color: bool) -> anyhow::Re
         format: args.format.and_then(|f| if let LogFormat::Space(kind) = f { Some(kind) } else { None }),
         poses: args.poses.clone(),
         pose_convention: args.pose_convention,
+        origin: args.origin,
         intrinsics: args.intrinsics.as_deref().map(Intrinsics::from_word),
         depth_scale: args.depth_scale,
         color,

@@ -15,8 +15,8 @@ pub use cloud::Cloud;
 pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
-pub use sparse_tsdf::{PointSweep, SparseTsdf, SparseTsdfConfig};
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
+pub use sparse_tsdf::{PointSweep, SparseTsdf, SparseTsdfConfig};
 pub use tree_map::{Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 
