@@ -46,7 +46,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let mut fusion = fuse(&mut maps, &log, &fused, &settings.filter, (memory, threads), &progress);
     drop(progress);
     watch.stage("fuse");
-    if let (0, Some(error)) = (fusion.stats.scans, fusion.unreadable.1.take()) {
+    if fusion.stats.scans == 0
+        && let Some(error) = fusion.unreadable.1.take()
+    {
         // Not one frame could be used: the reader's own error tells more than an empty map.
         return Err(error.into());
     }

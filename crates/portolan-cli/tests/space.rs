@@ -1,0 +1,197 @@
+//! `map` and what comes after it, on logs of the simulated Building.
+
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
+
+mod support;
+
+use std::path::{Path, PathBuf};
+
+use portolan_io::{LogLayout, LogWriter};
+use portolan_sim::space::{BuildingConfig, DepthCamera, SpaceLidar, SpaceSensor, building};
+use support::{arg, fail, json, succeed};
+use tempfile::TempDir;
+
+/// A short walk with a small lidar, as KITTI has it.
+fn lidar_log() -> (TempDir, PathBuf) {
+    let lidar = SpaceLidar { rings: 24, columns: 360, ..SpaceLidar::default() };
+    written(
+        SpaceSensor::Lidar(lidar),
+        6,
+        LogLayout::Kitti { camera_from_lidar: portolan::geom::Pose::IDENTITY },
+    )
+}
+
+/// A short walk with a small depth camera, as 7-Scenes has it.
+fn camera_log() -> (TempDir, PathBuf) {
+    written(SpaceSensor::Camera(DepthCamera::default().scaled(0.25)), 5, LogLayout::SevenScenes)
+}
+
+fn written(sensor: SpaceSensor, scans: usize, layout: LogLayout) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log");
+    let log = building(&BuildingConfig { scans: 8 * scans, sensor, ..BuildingConfig::default() });
+    let mut writer = LogWriter::create(&path, layout).unwrap();
+    for ((pose, frame), time) in log.scans.iter().zip(&log.times).take(scans) {
+        writer.push(pose, *time, frame).unwrap();
+    }
+    writer.finish().unwrap();
+    (folder, path)
+}
+
+fn map(log: &Path, out: &Path, more: &[&str]) -> String {
+    let call = ["map", arg(log), "--out", arg(out), "--resolution", "0.1"];
+    succeed(call.iter().copied().chain(more.iter().copied()))
+}
+
+fn files_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+fn summary(out: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn a_lidar_log_becomes_all_maps() {
+    let (folder, log) = lidar_log();
+    let out = folder.path().join("out");
+    let text = map(&log, &out, &[]);
+    assert!(text.contains("6 of 6 scans fused (kitti)"), "{text}");
+    assert_eq!(
+        files_in(&out),
+        ["esdf.bin", "map.portolan", "mesh.ply", "octree.bt", "octree.ot", "preview.png", "summary.json"]
+    );
+    let summary = summary(&out);
+    assert_eq!(summary["scans"]["fused"], 6);
+    assert!(summary["beams"]["hit"].as_u64().unwrap() > 20_000);
+    assert!(summary["mesh"]["triangles"].as_u64().unwrap() > 5000);
+    assert!(summary["mesh"]["area"].as_f64().unwrap() > 50.0);
+    assert_eq!(summary["warnings"], serde_json::json!([]));
+
+    // Where the first sensor was is free, and the floor below it is as far as the sensor was high.
+    let pose = std::fs::read_to_string(log.join("poses.txt")).unwrap();
+    let row: Vec<f64> = pose.lines().next().unwrap().split_whitespace().map(|v| v.parse().unwrap()).collect();
+    let points = folder.path().join("points.csv");
+    std::fs::write(&points, format!("{},{},{}\n", row[3], row[7], 0.6)).unwrap();
+    let answers = json(["query", arg(&out), "--points", arg(&points), "--json"]);
+    let answer = &answers["answers"][0];
+    assert_eq!(answer["status"], "known");
+    assert!(answer["occupancy"].as_f64().unwrap() < 0.3);
+    let distance = answer["distance"].as_f64().unwrap();
+    assert!((0.45..=0.65).contains(&distance), "{answer}");
+    let info = json(["info", arg(&out), "--json"]);
+    assert_eq!(info["dimension"], 3);
+    assert!(info["maps"]["tree"]["observed"].as_u64().unwrap() > 10_000);
+    let octree = json(["info", arg(&out.join("octree.bt")), "--json"]);
+    assert!(octree["kind"].as_str().unwrap().contains("OctoMap"), "{octree}");
+}
+
+#[test]
+fn a_camera_log_becomes_a_coloured_mesh() {
+    let (folder, log) = camera_log();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--maps", "mesh", "--max-range", "6"]);
+    let summary = summary(&out);
+    assert_eq!(summary["input"]["format"], "seven-scenes");
+    assert_eq!(summary["mesh"]["colors"], true);
+    assert!(summary["beams"]["max_range"].as_u64().unwrap() > 0);
+    assert!(!out.join("octree.bt").exists());
+    map(&log, &out, &["--maps", "mesh", "--no-color"]);
+    assert_eq!(self::summary(&out)["mesh"]["colors"], false);
+}
+
+#[test]
+fn appending_is_fusing_in_one_go_and_threads_do_not_matter() {
+    let (folder, log) = lidar_log();
+    let at = |name: &str| folder.path().join(name);
+    map(&log, &at("all"), &["--threads", "1"]);
+    map(&log, &at("two"), &["--threads", "2"]);
+    for file in ["map.portolan", "mesh.ply", "octree.bt", "octree.ot", "esdf.bin"] {
+        let bytes = |name: &str| std::fs::read(at(name).join(file)).unwrap();
+        assert!(bytes("all") == bytes("two"), "{file} depends on the number of threads");
+    }
+
+    // The same scans in two logs, one after the other.
+    let rows: Vec<String> =
+        std::fs::read_to_string(log.join("poses.txt")).unwrap().lines().map(str::to_owned).collect();
+    for (name, range) in [("first", 0..2), ("second", 2..6)] {
+        std::fs::create_dir_all(at(name).join("velodyne")).unwrap();
+        for (k, i) in range.clone().enumerate() {
+            let scan = |i: usize| format!("velodyne/{i:06}.bin");
+            std::fs::copy(log.join(scan(i)), at(name).join(scan(k))).unwrap();
+        }
+        std::fs::write(at(name).join("poses.txt"), rows[range].join("\n")).unwrap();
+        std::fs::copy(log.join("calib.txt"), at(name).join("calib.txt")).unwrap();
+    }
+    map(&at("first"), &at("parts"), &[]);
+    succeed(["map", arg(&at("second")), "--out", arg(&at("parts")), "--append"]);
+    for file in ["mesh.ply", "octree.bt", "octree.ot", "esdf.bin"] {
+        let bytes = |name: &str| std::fs::read(at(name).join(file)).unwrap();
+        assert!(bytes("all") == bytes("parts"), "{file} depends on how the log was cut");
+    }
+    let (all, parts) = (summary(&at("all")), summary(&at("parts")));
+    assert_eq!(parts["scans"]["in_map"], 6);
+    assert_eq!(all["extent"], parts["extent"]);
+
+    let other =
+        fail(1, ["map", arg(&at("second")), "--out", arg(&at("parts")), "--append", "--resolution", "0.2"]);
+    assert!(other.contains("resolution is 0.1 in the map and 0.2 in this call"), "{other}");
+}
+
+#[test]
+fn the_memory_limit_saves_what_fits() {
+    let (folder, log) = lidar_log();
+    let out = folder.path().join("out");
+    let call = ["map", arg(&log), "--out", arg(&out), "--resolution", "0.05", "--memory", "8M"];
+    let output = support::portolan(call);
+    assert_eq!(output.status.code(), Some(1));
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(error.contains("the map needs more than") && error.contains("fused and saved"), "{error}");
+    let summary = summary(&out);
+    let total: u64 = ["tree", "tsdf"].iter().map(|m| summary["bytes"][m].as_u64().unwrap()).sum();
+    assert!(total <= 8 << 20, "{total}");
+    assert!(json(["info", arg(&out), "--json"])["maps"]["tsdf"]["bricks"].as_u64().unwrap() > 100);
+}
+
+#[test]
+fn bounds_ranges_and_the_robots_body() {
+    let (folder, log) = lidar_log();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--bounds", "-1,-1,0,3,3,2", "--maps", "tree"]);
+    let summary_of = summary(&out);
+    assert!(summary_of["beams"]["hits_outside"].as_u64().unwrap() > 0);
+    let size = summary_of["extent"]["size"].as_array().unwrap();
+    assert!(size.iter().all(|v| v.as_f64().unwrap() <= 5.6), "{size:?}");
+
+    map(&log, &out, &["--self-filter", "0,0,0,1.6", "--min-range", "0.5", "--maps", "tree"]);
+    assert!(summary(&out)["beams"]["self_hit"].as_u64().unwrap() > 0);
+
+    let refused =
+        fail(2, ["map", arg(&log), "--out", arg(&out), "--resolution", "0.1", "--bounds", "0,0,1,1"]);
+    assert!(refused.contains("six numbers"), "{refused}");
+    let refused = fail(2, ["map", arg(&log), "--out", arg(&out), "--resolution", "0.1", "--maps", "contour"]);
+    assert!(refused.contains("planar"), "{refused}");
+}
+
+#[test]
+fn a_broken_scan_is_counted_and_a_broken_log_refused() {
+    let (folder, log) = camera_log();
+    let out = folder.path().join("out");
+    std::fs::write(log.join("frame-000002.depth.png"), b"\x89PNG\r\n\x1a\nnothing").unwrap();
+    let text = map(&log, &out, &["--maps", "tsdf"]);
+    assert!(
+        text.contains("4 of 5 scans fused") && text.contains("1 scans could not be read (first: "),
+        "{text}"
+    );
+    assert!(text.contains("frame-000002.depth.png"), "{text}");
+    for i in 0..5 {
+        std::fs::write(log.join(format!("frame-{i:06}.depth.png")), b"none").unwrap();
+    }
+    let other = folder.path().join("other");
+    let error = fail(1, ["map", arg(&log), "--out", arg(&other), "--resolution", "0.1"]);
+    assert!(error.contains("frame-000000.depth.png"), "{error}");
+    assert!(!other.exists());
+}
