@@ -8,6 +8,9 @@ mod repr;
 mod sparse_error;
 mod sparse_occupancy;
 mod sparse_tsdf;
+mod sparse_occupancy;
+mod sparse_tsdf;
+mod sparse_tsdf_config;
 mod tree_map;
 mod tsdf;
 
@@ -17,6 +20,8 @@ pub use occupancy_grid::OccupancyGrid;
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
 pub use sparse_tsdf::{PointSweep, SparseTsdf, SparseTsdfConfig};
+pub use sparse_tsdf::SparseTsdf;
+pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
 pub use tree_map::{Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 

@@ -1,76 +1,16 @@
 //! Truncated signed distance fields of space in bricks.
 
-use super::sparse_error::{check_lattice, most_blocks};
+use super::error::check_lattice;
+use super::sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
 use super::{Abilities, MapError};
 use crate::answer::Answer;
 use crate::cell::{
     Cell, Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
 };
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
-use crate::scan::{BeamCounts, Frame, Origin, PointScan, RangeImage, ScanStats};
+use crate::scan::{BeamCounts, Frame, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
 use crate::store::{Bricks, BricksFull, Store};
-use crate::sweep::{PlanError, PointRays, Projective, ProjectiveSettings, WeightModel};
-
-/// How a scan of points becomes observations of cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PointSweep {
-    /// By its rows and columns where it has them, else ray by ray.
-    #[default]
-    Projective,
-    /// Always ray by ray.
-    Rays,
-}
-
-/// Settings of a [`SparseTsdf`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseTsdfConfig {
-    /// Edge of a cell (metres).
-    pub resolution: f64,
-    /// Lower corner of cell 0 (world, metres): near to the map, and a multiple of the resolution, so that the lattices of
-    /// two maps coincide.
-    pub origin: [f64; 3],
-    /// Truncation tau (metres): two to four cells, and less than half of the thinnest wall that is seen from both sides.
-    pub truncation: f64,
-    /// Clamp of the weight. Infinity: never forget.
-    pub w_max: f32,
-    /// Whether the free space up to the surfaces is fused too. It costs memory and time, and buys the difference between
-    /// free and unknown, and that what has gone disappears.
-    pub carve: bool,
-    /// Weight of an observation of free space beyond the truncation, times that of its ray.
-    pub carve_weight: f32,
-    /// How much each ray is trusted. Behind a surface the weight falls linearly to 0 at the truncation.
-    pub weights: WeightModel,
-    /// How scans of points become observations.
-    pub sweep: PointSweep,
-    /// Surfaces nearer than this are not used (metres along the ray).
-    pub min_range: f64,
-    /// Surfaces further than this are not used, but the space up to there is free (metres along the ray).
-    pub max_range: f64,
-    /// Whether colours are fused beside distances, where scans have them.
-    pub color: bool,
-    /// Clamp of a colour's weight, at most 255.
-    pub color_w_max: f32,
-}
-
-impl Default for SparseTsdfConfig {
-    /// 5 cm, tau three cells, W_max 64, with carving.
-    fn default() -> Self {
-        Self {
-            resolution: 0.05,
-            origin: [0.0; 3],
-            truncation: 0.15,
-            w_max: 64.0,
-            carve: true,
-            carve_weight: 1.0,
-            weights: WeightModel::default(),
-            sweep: PointSweep::default(),
-            min_range: 0.0,
-            max_range: 100.0,
-            color: false,
-            color_w_max: 64.0,
-        }
-    }
-}
+use crate::sweep::{PlanError, PointRays, Projective};
 
 /// A truncated signed distance field of space: per cell a scalar information filter of the signed distance to the nearest
 /// surface (Curless & Levoy 1996), in bricks, which exist only where something was seen. Colours lie beside it in bricks of
@@ -87,9 +27,20 @@ pub struct SparseTsdf {
     colors: Option<Bricks<Color, 3>>,
     bounds: Option<Aabb<3>>,
     limit: usize,
+    layout: Layout,
     sweeps: Box<Sweeps>,
     watched: Vec<(BlockKey<3>, usize, [i32; 3])>,
     events: Vec<([i32; 3], FusionEvent)>,
+}
+
+/// Rows and columns of scans of points that come without them.
+#[derive(Clone, Debug)]
+enum Layout {
+    /// To be found in the first scan.
+    Unknown,
+    /// There are none.
+    None,
+    Found(Box<SphericalLayout>),
 }
 
 /// The sweeps with their memory, which is kept from scan to scan.
@@ -161,30 +112,8 @@ impl SparseTsdf {
         let color = colors.is_some();
         let config =
             SparseTsdfConfig { resolution: lattice.resolution, origin: lattice.origin, color, ..config };
-        let rule = TsdfRule { truncation: config.truncation as f32, w_max: config.w_max };
-        rule.validate()?;
-        if !(config.carve_weight > 0.0 && config.carve_weight <= 1.0) {
-            return Err(MapError::CarveWeight(config.carve_weight));
-        }
-        if !(config.color_w_max > 0.0) {
-            return Err(crate::cell::TsdfRuleError::WeightClamp(config.color_w_max).into());
-        }
-        // Images are searched for blocks in a box of this many cells at most.
-        const REACH: f64 = (1u32 << 20) as f64;
-        let ranges = (config.min_range, config.max_range);
-        if !(ranges.0 >= 0.0
-            && ranges.1 > ranges.0
-            && ranges.1 + config.truncation <= REACH * config.resolution)
-        {
-            return Err(MapError::Ranges { min: ranges.0, max: ranges.1, most: REACH * config.resolution });
-        }
-        let settings = ProjectiveSettings {
-            truncation: config.truncation,
-            carve_weight: if config.carve { config.carve_weight } else { 0.0 },
-            weights: config.weights,
-            min_range: config.min_range,
-            max_range: config.max_range,
-        };
+        let rule = config.rule()?;
+        let settings = config.sweep_settings();
         let sweeps = Sweeps { projective: Projective::new(settings), rays: PointRays::new(settings) };
         Ok(Self {
             rule,
@@ -193,6 +122,7 @@ impl SparseTsdf {
             colors,
             bounds: None,
             limit: usize::MAX,
+            layout: Layout::Unknown,
             sweeps: Box::new(sweeps),
             watched: Vec::new(),
             events: Vec::new(),
@@ -213,19 +143,55 @@ impl SparseTsdf {
         }
         match frame {
             Frame::Image(image) => self.integrate_image(world_from_sensor, image),
-            Frame::Points(scan) => match (&scan.image, &scan.origin, self.config.sweep) {
-                (Some(image), Origin::Common(origin), PointSweep::Projective) => {
-                    let at = Pose {
-                        translation: world_from_sensor.transform_point(*origin),
-                        ..*world_from_sensor
-                    };
-                    let mut stats = self.integrate_image(&at, image)?;
-                    stats.refused += scan.refused;
-                    Ok(stats)
-                }
-                _ => self.integrate_rays(world_from_sensor, scan),
-            },
+            Frame::Points(scan) => self.integrate_scan(world_from_sensor, scan),
         }
+    }
+
+    fn integrate_scan(
+        &mut self,
+        world_from_sensor: &Pose<3>,
+        scan: &PointScan,
+    ) -> Result<ScanStats, MapError> {
+        let (&Origin::Common(origin), PointSweep::Projective) = (&scan.origin, self.config.sweep) else {
+            return self.integrate_rays(world_from_sensor, scan);
+        };
+        let at = Pose { translation: world_from_sensor.transform_point(origin), ..*world_from_sensor };
+        let found = match &scan.image {
+            Some(_) => None,
+            None => self.organise(scan, origin),
+        };
+        let Some(image) = scan.image.as_ref().or(found.as_ref()) else {
+            return self.integrate_rays(world_from_sensor, scan);
+        };
+        let mut stats = self.integrate_image(&at, image)?;
+        stats.refused += scan.refused;
+        if found.is_some() {
+            // Pixels without a point are no readings; points beside another of their pixel are.
+            let used = stats.beams.hit + stats.beams.max_range;
+            stats.beams.dropped = ((scan.points.len() + scan.free_ends.len()) as u64).saturating_sub(used);
+        }
+        Ok(stats)
+    }
+
+    /// The image of a scan without rows and columns, where it can be given them. Not where points have colours to be fused:
+    /// pixels have lost which point they come from.
+    fn organise(&mut self, scan: &PointScan, origin: [f64; 3]) -> Option<RangeImage> {
+        if self.config.color && !scan.colors.is_empty() {
+            return None;
+        }
+        if matches!(self.layout, Layout::Unknown) {
+            let found = SphericalLayout::of(&scan.points, origin);
+            self.layout = found.map_or(Layout::None, |layout| Layout::Found(Box::new(layout)));
+        }
+        let Layout::Found(layout) = &self.layout else { return None };
+        let mut image = layout.image(&scan.points, origin);
+        if !scan.free_ends.is_empty() {
+            let free = layout.image(&scan.free_ends, origin);
+            for (value, free) in image.values.iter_mut().zip(free.values) {
+                *value = if *value == 0.0 { -free } else { *value };
+            }
+        }
+        Some(image)
     }
 
     /// Fuses points (world, metres) seen from `origin_world`, in one call. Points that are not finite or lie on the origin
@@ -241,7 +207,13 @@ impl SparseTsdf {
         // Relative to the sensor: far from zero f32 loses millimetres.
         let offset = |p: &[f64; 3]| std::array::from_fn(|k| (p[k] - origin_world[k]) as f32);
         let scan = PointScan::new(points_world.iter().map(offset), [0.0; 3]);
-        self.integrate(&Pose { translation: origin_world, ..Pose::IDENTITY }, &Frame::Points(scan))
+        let at = Pose { translation: origin_world, ..Pose::IDENTITY };
+        self.events.clear();
+        if !at.is_rigid() || self.lattice().cell_of(origin_world).is_none() {
+            return Ok(ScanStats { refused_poses: 1, ..Default::default() });
+        }
+        // Ray by ray: which way the sensor's axis points is not known.
+        self.integrate_rays(&at, &scan)
     }
 
     fn integrate_image(
@@ -415,6 +387,12 @@ impl SparseTsdf {
         self.limit = bytes;
     }
 
+    /// Gives scans of points without rows and columns these from now on. Without this call they are looked for in the first
+    /// such scan, once: as for one sensor per map.
+    pub fn set_layout(&mut self, layout: SphericalLayout) {
+        self.layout = Layout::Found(Box::new(layout));
+    }
+
     /// Keeps to cells whose centre lies in a box (world) from now on; `None`: everywhere.
     pub fn set_bounds(&mut self, bounds: Option<Aabb<3>>) {
         self.bounds = bounds;
@@ -445,6 +423,12 @@ impl SparseTsdf {
         let of = |weights: &[f32]| weights.iter().filter(|&&w| w > 0.0 && w >= min_weight).count();
         self.distances.bricks_by_age().map(|(_, brick)| of(brick.weights())).sum()
     }
+}
+
+/// Blocks that one scan may see, of which many may turn out to be silent: the search for them ends before their list alone
+/// takes the memory.
+fn most_blocks(limit: usize) -> usize {
+    (limit / 1024).saturating_add(4096).min(1 << 26)
 }
 
 /// What the planned scan will do to the watched cells.

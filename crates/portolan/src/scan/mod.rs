@@ -24,6 +24,7 @@ mod rings;
 mod spherical_layout;
 mod stats;
 
+pub(crate) use angles::atan2;
 pub use beam::{Beam, BeamKind};
 pub use frame_filter::{Body, FrameFilter};
 pub use incidence::cos_incidence;

@@ -1,6 +1,6 @@
 //! Where points of the sensor's frame fall into a range image: 64 at a time, or a whole box.
 
-use crate::scan::{Projection, RangeImage};
+use crate::scan::{Projection, RangeImage, atan2};
 use std::f64::consts::TAU;
 
 /// Points that are projected together: an octant of a block.
@@ -401,20 +401,4 @@ impl Rings {
 fn floor(x: f32) -> f32 {
     const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23: adding it leaves no fraction
     (x - 0.5 + MAGIC) - MAGIC
-}
-
-/// `atan2` to 3e-7 rad, without branches (the polynomial of Cephes' `atanf`).
-#[inline(always)]
-fn atan2(y: f32, x: f32) -> f32 {
-    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
-    let (ax, ay) = (x.abs(), y.abs());
-    let (small, large) = (ax.min(ay), ax.max(ay).max(1e-30));
-    let steep = small > 0.414_213_57 * large;
-    let t = if steep { small - large } else { small } / if steep { small + large } else { large };
-    let s = t * t;
-    let poly = ((8.053_745e-2 * s - 1.387_768_6e-1) * s + 1.997_771_1e-1) * s - 3.333_295e-1;
-    let angle = poly * s * t + t + if steep { FRAC_PI_4 } else { 0.0 };
-    let angle = if ay > ax { FRAC_PI_2 - angle } else { angle };
-    let angle = if x < 0.0 { PI - angle } else { angle };
-    angle.copysign(y)
 }

@@ -1,0 +1,99 @@
+//! Settings of a TSDF of space.
+
+use super::MapError;
+use crate::cell::{TsdfRule, TsdfRuleError};
+use crate::sweep::{ProjectiveSettings, WeightModel};
+
+/// How a scan of points becomes observations of cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PointSweep {
+    /// By its rows and columns where it has them, else ray by ray.
+    #[default]
+    Projective,
+    /// Always ray by ray.
+    Rays,
+}
+
+/// Settings of a [`SparseTsdf`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SparseTsdfConfig {
+    /// Edge of a cell (metres).
+    pub resolution: f64,
+    /// Lower corner of cell 0 (world, metres): near to the map, and a multiple of the resolution, so that the lattices of
+    /// two maps coincide.
+    pub origin: [f64; 3],
+    /// Truncation tau (metres): two to four cells, and less than half of the thinnest wall that is seen from both sides.
+    pub truncation: f64,
+    /// Clamp of the weight. Infinity: never forget.
+    pub w_max: f32,
+    /// Whether the free space up to the surfaces is fused too. It costs memory and time, and buys the difference between
+    /// free and unknown, and that what has gone disappears.
+    pub carve: bool,
+    /// Weight of an observation of free space beyond the truncation, times that of its ray.
+    pub carve_weight: f32,
+    /// How much each ray is trusted. Behind a surface the weight falls linearly to 0 at the truncation.
+    pub weights: WeightModel,
+    /// How scans of points become observations.
+    pub sweep: PointSweep,
+    /// Surfaces nearer than this are not used (metres along the ray).
+    pub min_range: f64,
+    /// Surfaces further than this are not used, but the space up to there is free (metres along the ray).
+    pub max_range: f64,
+    /// Whether colours are fused beside distances, where scans have them.
+    pub color: bool,
+    /// Clamp of a colour's weight, at most 255.
+    pub color_w_max: f32,
+}
+
+impl Default for SparseTsdfConfig {
+    /// 5 cm, tau three cells, W_max 64, with carving.
+    fn default() -> Self {
+        Self {
+            resolution: 0.05,
+            origin: [0.0; 3],
+            truncation: 0.15,
+            w_max: 64.0,
+            carve: true,
+            carve_weight: 1.0,
+            weights: WeightModel::default(),
+            sweep: PointSweep::default(),
+            min_range: 0.0,
+            max_range: 100.0,
+            color: false,
+            color_w_max: 64.0,
+        }
+    }
+}
+
+impl SparseTsdfConfig {
+    /// The filter, if all settings are possible.
+    pub(super) fn rule(&self) -> Result<TsdfRule, MapError> {
+        let rule = TsdfRule { truncation: self.truncation as f32, w_max: self.w_max };
+        rule.validate()?;
+        if !(self.carve_weight > 0.0 && self.carve_weight <= 1.0) {
+            return Err(MapError::CarveWeight(self.carve_weight));
+        }
+        if !(self.color_w_max > 0.0) {
+            return Err(TsdfRuleError::WeightClamp(self.color_w_max).into());
+        }
+        // Images are searched for blocks in a box of this many cells at most.
+        const REACH: f64 = (1u32 << 20) as f64;
+        let ranges = (self.min_range, self.max_range);
+        if !(ranges.0 >= 0.0 && ranges.1 > ranges.0 && ranges.1 + self.truncation <= REACH * self.resolution)
+        {
+            return Err(MapError::Ranges { min: ranges.0, max: ranges.1, most: REACH * self.resolution });
+        }
+        Ok(rule)
+    }
+
+    /// What the sweeps need to know.
+    pub(super) fn sweep_settings(&self) -> ProjectiveSettings {
+        ProjectiveSettings {
+            truncation: self.truncation,
+            carve_weight: if self.carve { self.carve_weight } else { 0.0 },
+            weights: self.weights,
+            min_range: self.min_range,
+            max_range: self.max_range,
+        }
+    }
+}
