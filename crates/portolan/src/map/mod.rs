@@ -14,7 +14,9 @@ pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
-pub use tree_map::{Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio};
+pub use tree_map::{
+    CoarseOccupancy, Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio,
+};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 
 /// A TSDF of the plane.
