@@ -47,9 +47,9 @@ fn info_counts_leaves_and_nodes() {
             (&about["resolution"], &about["inner_nodes_that_could_be_merged"]),
             (&0.1.into(), &0.into())
         );
-        let [size, volume] =
-            [&about["extent_of_occupied"]["size"][1], &about["observed_volume"]].map(|v| v.as_f64().unwrap());
-        assert!((size - 0.2).abs() < 1e-9 && (volume - 0.512).abs() < 1e-9, "{size} {volume}");
+        let [size, cells] =
+            [&about["extent_of_occupied"]["size"][1], &about["observed_cells"]].map(|v| v.as_f64().unwrap());
+        assert_eq!((size, cells), (0.2, 512.0));
     }
     let text = succeed(["info", arg(&bt)]);
     assert!(text.contains("  class: OcTree\n") && text.contains("    occupied: 16\n"), "{text}");

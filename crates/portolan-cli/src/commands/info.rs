@@ -175,11 +175,15 @@ fn of_contour(lines: &[Polyline]) -> Value {
 fn of_octomap(file: &OctomapTree) -> Value {
     let tree = file.tree();
     let (free, occupied) = file.leaves();
+    let resolution = file.resolution();
+    // Cells about the world's zero times the resolution: `tree.lattice()` counts from a corner far away, whose rounding shows.
+    let half = 1 << (tree.depth() - 1);
+    let corner = |cell: [i32; 3]| cell.map(|v| f64::from(v - half) * resolution);
     let (mut extent, mut extent_occupied) = (Aabb::EMPTY, Aabb::EMPTY);
-    let mut observed_volume = 0.0;
+    let mut observed_cells = 0.0;
     tree.for_each_leaf(|leaf| {
-        let leaf_box = tree.lattice().aabb(leaf.cell, leaf.cell.map(|v| v + (1 << leaf.height)));
-        observed_volume += leaf_box.extent().iter().product::<f64>();
+        let leaf_box = Aabb::new(corner(leaf.cell), corner(leaf.cell.map(|v| v + (1 << leaf.height))));
+        observed_cells += 8f64.powi(leaf.height as i32);
         extent = extent.union(leaf_box);
         if leaf.value.0 >= 0.0 {
             extent_occupied = extent_occupied.union(leaf_box);
@@ -187,12 +191,12 @@ fn of_octomap(file: &OctomapTree) -> Value {
     });
     json!({
         "class": file.class(),
-        "resolution": file.resolution(),
+        "resolution": resolution,
         "depth": tree.depth(),
         "leaves": { "total": free + occupied, "free": free, "occupied": occupied },
         "inner_nodes": file.inner_nodes(),
         "inner_nodes_that_could_be_merged": file.prunable_nodes(),
-        "observed_volume": observed_volume,
+        "observed_cells": observed_cells,
         "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
         "extent_of_occupied": (!extent_occupied.is_empty()).then(|| json::aabb(&extent_occupied)),
         "bytes_in_memory": tree.memory_bytes(),

@@ -2,7 +2,7 @@
 
 use super::error::check_grid;
 use super::integrate::integrate;
-use super::{Abilities, MapError, MapRepr};
+use super::{Abilities, MapError, MapRepr, SparseOccupancy};
 use crate::answer::Answer;
 use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, OccupancyModel, ProbabilityTable};
 use crate::geom::{Aabb, Grid, Pose, block_cells};
@@ -20,6 +20,19 @@ pub struct TreeMap<const D: usize> {
     bounds: Aabb<D>,
     sweep: Rays<D>,
     scratch: HitMiss,
+}
+
+/// What a cube of many cells holds, as probabilities of being occupied.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoarseOccupancy {
+    /// P(occupied) of the cell that is least likely occupied.
+    pub min: f64,
+    /// P(occupied) of the cell that is most likely occupied.
+    pub max: f64,
+    /// P(occupied) at the mean log odds of the observed cells, each counting alike.
+    pub mean: f64,
+    /// Share of the cube that was observed, above 0, at most 1.
+    pub observed: f64,
 }
 
 /// A log-odds tree of the plane.
@@ -87,6 +100,19 @@ impl<const D: usize> TreeMap<D> {
         self.tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(self.probabilities.of(v)))
     }
 
+    /// P(occupied) inside the cube of edge `2^height` cells that holds a point, over what was observed of it; unknown
+    /// where nothing was. O(depth + nodes below). [`Tree::max_at`] answers for the maximum alone in O(depth).
+    pub fn coarse(&self, p_world: impl Into<[f64; D]>, height: u32) -> Answer<CoarseOccupancy> {
+        let p = p_world.into();
+        let Some(cell) = self.tree.lattice().cell_of(p).filter(|_| self.bounds.contains(p)) else {
+            return Answer::Outside;
+        };
+        let Some(s) = self.tree.summary(cell, height) else { return Answer::Unknown };
+        let of = |v: LogOdds8| self.probabilities.of(v);
+        let mean = 1.0 / (1.0 + (-s.mean * self.rule.quantum).exp());
+        Answer::Known(CoarseOccupancy { min: of(s.min), max: of(s.max), mean, observed: s.observed })
+    }
+
     /// The tree.
     pub fn tree(&self) -> &Tree<LogOdds8, D> {
         &self.tree
@@ -100,6 +126,16 @@ impl<const D: usize> TreeMap<D> {
     /// The model that the filter's numbers come from.
     pub fn model(&self) -> &OccupancyModel {
         &self.model
+    }
+}
+
+impl TreeMap<3> {
+    /// The cells of bricks in a tree: the same as if the scans had been fused into the tree.
+    ///
+    /// # Errors
+    /// [`MapError::Depth`] where a brick is beyond 2^27 cells from the origin.
+    pub fn from_sparse(map: &SparseOccupancy<LogOdds8>) -> Result<Self, MapError> {
+        Self::from_tree(Tree::from_bricks(map.store()).ok_or(MapError::Depth(29))?, *map.model())
     }
 }
 
@@ -152,6 +188,29 @@ pub fn crossover_resolution<const D: usize>(node_bytes: f64, surface: f64, volum
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn coarse_cells_know_their_extremes_and_how_much_was_seen() {
+        use crate::geom::Lattice;
+        use crate::map::OccupancySweep;
+        let model = OccupancyModel::default();
+        let mut bricks =
+            SparseOccupancy::new(Lattice::new([0.0; 3], 1.0), model, OccupancySweep::Exact).unwrap();
+        // Along x: three cells passed, the fourth hit.
+        bricks.integrate_points(&[[3.5, 0.5, 0.5]], [0.5; 3]).unwrap();
+        let map = Octree::from_sparse(&bricks).unwrap();
+        for x in [0.5, 1.5, 2.5, 3.5, 4.5] {
+            assert_eq!(map.probability([x, 0.5, 0.5]), bricks.probability([x, 0.5, 0.5]));
+        }
+        let Answer::Known(c) = map.coarse([1.0, 3.0, 2.0], 2) else { panic!("nothing known") };
+        let rule = LogOddsRule::<i8>::new(&model).unwrap();
+        let p = |units: f64| 1.0 / (1.0 + (-units * rule.quantum).exp());
+        assert!((c.min - p(-15.0)).abs() < 1e-12 && (c.max - p(31.0)).abs() < 1e-12);
+        assert!((c.mean - p((31.0 - 45.0) / 4.0)).abs() < 1e-12);
+        assert_eq!(c.observed, 4.0 / 64.0);
+        assert_eq!(map.coarse([5.0, 0.5, 0.5], 1), Answer::Unknown);
+        assert_eq!(map.coarse([1e4, 0.5, 0.5], 1), Answer::Outside);
+    }
 
     #[test]
     fn chapter19_crossover() {

@@ -39,6 +39,13 @@ impl<V: LogOddsValue, const D: usize> Arena<V, D> {
         Self { values: Vec::new(), first_child: Vec::new(), mask: Vec::new(), free: [NONE; 9] }
     }
 
+    /// Takes memory for `n` records at once.
+    pub(super) fn reserve(&mut self, n: usize) {
+        self.values.reserve_exact(n * children::<D>());
+        self.first_child.reserve_exact(n);
+        self.mask.reserve_exact(n);
+    }
+
     /// Records in use and free together.
     pub(super) fn slots(&self) -> usize {
         self.mask.len()

@@ -141,6 +141,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         tree.root_value = records.root_value;
         if masks > 0 {
             let mut next = 0;
+            tree.arena.reserve(masks);
             tree.root = tree.arena.allocate(1);
             read_below(&mut tree.arena, tree.root, records, &mut next, depth)?;
             tree.root_value = value_above(&tree.arena.read(tree.root), children::<D>());
