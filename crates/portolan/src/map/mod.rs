@@ -18,7 +18,6 @@ pub use repr::{Abilities, Derived, DerivedField, MapRepr};
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
 pub use sparse_tsdf::SparseTsdf;
 pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
-pub use tree_map::{Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio};
 pub use tree_map::{
     CoarseOccupancy, Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio,
 };
