@@ -19,6 +19,8 @@ use crate::mapping::{cells_for_map_server, polylines, write_contour};
 use crate::output::Output;
 use crate::source::{Source, open};
 
+mod space;
+
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  portolan convert intel intel.yaml"
@@ -26,7 +28,7 @@ use crate::source::{Source, open};
 pub(crate) struct Args {
     /// map.portolan or its folder, map_server yaml, esdf.bin, GeoJSON contour, or OctoMap .bt or .ot
     input: PathBuf,
-    /// File to write: .portolan, .yaml (with its .pgm), .bin, .geojson, .svg, .bt or .ot
+    /// File to write: .portolan, .yaml (with its .pgm), .bin, .geojson, .svg, .bt, .ot, .ply, .glb or .obj
     out: PathBuf,
     #[command(flatten)]
     output: Output,
@@ -41,6 +43,7 @@ enum Target {
     Contour,
     OctomapBt,
     OctomapOt,
+    Mesh,
 }
 
 /// Converts the file.
@@ -68,6 +71,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         }
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
         Source::Octomap(file) => convert_octomap(file, target, args)?,
+        Source::SpaceMap(file) => space::convert(file, target, args)?,
         _ => false,
     };
     if !done {
@@ -94,6 +98,7 @@ fn target(out: &Path) -> Option<Target> {
         "geojson" | "json" | "svg" => Some(Target::Contour),
         "bt" => Some(Target::OctomapBt),
         "ot" => Some(Target::OctomapOt),
+        "ply" | "glb" | "obj" => Some(Target::Mesh),
         _ => None,
     }
 }
@@ -108,7 +113,7 @@ fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
         Source::Contour(_) => ".geojson or .svg",
         Source::Image(_) => "nothing without its yaml file",
         Source::Octomap(_) => ".bt or .ot",
-        Source::SpaceMap(_) => ".portolan",
+        Source::SpaceMap(_) => ".ply, .glb, .obj, .bt, .ot, .bin (esdf) or .portolan, as far as its maps go",
         Source::Log(_) | Source::SpaceLog(_) => "nothing here: `portolan map` makes maps of logs",
     };
     let (input, out) = (args.input.display(), args.out.display());
@@ -138,7 +143,7 @@ fn convert_map(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<bo
         (Target::Contour, Some(tsdf)) => {
             return write_lines(&marching_squares(tsdf, &ContourSettings::of(tsdf)), args);
         }
-        (Target::OctomapBt | Target::OctomapOt, _) => return Ok(false),
+        (Target::OctomapBt | Target::OctomapOt | Target::Mesh, _) => return Ok(false),
         (Target::Esdf | Target::Contour, None) => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
             return convert_esdf(&esdf_of_cells(grid, &cells), target, args);
@@ -170,7 +175,7 @@ fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Re
             }
             return write_lines(&contour, args);
         }
-        Target::OctomapBt | Target::OctomapOt => return Ok(false),
+        Target::OctomapBt | Target::OctomapOt | Target::Mesh => return Ok(false),
     }
     Ok(true)
 }
@@ -187,7 +192,7 @@ fn convert_octomap(file: &OctomapTree, target: Target, args: &Args) -> anyhow::R
 
 fn convert_esdf(esdf: &Esdf<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match target {
-        Target::Portolan | Target::OctomapBt | Target::OctomapOt => return Ok(false),
+        Target::Portolan | Target::OctomapBt | Target::OctomapOt | Target::Mesh => return Ok(false),
         Target::Esdf => write_field(esdf, args)?,
         Target::MapServer => {
             let cell = |d: &f32| match d {

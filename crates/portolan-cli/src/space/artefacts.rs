@@ -1,20 +1,17 @@
 //! The files that a mapping run in space leaves behind.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::bail;
 use portolan::cell::LogOddsRule;
 use portolan::geom::Aabb;
-use portolan_io::{IoError, SpaceMapFile, write_esdf, write_octomap_bt, write_octomap_ot};
+use portolan_io::{IoError, SpaceMapFile, write_atomic, write_esdf, write_octomap_bt, write_octomap_ot};
 
-use super::Derived;
-
-/// A dense distance field is written up to this size.
-const LARGEST_DENSE: usize = 256 << 20;
-/// Bytes of a cell of it: distance and status.
-const DENSE_CELL: usize = 5;
+use super::files::{dense_esdf, write_mesh};
+use super::{Derived, preview};
 
 /// Everything that is written.
 pub(crate) struct Artefacts<'a> {
@@ -22,6 +19,8 @@ pub(crate) struct Artefacts<'a> {
     pub(crate) derived: &'a Derived,
     /// The box of the distance field that is asked for.
     pub(crate) dense: Option<Aabb<3>>,
+    /// Whether the sensor is a camera, which looks along z.
+    pub(crate) camera: bool,
     /// What the picture's title says.
     pub(crate) title: String,
 }
@@ -45,11 +44,26 @@ impl Artefacts<'_> {
     pub(crate) fn write(&self, folder: &Path) -> anyhow::Result<Written> {
         let mut written = Written::default();
         let start = Instant::now();
+        if let Some(mesh) = &self.derived.mesh {
+            write_mesh(&folder.join("mesh.ply"), mesh)?;
+            written.files.push("mesh.ply");
+        }
         self.write_octree(folder, &mut written)?;
         self.write_esdf(folder, &mut written)?;
         self.file.write(folder.join("map.portolan"))?;
         written.files.push("map.portolan");
         written.seconds.insert("write", start.elapsed().as_secs_f64());
+        let start = Instant::now();
+        let png = self
+            .derived
+            .mesh
+            .as_ref()
+            .and_then(|mesh| preview::of_mesh(mesh, &self.file.poses, self.camera, &self.title));
+        if let Some(png) = png {
+            write_atomic(folder.join("preview.png"), |w| w.write_all(&png))?;
+            written.files.push("preview.png");
+        }
+        written.seconds.insert("preview", start.elapsed().as_secs_f64());
         for stale in NAMES.iter().filter(|n| !written.files.contains(n) && **n != "summary.json") {
             match std::fs::remove_file(folder.join(stale)) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
@@ -82,32 +96,14 @@ impl Artefacts<'_> {
 
     fn write_esdf(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
         let Some(esdf) = &self.derived.esdf else { return Ok(()) };
-        let asked = match &self.dense {
-            Some(bounds) => esdf.grid_within(bounds),
-            None => esdf.grid(),
-        };
-        let Some(grid) = asked else {
-            written.notes.push("esdf.bin was not written: nothing was observed there".to_owned());
-            return Ok(());
-        };
-        let most = LARGEST_DENSE / DENSE_CELL;
-        if grid.checked_len().is_none_or(|cells| cells > most) {
-            let fitting = esdf.grid_of_at_most(most).map(|g| shown_box(&g.aabb())).unwrap_or_default();
-            written.notes.push(format!(
-                "esdf.bin was not written: {} cells are more than 256 MiB; --dense {fitting} would fit",
-                grid.shape.map(|n| n.to_string()).join(" x ")
-            ));
-            return Ok(());
+        match dense_esdf(esdf, self.dense.as_ref()) {
+            Ok(dense) => {
+                let path = folder.join("esdf.bin");
+                write_esdf(path, &dense.grid, &dense.distances, Some(&dense.status))?;
+                written.files.push("esdf.bin");
+            }
+            Err(why) => written.notes.push(format!("esdf.bin was not written: {why}")),
         }
-        let dense = esdf.dense(&grid);
-        write_esdf(folder.join("esdf.bin"), &dense.grid, &dense.distances, Some(&dense.status))?;
-        written.files.push("esdf.bin");
         Ok(())
     }
-}
-
-/// A box as the command line takes it.
-fn shown_box(bounds: &Aabb<3>) -> String {
-    let numbers = bounds.min.iter().chain(&bounds.max);
-    numbers.map(|v| ((v * 1000.0).round() / 1000.0).to_string()).collect::<Vec<_>>().join(",")
 }

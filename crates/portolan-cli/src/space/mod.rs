@@ -3,15 +3,18 @@
 mod artefacts;
 mod derived;
 mod extent;
+mod files;
 mod fuse;
 mod maps;
 mod memory;
+mod preview;
 mod settings;
 mod words;
 
 pub(crate) use artefacts::Artefacts;
 pub(crate) use derived::{Derived, esdf_settings, mesh_settings};
 pub(crate) use extent::brick_extent;
+pub(crate) use files::{dense_esdf, write_mesh};
 pub(crate) use fuse::{Fusion, fuse};
 pub(crate) use maps::SpaceMaps;
 pub(crate) use memory::peak_memory;

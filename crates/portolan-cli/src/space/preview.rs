@@ -13,7 +13,8 @@ pub(crate) fn of_mesh(mesh: &Mesh, poses: &[Pose<3>], camera: bool, title: &str)
     if mesh.triangles.is_empty() {
         return None;
     }
-    let (ahead, up) = if camera { ([0.0, 0.0, 1.0], [0.0, -1.0, 0.0]) } else { ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]) };
+    let (ahead, up) =
+        if camera { ([0.0, 0.0, 1.0], [0.0, -1.0, 0.0]) } else { ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]) };
     let sensor = |pose: &Pose<3>| Sensor {
         position: sub(pose.translation, mesh.origin).map(|v| v as f32),
         forward: pose.rotate(ahead).map(|v| v as f32),

@@ -64,7 +64,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     })?;
     let title = title(&file.header.logs, settings.resolution, file.header.scans);
     maps.store_into(&mut file);
-    let written = Artefacts { file: &file, derived: &derived, dense: args.dense, title }.write(&args.out)?;
+    let written = Artefacts {
+        file: &file,
+        derived: &derived,
+        dense: args.dense,
+        camera: log.camera().is_some(),
+        title,
+    }
+    .write(&args.out)?;
     let mut files = written.files;
     files.push("summary.json");
     seconds.extend(fusion.seconds.iter().chain(&derived.seconds).chain(&written.seconds));
