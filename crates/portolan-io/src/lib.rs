@@ -10,6 +10,9 @@
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
 //! | SVG contours | | [`write_svg`] |
+//! | PLY meshes (binary) | | [`write_ply_mesh`] |
+//! | GLB meshes (glTF 2.0) | | [`write_glb`] |
+//! | OBJ meshes | | [`write_obj`] |
 //! | query points, answers (CSV) | [`QueryPoints`] | [`write_answer`] |
 //!
 //! [`detect`] tells what a file is. The formats know plain data (slices and grids), not maps.
@@ -28,6 +31,7 @@ mod esdf_bin;
 mod geojson;
 mod map_file;
 mod map_server;
+mod mesh;
 mod pgm;
 mod points_csv;
 mod poses;
@@ -47,6 +51,7 @@ pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
 pub use geojson::{parse_geojson, read_geojson, write_geojson};
 pub use map_file::{MapFile, MapHeader, sweep_of, sweep_word, weights_of, weights_word};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
+pub use mesh::{write_glb, write_obj, write_ply_mesh};
 pub use pgm::Pgm;
 pub use points_csv::{AnswerRow, AnswerStatus, QueryPoints, write_answer, write_answer_header};
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};
