@@ -20,6 +20,9 @@
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
 //! | SVG contours | | [`write_svg`] |
+//! | PLY meshes (binary) | | [`write_ply_mesh`] |
+//! | GLB meshes (glTF 2.0) | | [`write_glb`] |
+//! | OBJ meshes | | [`write_obj`] |
 //! | query points, answers (CSV) | [`QueryPoints`] | [`write_answer`] |
 //!
 //! [`detect`] tells what a file is. The formats know plain data (slices and grids), not maps.
@@ -40,6 +43,7 @@ mod kitti_bin;
 mod log_writer;
 mod map_file;
 mod map_server;
+mod mesh;
 mod octomap;
 mod pcd;
 mod pgm;
@@ -72,6 +76,7 @@ pub use map_file::{
     sweep_word, weights_of, weights_word,
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
+pub use mesh::{write_glb, write_obj, write_ply_mesh};
 pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
 pub use pcd::{read_pcd, write_pcd};
 pub use pgm::Pgm;

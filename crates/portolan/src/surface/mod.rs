@@ -9,7 +9,7 @@ mod ray_cast;
 mod squares;
 
 pub use contour::Contour;
-pub use cubes::{MeshSettings, isosurface, marching_cubes};
+pub use cubes::{IncrementalMesh, MeshSettings, isosurface, marching_cubes};
 pub use measures::{DoubledLength, ThinWalls, doubled_length, thin_walls};
 pub use mesh::{EdgeCounts, Mesh};
 pub use polyline::Polyline;

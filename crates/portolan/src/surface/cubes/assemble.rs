@@ -108,7 +108,10 @@ impl Joint<'_> {
                 }
                 let to = (number - vertex_0) as usize;
                 let p = part.vertices[from + j];
-                place.vertices[to] = std::array::from_fn(|k| ((base[k] + f64::from(p[k])) * scale) as f32);
+                let out = &mut place.vertices[to];
+                for k in 0..3 {
+                    out[k] = ((base[k] + f64::from(p[k])) * scale) as f32;
+                }
                 if self.want.normals {
                     place.normals[to] = super::normals::unit(part.gradients[from + j]);
                 }

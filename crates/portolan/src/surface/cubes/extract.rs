@@ -3,7 +3,7 @@
 use super::assemble::{Placement, assemble};
 use super::parallel::map;
 use super::piece::{Attributes, Numbers, Part};
-use super::samples::{BrickSamples, MIDDLE};
+use super::samples::{BrickSamples, MIDDLE, threshold};
 use super::signs::{Layers, Signs, signs_of_brick};
 use crate::cell::{Color, DistanceBrick, SignedDistance};
 use crate::geom::BlockKey;
@@ -66,13 +66,14 @@ pub fn marching_cubes(
     bricks.sort_unstable_by_key(|(key, _)| order(*key));
     let want = settings.attributes(colors.is_some());
     let colors = colors.filter(|_| want.colors);
+    let threshold = threshold(settings.min_weight);
     let chunks = bricks.len().div_ceil(TOGETHER);
     let range = |chunk: usize| chunk * TOGETHER..((chunk + 1) * TOGETHER).min(bricks.len());
     let signs = map(
         chunks,
         || (),
         |(), chunk| {
-            let signs = bricks[range(chunk)].iter().map(|(_, b)| signs_of_brick(b, settings.min_weight));
+            let signs = bricks[range(chunk)].iter().map(|(_, b)| signs_of_brick(b, threshold));
             signs.collect::<Vec<_>>()
         },
     );
@@ -80,6 +81,7 @@ pub fn marching_cubes(
     let parts = map(chunks, Numbers::new, |numbers, chunk| {
         let mut part = Part::default();
         let mut upper = Walk::new(&bricks, range(chunk), want.normals);
+        let mut samples = BrickSamples::new(threshold);
         for i in range(chunk) {
             let key = bricks[i].0;
             upper.step(key);
@@ -90,9 +92,10 @@ pub fn marching_cubes(
             if !layers.any_crossing() {
                 continue;
             }
-            let near = |i: usize| upper.found[i].map(|at| bricks[at].1);
-            let color = |i: usize| colors?.brick(neighbour(key, i));
-            let samples = BrickSamples::new(near, color, settings.min_weight);
+            for (i, _) in &upper.walks {
+                let color = colors.and_then(|colors| colors.brick(neighbour(key, *i)));
+                samples.set(*i, upper.found[*i].map(|at| bricks[at].1), color);
+            }
             part.add(key, &layers, &samples, want, numbers);
         }
         part
@@ -143,5 +146,102 @@ impl<'a> Walk<'a> {
 
     fn brick(&self, offset: [i32; 3]) -> Option<usize> {
         self.found[(MIDDLE as i32 + offset[0] + 3 * offset[1] + 9 * offset[2]) as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::ColorBrick;
+    use crate::geom::Lattice;
+    use crate::surface::cubes::testing::{Random, bricks};
+
+    fn sphere(center: [f64; 3], radius: f64) -> impl Fn([i32; 3]) -> f32 {
+        move |c| {
+            let off: [f64; 3] = std::array::from_fn(|k| f64::from(c[k]) + 0.5 - center[k]);
+            (off.iter().map(|v| v * v).sum::<f64>().sqrt() - radius) as f32
+        }
+    }
+
+    #[test]
+    fn a_mesh_at_utm_coordinates_is_as_fine_as_one_at_zero() {
+        for origin in [[0.0; 3], [500_000.0, 4_000_000.0, 120.0]] {
+            // Far from the lattice's own zero too.
+            let first = [100_000, -70_000, 9];
+            let center = first.map(|v| f64::from(v) + 20.0);
+            let store = bricks(Lattice::new(origin, 0.05), first, [40; 3], sphere(center, 12.3));
+            let mesh = marching_cubes(&store, None, &MeshSettings::default());
+            assert_eq!((mesh.edge_counts().border, mesh.euler_characteristic()), (0, 2));
+            for i in 0..mesh.vertices.len() {
+                let p = mesh.vertex_world(i);
+                let off: [f64; 3] = std::array::from_fn(|k| (p[k] - origin[k]) / 0.05 - center[k]);
+                let radius = off.iter().map(|v| v * v).sum::<f64>().sqrt();
+                // Chords of cells, and UTM coordinates hold 1e-9 m.
+                assert!((radius - 12.3).abs() < 0.02, "{radius}");
+                let cosine: f64 = (0..3).map(|k| off[k] / radius * f64::from(mesh.normals[i][k])).sum();
+                assert!(cosine > 0.998);
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_not_observed_has_no_surface() {
+        let value = |c: [i32; 3]| if c[0] > 20 { f32::NAN } else { c[2] as f32 - 9.7 };
+        let store = bricks(Lattice::new([0.0; 3], 1.0), [3; 3], [30; 3], value);
+        let mesh = marching_cubes(&store, None, &MeshSettings::default());
+        assert_eq!(mesh.triangles.len(), 2 * 17 * 29);
+        assert_eq!(mesh.vertices.len(), 18 * 30);
+        assert!(mesh.normals.iter().all(|n| *n == [0.0, 0.0, 1.0]));
+        let strict = MeshSettings { min_weight: 1.5, ..MeshSettings::default() };
+        assert!(marching_cubes(&store, None, &strict).triangles.is_empty());
+        assert_eq!(marching_cubes(&Bricks::new(Lattice::new([0.0; 3], 1.0)), None, &strict), Mesh::default());
+    }
+
+    #[test]
+    fn crossings_without_a_whole_cube_are_no_vertices() {
+        let mut random = Random(5);
+        let value = |_: [i32; 3]| if random.next() % 3 == 0 { f32::NAN } else { random.value() };
+        let value = std::cell::RefCell::new(value);
+        let store = bricks(Lattice::new([0.0; 3], 1.0), [-11; 3], [30; 3], |c| value.borrow_mut()(c));
+        let mesh = marching_cubes(&store, None, &MeshSettings::default());
+        assert_eq!(mesh.edge_counts().faulty, 0);
+        let mut used = vec![false; mesh.vertices.len()];
+        mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        assert!(mesh.triangles.len() > 500 && used.iter().all(|&u| u));
+    }
+
+    #[test]
+    fn colours_are_weighted_by_nearness_and_weight() {
+        let store = bricks(Lattice::new([0.0; 3], 1.0), [0; 3], [8; 3], |c| c[2] as f32 - 3.25);
+        let mut colors = Bricks::new(Lattice::new([0.0; 3], 1.0));
+        let words = |weight: u16| -> Vec<[u16; 4]> {
+            let word = |z: usize| if z > 3 { [65535, 0, 0, weight] } else { [0, 0, 65535, 256] };
+            (0..512).map(|i| word(i / 64)).collect()
+        };
+        let settings = MeshSettings::default();
+        colors.insert(BlockKey([0; 3]), ColorBrick::from_words(&words(256))).unwrap();
+        let mesh = marching_cubes(&store, Some(&colors), &settings);
+        assert!(mesh.colors.iter().all(|c| *c == [64, 0, 191]), "{:?}", mesh.colors[0]);
+        colors.insert(BlockKey([0; 3]), ColorBrick::from_words(&words(768))).unwrap();
+        let mesh = marching_cubes(&store, Some(&colors), &settings);
+        assert!(mesh.colors.iter().all(|c| *c == [128, 0, 128]), "{:?}", mesh.colors[0]);
+        colors.insert(BlockKey([0; 3]), ColorBrick::from_words(&words(0))).unwrap();
+        let mesh = marching_cubes(&store, Some(&colors), &settings);
+        assert!(mesh.colors.iter().all(|c| *c == [0, 0, 255]), "{:?}", mesh.colors[0]);
+        assert!(marching_cubes(&store, None, &settings).colors.is_empty());
+    }
+
+    #[cfg(feature = "parallel")]
+    #[test]
+    fn threads_do_not_change_a_byte() {
+        let mut random = Random(9);
+        let value = std::cell::RefCell::new(move || random.value());
+        let store = bricks(Lattice::new([1e6; 3], 0.1), [-30; 3], [70; 3], |_| value.borrow_mut()());
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| marching_cubes(&store, None, &MeshSettings::default()))
+        };
+        let one = with(1);
+        assert!(one.triangles.len() > 300_000 && one == with(2) && one == with(7));
     }
 }

@@ -6,11 +6,12 @@
 //! | `numbering`, `loops`, `patch`, `tunnel`, `table` | what one cube looks like |
 //! | `samples`, `piece` | the vertices and triangles of one brick |
 //! | `assemble`, `normals` | pieces joined into a mesh |
-//! | `extract`, `dense` | from bricks of distances, from arrays |
+//! | `extract`, `incremental`, `dense` | from bricks of distances, from changes of them, from arrays |
 
 mod assemble;
 mod dense;
 mod extract;
+mod incremental;
 mod loops;
 mod normals;
 mod numbering;
@@ -26,3 +27,4 @@ mod tunnel;
 
 pub use dense::isosurface;
 pub use extract::{MeshSettings, marching_cubes};
+pub use incremental::IncrementalMesh;

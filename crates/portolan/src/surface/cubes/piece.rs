@@ -77,11 +77,14 @@ fn crossing(samples: &impl Samples, node: [i32; 3], axis: usize, want: Attribute
     end[axis] += 1;
     let (a, b) = (samples.value(node), samples.value(end));
     let t = (a / (a - b)).clamp(MARGIN, 1.0 - MARGIN);
-    let mut vertex = Vertex { position: node.map(|v| v as f32), ..Vertex::default() };
+    let mut vertex =
+        Vertex { position: [node[0] as f32, node[1] as f32, node[2] as f32], ..Vertex::default() };
     vertex.position[axis] += t;
     if want.normals {
         let (ga, gb) = (samples.gradient(node), samples.gradient(end));
-        vertex.gradient = std::array::from_fn(|k| ga[k] + t * (gb[k] - ga[k]));
+        for k in 0..3 {
+            vertex.gradient[k] = ga[k] + t * (gb[k] - ga[k]);
+        }
     }
     if want.colors {
         vertex.color = color(samples, node, end, t);
@@ -173,6 +176,7 @@ impl Part {
         self.own_crossings(&mut piece, samples, want, numbers);
         piece.used = own_used(&crossing, &full);
         self.foreign_crossings(&mut piece, layers, &full, numbers);
+        let table = &*TABLE;
         for z in 0..8 {
             let (low, high) = (&inside[z], &inside[z + 1]);
             for i in bits(active[z]) {
@@ -180,10 +184,10 @@ impl Part {
                 let case = bit(low.at, 0) | bit(low.x, 1) | bit(low.y, 2) | bit(low.xy, 3);
                 let case = case | bit(high.at, 4) | bit(high.x, 5) | bit(high.y, 6) | bit(high.xy, 7);
                 let node = (i & 7) + 9 * (i >> 3) + 81 * z;
-                let plain = &TABLE.plain[case as usize & 255];
+                let plain = &table.plain[case as usize & 255];
                 if plain.triangles == ASK {
                     let at = [(i & 7) as i32, (i >> 3) as i32, z as i32];
-                    self.asked(&mut piece, case as u8, at, &TABLE, samples, want, numbers);
+                    self.asked(&mut piece, case as u8, at, table, samples, want, numbers);
                     continue;
                 }
                 for t in plain.corners.as_chunks::<3>().0.iter().take(usize::from(plain.triangles)) {
@@ -193,6 +197,15 @@ impl Part {
         }
         piece.triangles = self.triangles.len() as u32 - piece.first_triangle;
         self.pieces.push(piece);
+    }
+
+    /// Bytes that the arrays hold.
+    pub(super) fn memory_bytes(&self) -> usize {
+        self.pieces.capacity() * size_of::<Piece>()
+            + (self.vertices.capacity() + self.gradients.capacity()) * 12
+            + self.colors.capacity() * 3
+            + self.foreign.capacity() * 2
+            + self.triangles.capacity() * 6
     }
 
     fn push(&mut self, vertex: &Vertex, want: Attributes) {
@@ -212,18 +225,30 @@ impl Part {
         want: Attributes,
         numbers: &mut Numbers,
     ) {
-        let mut count = 0u16;
         for z in 0..8 {
-            for axis in 0..3 {
-                piece.rank[3 * z + axis] = count;
-                for i in bits(piece.crossing[3 * z + axis]) {
-                    let (x, y) = (i & 7, i >> 3);
-                    *numbers.at(axis, x + 9 * y + 81 * z) = count;
-                    count += 1;
-                    let node = [x as i32, y as i32, z as i32];
-                    self.push(&crossing(samples, node, axis, want), want);
-                }
-            }
+            self.own_crossings_along::<0>(piece, z, samples, want, numbers);
+            self.own_crossings_along::<1>(piece, z, samples, want, numbers);
+            self.own_crossings_along::<2>(piece, z, samples, want, numbers);
+        }
+    }
+
+    /// The axis is a constant, so that every index is one.
+    #[inline(always)]
+    fn own_crossings_along<const AXIS: usize>(
+        &mut self,
+        piece: &mut Piece,
+        z: usize,
+        samples: &impl Samples,
+        want: Attributes,
+        numbers: &mut Numbers,
+    ) {
+        let mut count = piece.own as u16;
+        piece.rank[3 * z + AXIS] = count;
+        for i in bits(piece.crossing[3 * z + AXIS]) {
+            let (x, y) = (i & 7, i >> 3);
+            *numbers.at(AXIS, x + 9 * y + 81 * z) = count;
+            count += 1;
+            self.push(&crossing(samples, [x as i32, y as i32, z as i32], AXIS, want), want);
         }
         piece.own = u32::from(count);
     }

@@ -16,45 +16,57 @@ pub(super) trait Samples {
     /// Derivative of the field per cell at an observed node: half the difference between its two neighbours along an
     /// axis, the whole one to the neighbour that was observed, 0 where neither was.
     fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
-        let here = self.value(node);
-        std::array::from_fn(|k| {
-            let (mut below, mut above) = (node, node);
-            below[k] -= 1;
-            above[k] += 1;
-            match (self.observed(below), self.observed(above)) {
-                (Some(b), Some(a)) => 0.5 * (a - b),
-                (Some(b), None) => here - b,
-                (None, Some(a)) => a - here,
-                (None, None) => 0.0,
-            }
-        })
+        careful_gradient(self, node)
     }
 }
 
-/// A brick and the 26 around it, x fastest; empty slices where there is none.
+/// [`Samples::gradient`] where anything may be missing.
+fn careful_gradient(samples: &(impl Samples + ?Sized), node: [i32; 3]) -> [f32; 3] {
+    let here = samples.value(node);
+    let mut gradient = [0.0; 3];
+    for k in 0..3 {
+        let (mut below, mut above) = (node, node);
+        below[k] -= 1;
+        above[k] += 1;
+        gradient[k] = match (samples.observed(below), samples.observed(above)) {
+            (Some(b), Some(a)) => 0.5 * (a - b),
+            (Some(b), None) => here - b,
+            (None, Some(a)) => a - here,
+            (None, None) => 0.0,
+        };
+    }
+    gradient
+}
+
+/// A brick and the 26 around it, x fastest; empty slices where there is none or where it is not needed.
 pub(super) struct BrickSamples<'a> {
     distances: [&'a [f32]; 27],
     weights: [&'a [f32]; 27],
     colors: [&'a [[u16; 4]]; 27],
-    min_weight: f32,
+    threshold: f32,
 }
 
 /// The brick itself in the order of [`BrickSamples`].
 pub(super) const MIDDLE: usize = 13;
 
+/// The weight from which on a cell counts as observed: positive, and at least `min_weight`.
+pub(super) fn threshold(min_weight: f32) -> f32 {
+    const SMALLEST: f32 = f32::from_bits(1);
+    if min_weight <= 0.0 { SMALLEST } else { min_weight }
+}
+
 impl<'a> BrickSamples<'a> {
-    pub(super) fn new(
-        bricks: impl Fn(usize) -> Option<&'a DistanceBrick>,
-        colors: impl Fn(usize) -> Option<&'a ColorBrick>,
-        min_weight: f32,
-    ) -> Self {
-        let bricks: [_; 27] = std::array::from_fn(bricks);
-        Self {
-            distances: bricks.map(|b| b.map_or(&[][..], DistanceBrick::distances)),
-            weights: bricks.map(|b| b.map_or(&[][..], DistanceBrick::weights)),
-            colors: std::array::from_fn(|i| colors(i).map_or(&[][..], ColorBrick::words)),
-            min_weight,
-        }
+    /// A cell was observed from a weight of `threshold` on.
+    pub(super) fn new(threshold: f32) -> Self {
+        Self { distances: [&[]; 27], weights: [&[]; 27], colors: [&[]; 27], threshold }
+    }
+
+    /// Puts the bricks in place.
+    #[inline]
+    pub(super) fn set(&mut self, i: usize, brick: Option<&'a DistanceBrick>, color: Option<&'a ColorBrick>) {
+        self.distances[i] = brick.map_or(&[], DistanceBrick::distances);
+        self.weights[i] = brick.map_or(&[], DistanceBrick::weights);
+        self.colors[i] = color.map_or(&[], ColorBrick::words);
     }
 
     /// The brick that holds a node, and the node's place in it.
@@ -76,7 +88,24 @@ impl Samples for BrickSamples<'_> {
     fn observed(&self, node: [i32; 3]) -> Option<f32> {
         let (brick, i) = Self::place(node);
         let weight = *self.weights[brick].get(i)?;
-        (weight > 0.0 && weight >= self.min_weight).then(|| self.distances[brick][i])
+        (weight >= self.threshold).then(|| self.distances[brick][i])
+    }
+
+    /// Inside of one brick the neighbours are at fixed distances in memory.
+    #[inline]
+    fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
+        let (brick, i) = Self::place(node);
+        let inner = node[0] & 7 != 0 && node[0] & 7 != 7 && i >= 64 + 8 && i < 512 - 64 - 8;
+        if inner && node[1] & 7 != 0 && node[1] & 7 != 7 {
+            let (from, d, w) = (i - 64, self.distances[brick], self.weights[brick]);
+            if let (Some(d), Some(w)) = (d.get(from..from + 129), w.get(from..from + 129)) {
+                let at = [(63, 65), (56, 72), (0, 128)];
+                if at.iter().all(|&(b, a)| w[b] >= self.threshold && w[a] >= self.threshold) {
+                    return at.map(|(b, a)| 0.5 * (d[a] - d[b]));
+                }
+            }
+        }
+        careful_gradient(self, node)
     }
 
     #[inline]
@@ -99,8 +128,8 @@ pub(super) struct DenseSamples<'a> {
 impl DenseSamples<'_> {
     #[inline(always)]
     fn index(&self, node: [i32; 3]) -> usize {
-        let [x, y, z] = [0, 1, 2].map(|k| self.first[k].wrapping_add_signed(node[k] as isize));
-        x + self.shape[0] * (y + self.shape[1] * z)
+        let at = |k: usize| self.first[k].wrapping_add_signed(node[k] as isize);
+        at(0).wrapping_add(self.shape[0].wrapping_mul(at(1).wrapping_add(self.shape[1].wrapping_mul(at(2)))))
     }
 }
 
@@ -114,6 +143,25 @@ impl Samples for DenseSamples<'_> {
     fn observed(&self, node: [i32; 3]) -> Option<f32> {
         let inside = (0..3).all(|k| self.first[k].wrapping_add_signed(node[k] as isize) < self.shape[k]);
         inside.then(|| self.value(node)).filter(|v| v.is_finite())
+    }
+
+    /// Away from the border the neighbours are at fixed distances in memory.
+    #[inline]
+    fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
+        let inner = |k: usize| {
+            let at = self.first[k].wrapping_add_signed(node[k] as isize);
+            at > 0 && at + 1 < self.shape[k]
+        };
+        if inner(0) && inner(1) && inner(2) {
+            let (i, row) = (self.index(node), self.shape[0]);
+            let half = |stride: usize| 0.5 * (self.samples[i + stride] - self.samples[i - stride]);
+            let gradient = [half(1), half(row), half(row * self.shape[1])];
+            // A neighbour that is not finite makes the difference so.
+            if gradient.iter().all(|v| v.is_finite()) {
+                return gradient;
+            }
+        }
+        careful_gradient(self, node)
     }
 
     fn color(&self, _: [i32; 3]) -> Option<Color> {

@@ -89,12 +89,12 @@ impl Layers {
     }
 }
 
-/// Signs of a brick's cells; those of a weight of 0 or below `min_weight` were not observed.
-pub(super) fn signs_of_brick(brick: &DistanceBrick, min_weight: f32) -> Signs {
+/// Signs of a brick's cells; those of a weight below `threshold` were not observed.
+pub(super) fn signs_of_brick(brick: &DistanceBrick, threshold: f32) -> Signs {
     let mut signs = Signs::NOTHING;
     let planes = brick.distances().as_chunks::<64>().0.iter().zip(brick.weights().as_chunks::<64>().0);
     for (z, (d, w)) in planes.enumerate().take(8) {
-        signs.observed[z] = word(w, |w| w > 0.0 && w >= min_weight);
+        signs.observed[z] = word(w, |w| w >= threshold);
         signs.inside[z] = word(d, |d| d < 0.0) & signs.observed[z];
     }
     signs

@@ -1,0 +1,199 @@
+//! A mesh that follows a map: only bricks near a change are meshed again.
+
+use super::assemble::{Placement, assemble};
+use super::extract::{MeshSettings, neighbour, order};
+use super::parallel::map;
+use super::piece::{Attributes, Numbers, Part};
+use super::samples::{BrickSamples, threshold};
+use super::signs::{Layers, Signs, signs_of_brick};
+use crate::cell::{Color, SignedDistance};
+use crate::geom::BlockKey;
+use crate::store::Bricks;
+use crate::surface::Mesh;
+use rustc_hash::FxHashMap;
+
+/// The pieces of a mesh, brick by brick, kept between changes of the map.
+///
+/// [`IncrementalMesh::update`] meshes again what changed since the last call; [`IncrementalMesh::mesh`] joins the pieces
+/// and gives the same bytes as [`marching_cubes`](super::marching_cubes) over the whole map.
+#[derive(Debug)]
+pub struct IncrementalMesh {
+    settings: MeshSettings,
+    /// Whether the pieces have colours: whether the last update was given any.
+    colored: bool,
+    pieces: FxHashMap<BlockKey<3>, Part>,
+    /// Epochs of distances and colours up to which the pieces are.
+    seen: [u64; 2],
+    placement: Option<Placement>,
+}
+
+impl IncrementalMesh {
+    /// A mesh of nothing yet.
+    pub fn new(settings: MeshSettings) -> Self {
+        Self { settings, colored: false, pieces: FxHashMap::default(), seen: [0; 2], placement: None }
+    }
+
+    /// Meshes the bricks again that changed since the last call, and those of their neighbours that read their cells:
+    /// the lower ones, and with normals, which come from differences between cells, all. Returns the keys of the pieces
+    /// that were made again, ascending. O(bricks) to look for changes, then O(changed bricks).
+    ///
+    /// `store` and `colors` must be those of the last call, changed since; another map needs another `IncrementalMesh`.
+    pub fn update(
+        &mut self,
+        store: &Bricks<SignedDistance, 3>,
+        colors: Option<&Bricks<Color, 3>>,
+    ) -> Vec<BlockKey<3>> {
+        let want = self.settings.attributes(colors.is_some());
+        if want.colors != self.colored {
+            // Nothing of the pieces without colours can be kept.
+            self.pieces.clear();
+            self.seen = [0; 2];
+            self.colored = want.colors;
+        }
+        let colors = colors.filter(|_| want.colors);
+        let mut dirty: Vec<BlockKey<3>> = Vec::new();
+        let mut mark = |changed: Vec<BlockKey<3>>, all: bool| {
+            for key in changed {
+                // A neighbour whose upper neighbour changed is a lower neighbour of the change.
+                let lower = |i: &usize| all || [i % 3, i / 3 % 3, i / 9].iter().all(|&k| k < 2);
+                dirty.extend((0..27).filter(lower).map(|i| neighbour(key, i)));
+            }
+        };
+        mark(store.changed_since(self.seen[0]), want.normals);
+        if let Some(colors) = colors {
+            mark(colors.changed_since(self.seen[1]), false);
+        }
+        dirty.sort_unstable_by_key(|key| order(*key));
+        dirty.dedup();
+        dirty.retain(|key| store.brick(*key).is_some());
+        let parts = map(dirty.len(), Numbers::new, |numbers, i| {
+            mesh_brick(store, colors, self.settings.min_weight, want, dirty[i], numbers)
+        });
+        for (key, part) in dirty.iter().zip(parts) {
+            if part.pieces.is_empty() {
+                self.pieces.remove(key);
+            } else {
+                self.pieces.insert(*key, part);
+            }
+        }
+        self.seen = [store.epoch(), colors.map_or(0, Bricks::epoch)];
+        self.placement = Some(Placement::of(store));
+        dirty
+    }
+
+    /// The mesh as of the last update. O(triangles).
+    pub fn mesh(&self) -> Mesh {
+        let Some(placement) = &self.placement else { return Mesh::default() };
+        let mut pieces: Vec<_> = self
+            .pieces
+            .values()
+            .flat_map(|part| part.pieces.iter().map(move |piece| (part, piece)))
+            .collect();
+        pieces.sort_unstable_by_key(|(_, piece)| order(piece.key));
+        assemble(&pieces, placement, self.settings.attributes(self.colored))
+    }
+
+    /// Bytes that the pieces hold.
+    pub fn memory_bytes(&self) -> usize {
+        self.pieces.values().map(Part::memory_bytes).sum::<usize>()
+            + self.pieces.capacity() * (size_of::<(BlockKey<3>, Part)>() + 1)
+    }
+}
+
+/// The piece of one brick.
+fn mesh_brick(
+    store: &Bricks<SignedDistance, 3>,
+    colors: Option<&Bricks<Color, 3>>,
+    min_weight: f32,
+    want: Attributes,
+    key: BlockKey<3>,
+    numbers: &mut Numbers,
+) -> Part {
+    let threshold = threshold(min_weight);
+    let octants: [Signs; 8] = std::array::from_fn(|o| {
+        let at = BlockKey(std::array::from_fn(|k| key.0[k] + (o >> k & 1) as i32));
+        store.brick(at).map_or(Signs::NOTHING, |brick| signs_of_brick(brick, threshold))
+    });
+    let layers = Layers::new(octants.each_ref());
+    let mut part = Part::default();
+    if layers.any_crossing() {
+        let mut samples = BrickSamples::new(threshold);
+        for i in 0..27 {
+            let at = neighbour(key, i);
+            samples.set(i, store.brick(at), colors.and_then(|colors| colors.brick(at)));
+        }
+        part.add(key, &layers, &samples, want, numbers);
+    }
+    part
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::{ColorBrick, DistanceBrick};
+    use crate::geom::Lattice;
+    use crate::surface::cubes::testing::{Random, bricks};
+    use crate::surface::marching_cubes;
+    use proptest::prelude::*;
+
+    fn noise_brick(random: &mut Random, holes: u64) -> DistanceBrick {
+        let distances: Vec<f32> = (0..512).map(|_| random.value()).collect();
+        let weights: Vec<f32> =
+            (0..512).map(|_| if random.next() % 100 < holes { 0.0 } else { 1.0 }).collect();
+        DistanceBrick::from_parts(&distances, &weights).unwrap()
+    }
+
+    fn color_brick(random: &mut Random) -> ColorBrick {
+        let words: Vec<[u16; 4]> = (0..512).map(|_| std::array::from_fn(|_| random.next() as u16)).collect();
+        ColorBrick::from_words(&words)
+    }
+
+    fn random_key(random: &mut Random) -> BlockKey<3> {
+        BlockKey(std::array::from_fn(|_| (random.next() % 4) as i32 - 2))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn meshing_changes_equals_meshing_all(seed: u64, normals: bool, colored: bool, holes in 0..12u64) {
+            let mut random = Random(seed);
+            let lattice = Lattice::new([500_000.0, 4_000_000.0, -3.0], 0.05);
+            let (mut store, mut colors) = (Bricks::new(lattice), Bricks::new(lattice));
+            let settings = MeshSettings { min_weight: 0.5, normals, colors: true };
+            let mut incremental = IncrementalMesh::new(settings);
+            for round in 0..6 {
+                for _ in 0..1 + random.next() % 4 {
+                    store.insert(random_key(&mut random), noise_brick(&mut random, holes)).unwrap();
+                }
+                if round % 2 == 0 {
+                    colors.insert(random_key(&mut random), color_brick(&mut random)).unwrap();
+                }
+                let colors = colored.then_some(&colors);
+                incremental.update(&store, colors);
+                let (mesh, whole) = (incremental.mesh(), marching_cubes(&store, colors, &settings));
+                prop_assert_eq!(whole.edge_counts().faulty, 0);
+                prop_assert_eq!(whole.colors.len(), if colored { whole.vertices.len() } else { 0 });
+                prop_assert!(mesh == whole);
+                // Nothing changed: nothing is done.
+                prop_assert!(incremental.update(&store, colors).is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn a_change_reaches_its_lower_neighbours_only() {
+        let plane = |c: [i32; 3]| c[2] as f32 - 11.5;
+        let mut store = bricks(Lattice::new([0.0; 3], 0.1), [0; 3], [40; 3], plane);
+        let mut incremental =
+            IncrementalMesh::new(MeshSettings { normals: false, ..MeshSettings::default() });
+        assert_eq!(incremental.mesh(), Mesh::default());
+        assert_eq!(incremental.update(&store, None).len(), 125);
+        let key = BlockKey([2, 2, 1]);
+        let brick = store.brick(key).unwrap().clone();
+        store.insert(key, brick).unwrap();
+        let again = incremental.update(&store, None);
+        assert_eq!((again.len(), again[0], again[7]), (8, BlockKey([1, 1, 0]), key));
+        assert_eq!(incremental.mesh().triangles.len(), 2 * 39 * 39);
+        assert!(incremental.memory_bytes() > 0);
+    }
+}
