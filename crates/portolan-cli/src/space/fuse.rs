@@ -61,8 +61,12 @@ pub(crate) fn fuse(
     std::thread::scope(|scope| {
         let (send, receive) = sync_channel::<Read>(AHEAD);
         scope.spawn(move || {
-            // Nobody receives any more where fusing has ended early.
-            indices.iter().map(|&i| read(i)).try_for_each(|frame| send.send(frame)).ok()
+            for &i in indices {
+                // Nobody receives any more where fusing has ended early.
+                if send.send(read(i)).is_err() {
+                    break;
+                }
+            }
         });
         fuse_all(maps, log, receive.into_iter(), memory, &mut report, progress);
     });

@@ -3,7 +3,7 @@
 use anyhow::bail;
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Lattice};
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{OccupancySweep, PointSweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
 use portolan::scan::{Body, FrameFilter};
 use portolan::sweep::WeightModel;
 use portolan_io::weights_word;
@@ -12,6 +12,9 @@ use serde_json::{Map, Value, json};
 use super::SpaceMaps;
 use crate::json::object;
 use crate::mapping::{MapKind, map_word};
+
+/// Rays are followed so far (cells): beyond a million cells a range is no measurement.
+const FARTHEST_CELLS: f64 = (1u32 << 20) as f64;
 
 /// All that decides what the maps will hold.
 #[derive(Clone, Debug)]
@@ -49,6 +52,12 @@ impl Settings {
             carve: self.carve,
             carve_weight: self.carve_weight,
             color: self.color,
+            sweep: match self.sweep {
+                OccupancySweep::Exact => PointSweep::Rays,
+                _ => PointSweep::Projective,
+            },
+            // What is beyond the caller's limit is cut before; the map's own is as far as it reaches.
+            max_range: FARTHEST_CELLS * self.resolution - self.truncation,
             ..SparseTsdfConfig::default()
         }
     }
