@@ -59,32 +59,29 @@ impl SpaceLog {
         parts: Parts,
         options: &SpaceLogOptions,
     ) -> Result<Self, IoError> {
-        let Parts { name, source, scans, poses, mut convention, posed_from_sensor, camera, mut stats } =
-            parts;
+        let Parts { name, source, scans, poses, convention, posed_from_sensor, camera, mut stats } = parts;
         if scans.is_empty() {
             return Err(IoError::layout(path, "the number of scans", "0", "give a log with scans"));
         }
-        let poses = match (&options.poses, poses) {
-            (Some(file), _) => {
-                convention = PoseConvention::WorldFromSensor;
-                LayoutPoses::File(read_poses_3d(file)?)
-            }
-            (None, LayoutPoses::Missing(looked_for)) => {
-                let advice = format!("looked for {looked_for}; name a file with --poses");
-                return Err(IoError::layout(path, "the pose file", "missing", advice));
-            }
-            (None, poses) => poses,
+        // A file that the caller names has nothing to do with the oddities of the layout.
+        let convention = match &options.poses {
+            Some(_) => PoseConvention::WorldFromSensor,
+            None => convention,
         };
         let convention = options.pose_convention.unwrap_or(convention);
         let mut resolver = Resolver { convention, posed_from_sensor, stats: &mut stats };
-        let matches = match poses {
-            LayoutPoses::File(file) => {
+        let named = options.poses.as_ref().map(read_poses_3d).transpose()?;
+        let matches = match (named, poses) {
+            (Some(file), _) | (None, LayoutPoses::File(file)) => {
                 let track: Vec<TrackPose> =
                     file.poses.iter().map(|raw| resolver.resolve(&file.path, raw)).collect();
                 match_poses(&scans, &track, options.time_tolerance, &file.path, &mut stats)?
             }
-            LayoutPoses::PerScan(all) => resolver.per_scan(&all),
-            LayoutPoses::Missing(_) => Vec::new(),
+            (None, LayoutPoses::PerScan(all)) => resolver.per_scan(&all),
+            (None, LayoutPoses::Missing(looked_for)) => {
+                let advice = format!("looked for {looked_for}; name a file with --poses");
+                return Err(IoError::layout(path, "the pose file", "missing", advice));
+            }
         };
         stats.scans = scans.len() as u64;
         let entries = entries(&scans, &matches);

@@ -1,10 +1,12 @@
 //! What a format delivers: scans to be read, and where their poses are.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 use portolan::scan::Frame;
 
+use super::files::names_in;
 use super::{Camera, SpaceLogStats};
 use crate::IoError;
 use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
@@ -72,4 +74,16 @@ pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>, IoE
         return Err(IoError::layout(path, "the number of poses", value, "give one pose per scan"));
     }
     Ok(file.poses.pop().map(|pose| (file.path, pose)))
+}
+
+/// How many files of poses, one each, lie in a folder beside no scan. `name_of_scan` makes the name of a scan of that of a
+/// pose, and tells other files by `None`.
+pub(super) fn poses_beside_nothing(
+    folder: &Path,
+    scans: &[String],
+    name_of_scan: impl Fn(&str) -> Option<String>,
+) -> Result<u64, IoError> {
+    let scans: HashSet<&str> = scans.iter().map(String::as_str).collect();
+    let alone = |name: &str| name_of_scan(name).is_some_and(|scan| !scans.contains(&*scan));
+    Ok(names_in(folder, alone)?.len() as u64)
 }

@@ -13,7 +13,7 @@ use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
 use super::files::{has_extension, has_name, name_of, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::matching::nearest_in_time;
-use super::parts::{LayoutPoses, Parts, ScanId, pose_beside};
+use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{SpaceLogOptions, SpaceLogStats};
 use crate::IoError;
 use crate::poses3::{PoseConvention, read_poses_3d};
@@ -55,6 +55,11 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
         pinhole: camera.pinhole,
     });
     let frames = frames.collect();
+    let poses = poses_of(path, &names, options)?;
+    if matches!(poses, LayoutPoses::PerScan(_)) {
+        let name_of_scan = |pose: &str| Some(format!("{}.png", pose.strip_suffix(".txt")?));
+        stats.poses_without_scan = poses_beside_nothing(&path.join(POSE_FOLDER), &names, name_of_scan)?;
+    }
     let scan = |name: &String| {
         let (number, time) = number_and_time(name);
         ScanId { path: folder.join(name), number, time }
@@ -63,7 +68,7 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
         name: name_of(path),
         source: Box::new(DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?),
         scans: names.iter().map(scan).collect(),
-        poses: poses_of(path, &names, options)?,
+        poses,
         convention: PoseConvention::WorldFromSensor,
         posed_from_sensor: None,
         camera: Some(camera),
@@ -201,13 +206,14 @@ mod tests {
             write_depth(&file(&format!("depth/{i}.png")), i, 1000.0);
             write(&file(&format!("pose/{i}.txt")), matrix_text(&camera_pose(i)));
         }
+        write(&file("pose/11.txt"), matrix_text(&camera_pose(11)));
         write(&file("pose/5.txt"), "-inf -inf -inf -inf\n".repeat(4));
         let [fx, fy, cx, cy] = SMALL_CAMERA;
         let matrix = format!("{fx} 0 {cx} 0\n0 {fy} {cy} 0\n0 0 1 0\n0 0 0 1\n");
         write(&file("intrinsic/intrinsic_depth.txt"), matrix);
         write(&file("color/0.jpg"), bytes_of(RED_JPEG));
         let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-        assert_eq!((log.len(), log.stats().refused_poses.len()), (10, 1));
+        assert_eq!((log.len(), log.stats().refused_poses.len(), log.stats().poses_without_scan), (10, 1, 1));
         assert_is_picture(&log, 9, 10);
         assert!(log.stats().colors_left_out.is_some());
     }

@@ -9,12 +9,13 @@ use std::path::Path;
 use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
 use super::files::{has_name, name_of, names_in, number_in};
 use super::intrinsics::find_camera;
-use super::parts::{LayoutPoses, Parts, ScanId, pose_beside};
+use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{SpaceLogOptions, SpaceLogStats};
 use crate::IoError;
 use crate::poses3::PoseConvention;
 
 const DEPTH: &str = ".depth.png";
+const POSE: &str = ".pose.txt";
 const UNITS_PER_METRE: f64 = 1000.0;
 const CAMERA: [f64; 4] = [585.0, 585.0, 320.0, 240.0];
 
@@ -41,10 +42,14 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
         frames.push(DepthFrame { depth, color, pinhole: camera.pinhole });
         // A file of poses makes those beside the scans unneeded, however broken they may be.
         if options.poses.is_none() {
-            poses.push(pose_beside(&path.join(format!("{stem}.pose.txt")))?);
+            poses.push(pose_beside(&path.join(format!("{stem}{POSE}")))?);
         }
     }
     let mut stats = SpaceLogStats::default();
+    if options.poses.is_none() {
+        let name_of_scan = |pose: &str| Some(format!("{}{DEPTH}", pose.strip_suffix(POSE)?));
+        stats.poses_without_scan = poses_beside_nothing(path, &names, name_of_scan)?;
+    }
     let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
     Ok(Parts {
         name: name_of(path),
@@ -143,7 +148,7 @@ mod tests {
         assert_is_picture(&log, 1, 5);
         let stats = log.stats();
         assert_eq!((stats.scans, stats.poses, stats.scans_without_pose), (5, 4, 1));
-        assert_eq!((stats.mended_poses, stats.scans_without_color), (1, 4));
+        assert_eq!((stats.mended_poses, stats.scans_without_color, stats.poses_without_scan), (1, 4, 1));
         assert!((stats.worst_pose - 2e-3).abs() < 1e-5);
         let refused: Vec<String> = stats.refused_poses.iter().map(ToString::to_string).collect();
         assert!(
