@@ -4,13 +4,11 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::bytes::{Endian, Input, Scalar, open};
-use crate::points::{CloudBuilder, PointCloudFile};
+use crate::points::{CloudBuilder, PointCloudFile, most_bytes};
 use crate::{IoError, write_atomic};
 
 /// Bytes of a point.
 const STRIDE: usize = 16;
-/// The most bytes of a file.
-const MOST_BYTES: u64 = 1 << 32;
 
 /// Reads a scan (metres, the lidar's frame: x forward, y left, z up).
 ///
@@ -21,7 +19,7 @@ pub fn read_kitti_bin(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError>
 }
 
 pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
-    let bytes = input.read_all(MOST_BYTES)?;
+    let bytes = input.read_all(most_bytes(&input))?;
     let points = bytes.chunks_exact(STRIDE);
     if !points.remainder().is_empty() {
         let at = (bytes.len() - points.remainder().len()) as u64;

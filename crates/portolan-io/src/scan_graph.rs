@@ -9,10 +9,7 @@ use portolan::geom::Pose;
 
 use crate::IoError;
 use crate::bytes::{Endian, Input, Scalar, open};
-use crate::points::{CloudBuilder, PointCloudFile};
-
-/// The most bytes of a file.
-const MOST_BYTES: u64 = 1 << 32;
+use crate::points::{CloudBuilder, PointCloudFile, most_bytes};
 
 /// One scan of a graph.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +32,7 @@ pub fn read_scan_graph(path: impl AsRef<Path>) -> Result<Vec<ScanGraphNode>, IoE
 }
 
 pub(crate) fn parse(mut input: Input) -> Result<Vec<ScanGraphNode>, IoError> {
-    let bytes = input.read_all(MOST_BYTES)?;
+    let bytes = input.read_all(most_bytes(&input))?;
     let mut reader = Reader { bytes: &bytes, at: 0, path: input.path() };
     let count = reader.u32("the number of scans")?;
     // Every node takes bytes, so that a wrong count ends at the end of the file.

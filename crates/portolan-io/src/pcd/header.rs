@@ -7,9 +7,9 @@ use crate::bytes::{Scalar, fields, parse_f64};
 use crate::error::shown;
 use crate::points::Viewpoint;
 
-/// The most fields, and the most values of a field.
+/// The most fields, and the most values of a point.
 const MOST_FIELDS: usize = 256;
-const MOST_COUNT: usize = 1 << 16;
+const MOST_COUNT: usize = 1 << 14;
 /// The most points that a cloud may have.
 const MOST_POINTS: usize = 1 << 30;
 
@@ -152,9 +152,13 @@ impl Lines<'_> {
                 let value = format!("{} of size {}", shown(self.types[i]), shown(self.sizes[i]));
                 return wrong("a TYPE", value, "write I or U of 1, 2, 4, 8 bytes, or F of 4 or 8");
             };
-            let count = self.counts.get(i).map_or(Some(1), |w| whole(w)).filter(|c| *c <= MOST_COUNT);
+            let count = self.counts.get(i).map_or(Some(1), |w| whole(w)).filter(|c| *c <= MOST_COUNT - word);
             let Some(count) = count else {
-                return wrong("a COUNT", shown(self.counts[i]), &format!("write at most {MOST_COUNT}"));
+                return wrong(
+                    "a COUNT",
+                    shown(self.counts[i]),
+                    &format!("write at most {MOST_COUNT} in all"),
+                );
             };
             // Text may hold more digits than the float that the header speaks of.
             let coordinate = ["x", "y", "z"].contains(&name.as_str());

@@ -8,10 +8,8 @@ use super::lzf;
 use crate::IoError;
 use crate::bytes::{Input, Scalar, fields, open, parse_f64};
 use crate::error::shown;
-use crate::points::{CloudBuilder, PointCloudFile, Viewpoint, channel, is_time, time_unit};
+use crate::points::{CloudBuilder, PointCloudFile, Viewpoint, channel, is_time, most_bytes, time_unit};
 
-/// The most bytes of a file.
-const MOST_BYTES: u64 = 4 << 30;
 /// A header is no longer than this (bytes).
 const LONGEST_HEADER: u64 = 64 << 10;
 
@@ -31,7 +29,7 @@ pub(crate) fn read_viewpoint(path: &Path) -> Result<Option<Viewpoint>, IoError> 
 }
 
 pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
-    let bytes = input.read_all(MOST_BYTES)?;
+    let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }
 

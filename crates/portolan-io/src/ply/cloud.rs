@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use super::MOST_BYTES;
 use super::body::Body;
 use super::header::{self, Element, Header};
 use crate::IoError;
 use crate::bytes::{Input, Scalar, open};
-use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, channel, is_time, time_unit};
+use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, channel, is_time, most_bytes, time_unit};
 
 /// The most pixels of a range grid.
 const MOST_PIXELS: u64 = 1 << 30;
@@ -24,7 +23,7 @@ pub fn read_ply_cloud(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError>
 }
 
 pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
-    let bytes = input.read_all(MOST_BYTES)?;
+    let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }
 

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use super::MOST_BYTES;
 use super::body::Body;
 use super::header::{self, Element};
 use crate::IoError;
 use crate::bytes::open;
-use crate::points::channel;
+use crate::points::{channel, most_bytes};
 
 /// A mesh of triangles. `normals` and `colors` have one entry per vertex, or none at all.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,7 +31,7 @@ pub struct PlyMesh {
 /// not there.
 pub fn read_ply_mesh(path: impl AsRef<Path>) -> Result<PlyMesh, IoError> {
     let mut input = open(path)?;
-    let bytes = input.read_all(MOST_BYTES)?;
+    let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }
 

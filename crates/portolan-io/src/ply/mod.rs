@@ -24,6 +24,3 @@ pub(crate) fn has_faces(path: &std::path::Path) -> bool {
     let is_face = |e: &header::Element| matches!(e.name.as_str(), "face" | "tristrips") && e.count > 0;
     header.is_ok_and(|h| h.elements.iter().any(is_face))
 }
-
-/// The most bytes of a file.
-const MOST_BYTES: u64 = 4 << 30;

@@ -6,5 +6,5 @@ mod read;
 
 pub(crate) use builder::{CloudBuilder, channel, is_time, time_unit};
 pub use cloud::{CloudGrid, PointCloudFile, RefusedPoints, Viewpoint};
-pub(crate) use read::read_points_as;
 pub use read::{PointFormat, parse_points, point_format, read_points};
+pub(crate) use read::{most_bytes, read_points_as};

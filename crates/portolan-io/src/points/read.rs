@@ -4,8 +4,16 @@ use std::io::BufRead;
 use std::path::Path;
 
 use super::PointCloudFile;
-use crate::bytes::{Input, open};
+use crate::bytes::{Compression, Input, open};
 use crate::{IoError, kitti_bin, pcd, ply, xyz};
+
+/// The most bytes of a file that is read as a whole: what few bytes unpack to is kept within the memory of a small machine.
+pub(crate) fn most_bytes(input: &Input) -> u64 {
+    match input.compression() {
+        Compression::Plain => 1 << 34,
+        _ => 1 << 30,
+    }
+}
 
 /// The formats of single clouds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -33,6 +33,9 @@ const ENDINGS: [(&str, PointFormat); 9] = [
     ("pts", PointFormat::Xyz),
     ("asc", PointFormat::Xyz),
 ];
+/// Endings that many things have: clouds where the caller says so.
+const TEXT_ENDINGS: [(&str, PointFormat); 3] =
+    [("csv", PointFormat::Xyz), ("txt", PointFormat::Xyz), ("dat", PointFormat::Xyz)];
 /// Folders below that clouds may be in.
 const FOLDERS: [&str; 6] = ["pcd", "scans", "clouds", "lidar", "points", "velodyne"];
 /// What a file of poses is called.
@@ -45,7 +48,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     if path.is_file() {
         return is_cloud(path);
     }
-    folder_of(path).is_some()
+    folder_of(path, &ENDINGS).is_some()
 }
 
 /// Whether a file is a cloud, and neither a mesh nor any data with such an ending.
@@ -65,14 +68,18 @@ fn is_cloud(path: &Path) -> bool {
 
 /// The ending of a file of points, `.gz` and `.bz2` behind it aside.
 fn ending_of(name: &str) -> Option<(&'static str, PointFormat)> {
+    ending_among(&ENDINGS, name)
+}
+
+fn ending_among(endings: &[(&'static str, PointFormat)], name: &str) -> Option<(&'static str, PointFormat)> {
     let packed = ["gz", "bz2"].iter().find(|e| has_extension(name, e));
     let name = packed.map_or(name, |e| &name[..name.len() - e.len() - 1]);
-    ENDINGS.into_iter().find(|(ending, _)| has_extension(name, ending))
+    endings.iter().copied().find(|(ending, _)| has_extension(name, ending))
 }
 
 /// The folder with clouds: this one or one below.
-fn folder_of(path: &Path) -> Option<PathBuf> {
-    let has_clouds = |folder: &Path| has_name(folder, |name| ending_of(name).is_some());
+fn folder_of(path: &Path, endings: &[(&'static str, PointFormat)]) -> Option<PathBuf> {
+    let has_clouds = |folder: &Path| has_name(folder, |name| is_one_of(endings, name));
     if has_clouds(path) {
         return Some(path.into());
     }
@@ -83,11 +90,13 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
     if path.is_file() {
         return open_file(path, options);
     }
-    let Some(folder) = folder_of(path) else {
+    let asked = options.format.is_some();
+    let endings = if asked && folder_of(path, &ENDINGS).is_none() { &TEXT_ENDINGS[..] } else { &ENDINGS[..] };
+    let Some(folder) = folder_of(path, endings) else {
         let advice = "give a folder of .pcd, .ply, .bin or .xyz files";
         return Err(IoError::layout(path, "the number of clouds", "0", advice));
     };
-    let (names, format) = clouds_in(&folder)?;
+    let (names, format) = clouds_in(&folder, endings)?;
     let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     let pose_file = match &options.poses {
         Some(_) => None,
@@ -101,8 +110,8 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
     };
     let source = CloudFrames::new(files.clone(), Some(format), rays)?;
     let scan = |file: &PathBuf| {
-        let number = file.file_name().and_then(|n| number_in(n.to_str()?));
-        ScanId { path: file.clone(), number, time: None }
+        let name = file.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        ScanId { path: file.clone(), number: number_in(name), time: time_in(name) }
     };
     Ok(parts(path, source, files.iter().map(scan).collect(), poses))
 }
@@ -135,28 +144,54 @@ fn open_file(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
     Ok(parts(path, source, vec![scan], poses))
 }
 
+/// Whether a file has one of the endings and is not called like poses.
+fn is_one_of(endings: &[(&'static str, PointFormat)], name: &str) -> bool {
+    ending_among(endings, name).is_some() && !is_poses(name)
+}
+
 /// The clouds of the most frequent ending, in natural order.
-fn clouds_in(folder: &Path) -> Result<(Vec<String>, PointFormat), IoError> {
-    let names = names_in(folder, |name| ending_of(name).is_some())?;
-    let count =
-        |ending: &str| names.iter().filter(|n| ending_of(n).is_some_and(|(e, _)| e == ending)).count();
+fn clouds_in(
+    folder: &Path,
+    endings: &[(&'static str, PointFormat)],
+) -> Result<(Vec<String>, PointFormat), IoError> {
+    let names = names_in(folder, |name| is_one_of(endings, name))?;
+    let ending = |name: &String| ending_among(endings, name).map(|(ending, _)| ending);
+    let count = |wanted: &str| names.iter().filter(|n| ending(n) == Some(wanted)).count();
     // The first of equals wins: the order of endings.
-    let mut best = ENDINGS[0];
-    for candidate in ENDINGS {
+    let mut best = endings[0];
+    for candidate in endings {
         if count(candidate.0) > count(best.0) {
-            best = candidate;
+            best = *candidate;
         }
     }
-    let wanted = |name: &String| ending_of(name).is_some_and(|(ending, _)| ending == best.0);
-    Ok((names.into_iter().filter(wanted).collect(), best.1))
+    let wanted = names.iter().filter(|name| ending(name) == Some(best.0)).cloned().collect();
+    Ok((wanted, best.1))
+}
+
+fn is_poses(name: &str) -> bool {
+    let lower = name.to_ascii_lowercase();
+    POSE_ENDINGS.iter().any(|e| has_extension(name, e)) && POSE_WORDS.iter().any(|w| lower.contains(w))
+}
+
+/// The time that a name is: seconds with a dot (`1630577758.569.pcd`), sixteen digits of microseconds or nineteen of
+/// nanoseconds.
+fn time_in(name: &str) -> Option<f64> {
+    let ending = ending_of(name).or_else(|| ending_among(&TEXT_ENDINGS, name))?.0;
+    let stem = name.get(..name.rfind(ending)?)?.strip_suffix('.')?;
+    if !stem.bytes().all(|b| b.is_ascii_digit() || b == b'.') {
+        return None;
+    }
+    let unit = match (stem.contains('.'), stem.len()) {
+        (true, _) => 1.0,
+        (false, 16) => 1e-6,
+        (false, 19) => 1e-9,
+        _ => return None,
+    };
+    stem.parse::<f64>().ok().map(|t| t * unit)
 }
 
 /// The only file that is called like poses, in the log's folder or that of its scans.
 fn pose_file(path: &Path, folder: &Path) -> Result<Option<PathBuf>, IoError> {
-    let is_poses = |name: &str| {
-        let lower = name.to_ascii_lowercase();
-        POSE_ENDINGS.iter().any(|e| has_extension(name, e)) && POSE_WORDS.iter().any(|w| lower.contains(w))
-    };
     for place in [path, folder] {
         let names = names_in(place, is_poses)?;
         match &names[..] {

@@ -129,6 +129,32 @@ fn folders_of_clouds_with_poses_in_every_layout() {
 }
 
 #[test]
+fn names_that_are_times_are_matched_by_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    for name in ["1700000000.25.xyz", "1700000000.75.xyz"] {
+        fs::write(path.join(name), "1 2 3\n4 5 6\n").unwrap();
+    }
+    // 20 poses a second.
+    let line = |k: u32| format!("17000000{:02}.{:02} {k} 0 0 0 0 0 1\n", k / 20, k % 20 * 5 + 2);
+    let tum: String = (0..24).map(line).collect();
+    fs::write(path.join("traj.tum"), &tum).unwrap();
+    let log = open(path);
+    let x = [0, 1].map(|i| log.pose(i).translation[0]);
+    // A double of this size resolves 0.24 microseconds.
+    assert!((x[0] - 4.6).abs() < 1e-4 && (x[1] - 14.6).abs() < 1e-4, "{x:?}");
+    // Nanoseconds; clouds of an ending that many things have need to be asked for.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fs::write(path.join("poses.tum"), &tum).unwrap();
+    fs::write(path.join("1700000000500000000.csv"), "x,y,z\n1,2,3\n").unwrap();
+    assert_eq!(SpaceLogKind::recognise(path), None);
+    let log =
+        SpaceLog::open(path, &SpaceLogOptions { format: Some(SpaceLogKind::Clouds), ..Default::default() });
+    assert!(distance(world(&log.unwrap(), 0)[0], [10.6, 2.0, 3.0]) < 1e-4);
+}
+
+#[test]
 fn clouds_far_away_keep_their_millimetres() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("utm.xyz");
