@@ -21,6 +21,7 @@ mod rings;
 mod spherical_layout;
 mod stats;
 
+pub(crate) use angles::atan2;
 pub use beam::{Beam, BeamKind};
 pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, connected};
