@@ -141,17 +141,12 @@ pub(crate) fn sweep_word(sweep: OccupancySweep) -> &'static str {
     match sweep {
         OccupancySweep::Auto => "auto",
         OccupancySweep::Exact => "exact",
-        other => unreachable_sweep(other),
+        OccupancySweep::Projective => "projective",
     }
 }
 
 /// The sweep of a word.
 pub(crate) fn sweep_of(word: &str) -> Option<OccupancySweep> {
-    let all = [OccupancySweep::Auto, OccupancySweep::Exact];
+    let all = [OccupancySweep::Auto, OccupancySweep::Exact, OccupancySweep::Projective];
     all.into_iter().find(|&s| sweep_word(s) == word)
-}
-
-/// Sweeps that have no word yet.
-fn unreachable_sweep(_: OccupancySweep) -> &'static str {
-    "projective"
 }

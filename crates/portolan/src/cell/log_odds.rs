@@ -259,7 +259,7 @@ impl<V: LogOddsValue> Planes<V> for Vec<V> {
 
 /// The filter in its own arithmetic; both cells are this, with another scalar.
 macro_rules! log_odds_cell {
-    ($cell:ident, $scalar:ty, $step:ident) => {
+    ($cell:ident, $scalar:ty, $step:ident, $brick:path) => {
         impl Cell for $cell {
             type Rule = LogOddsRule<$scalar>;
             type Planes = Vec<Self>;
@@ -288,7 +288,7 @@ macro_rules! log_odds_cell {
 
             #[inline]
             fn fuse_brick(brick: &mut LogOddsBrick<Self>, evidence: &HitMiss, rule: &Self::Rule) {
-                Self::fuse_cells(brick.cells_mut(), evidence, 0, rule);
+                $brick(brick.cells_mut(), evidence, rule);
             }
         }
 
@@ -323,8 +323,49 @@ fn step_float(before: f32, added: f32, rule: &LogOddsRule<f32>) -> f32 {
     (before + added).clamp(rule.min, rule.max)
 }
 
-log_odds_cell!(LogOdds8, i8, step_byte);
-log_odds_cell!(LogOdds32, f32, step_float);
+log_odds_cell!(LogOdds8, i8, step_byte, fuse_bytes);
+log_odds_cell!(LogOdds32, f32, step_float, fuse_floats);
+
+fn fuse_floats(cells: &mut [LogOdds32], evidence: &HitMiss, rule: &LogOddsRule<f32>) {
+    LogOdds32::fuse_cells(cells, evidence, 0, rule);
+}
+
+/// The byte filter, 64 cells a step.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
+fn fuse_bytes(cells: &mut [LogOdds8], evidence: &HitMiss, rule: &LogOddsRule<i8>) {
+    const BIT: [u8; 64] = {
+        let mut bit = [0; 64];
+        let mut k = 0;
+        while k < 64 {
+            bit[k] = 1 << (k % 8);
+            k += 1;
+        }
+        bit
+    };
+    for (w, cells) in cells.chunks_exact_mut(64).enumerate() {
+        let (hit, miss) = evidence.word(w);
+        if hit | miss == 0 {
+            continue;
+        }
+        let (hit, miss) = (spread(hit), spread(miss));
+        for k in 0..64 {
+            let (hit, miss) = (hit[k] & BIT[k] != 0, miss[k] & BIT[k] != 0);
+            let before = if cells[k].0 == UNOBSERVED_BYTE { rule.prior } else { cells[k].0 };
+            let after = step_byte(before, if hit { rule.hit } else { rule.miss }, rule);
+            cells[k].0 = if hit | miss { after } else { cells[k].0 };
+        }
+    }
+}
+
+/// Every byte eight times.
+#[inline(always)]
+fn spread(word: u64) -> [u8; 64] {
+    let mut bytes = [0; 64];
+    for (eight, byte) in bytes.chunks_exact_mut(8).zip(word.to_le_bytes()) {
+        eight.copy_from_slice(&(u64::from(byte) * 0x0101_0101_0101_0101).to_le_bytes());
+    }
+    bytes
+}
 
 #[cfg(test)]
 mod tests {
@@ -367,11 +408,13 @@ mod tests {
     fn run_equals_single_steps<C: LogOddsValue>(rule: &C::Rule, scans: &[(Vec<u16>, Vec<u16>)]) {
         let mut planes = Vec::<C>::unobserved(512);
         let mut singles = planes.clone();
+        let mut brick = C::Brick::unobserved(512);
         for (hits, misses) in scans {
             let mut e = HitMiss::silent(512);
             hits.iter().for_each(|&i| e.mark_hit(usize::from(i)));
             misses.iter().for_each(|&i| e.mark_miss(usize::from(i)));
             C::fuse_run(&mut planes, 0, &e, 0, 512, rule);
+            C::fuse_brick(&mut brick, &e, rule);
             let mut observed = 0;
             for i in 0..512 {
                 if let Some(o) = e.one(i) {
@@ -382,6 +425,7 @@ mod tests {
             assert_eq!(observed, e.observed());
         }
         assert!(planes.iter().zip(&singles).all(|(a, b)| a.same(*b)));
+        assert!((0..512).all(|i| brick.get(i) == singles.get(i)));
     }
 
     proptest! {

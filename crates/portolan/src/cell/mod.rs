@@ -10,6 +10,7 @@ mod distances;
 mod hit_miss;
 mod log_odds;
 mod model;
+mod packed;
 mod signed_distance;
 
 pub use brick::{DistanceBrick, LogOddsBrick};

@@ -5,7 +5,10 @@ mod error;
 mod integrate;
 mod occupancy_grid;
 mod repr;
+mod sparse_fuse;
 mod sparse_occupancy;
+#[cfg(test)]
+mod sparse_occupancy_tests;
 mod sparse_tsdf;
 mod sparse_tsdf_config;
 mod tree_map;

@@ -1,22 +1,29 @@
 //! Occupancy of space in bricks: memory only where something was seen.
 
+use super::sparse_fuse::{free_reach, fuse, stats, union};
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
-use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsValue, OccupancyModel, Planes};
-use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
-use crate::scan::{BeamCounts, Frame, Origin, PointScan, RangeImage, Scan, ScanStats};
+use crate::cell::{LogOdds8, LogOddsValue, OccupancyModel, Planes};
+use crate::geom::{Aabb, Lattice, Pose};
+use crate::scan::{Frame, Origin, PointScan, RangeImage, Scan, ScanStats, SphericalLayout};
 use crate::store::{Bricks, Store};
-use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Ray, Tally};
+use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, Projective, Ray};
+use std::borrow::Cow;
+
+/// Boxes of more bricks than this are not searched for free space: single readings from far away are cheaper as rays.
+const PROJECTIVE_BRICKS: u64 = 1 << 27;
 
 /// How a scan becomes evidence of hits and misses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum OccupancySweep {
-    /// What fits the scan best.
+    /// Projective where a scan has rows and columns or gets them, exact otherwise.
     #[default]
     Auto,
-    /// Every cell that a beam passes, exactly.
+    /// Every cell that a beam passes, exactly: the map that OctoMap makes.
     Exact,
+    /// Misses through a range image, hits exact: faster, frees the space between beams, and carves grazing surfaces less.
+    /// As `Auto`, but goes on looking for rows and columns where the first scans had none.
+    Projective,
 }
 
 /// Clamped log odds in hashed bricks of `8^3` cells; the map of space for lidars and depth cameras.
@@ -45,6 +52,9 @@ pub struct SparseOccupancy<V: LogOddsValue = LogOdds8> {
     sweep: OccupancySweep,
     bounds: Option<(Aabb<3>, CellBox)>,
     exact: ExactRays,
+    guard: Guard,
+    layout: Option<SphericalLayout>,
+    failed_layouts: u32,
 }
 
 impl<V: LogOddsValue> SparseOccupancy<V> {
@@ -68,7 +78,18 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         super::error::check_lattice(store.lattice())?;
         let rule = V::rule(&model)?;
         let lookup = V::lookup(&rule);
-        Ok(Self { store, rule, lookup, model, sweep, bounds: None, exact: ExactRays::default() })
+        Ok(Self {
+            store,
+            rule,
+            lookup,
+            model,
+            sweep,
+            bounds: None,
+            exact: ExactRays::default(),
+            guard: Guard::default(),
+            layout: None,
+            failed_layouts: 0,
+        })
     }
 
     /// Allows no more than `bytes` for the store from now on.
@@ -82,6 +103,11 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         self.bounds = bounds.map(|b| CellBox::of(&b, lattice)).map(|cells| (cells.aabb(lattice), cells));
     }
 
+    /// Rows and columns for scans of points that come without them; otherwise found in the first scan.
+    pub fn set_layout(&mut self, layout: SphericalLayout) {
+        self.layout = Some(layout);
+    }
+
     /// Fuses what a sensor delivered at a known pose. A pose that is not rigid is refused and counted.
     ///
     /// # Errors
@@ -91,13 +117,13 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
             return Ok(ScanStats { refused_poses: 1, ..Default::default() });
         }
         let stats = match frame {
-            Frame::Points(scan) => self.points_exact(world_from_sensor, scan)?,
-            Frame::Image(image) => self.image_exact(world_from_sensor, image)?,
+            Frame::Points(scan) => self.points(world_from_sensor, scan)?,
+            Frame::Image(image) => self.image(world_from_sensor, image)?,
         };
         Ok(ScanStats { refused: stats.refused + frame.refused(), ..stats })
     }
 
-    /// Fuses surfaces seen from `origin` (both world, metres), in one call. Points that are not finite are refused and
+    /// Fuses surfaces seen from `origin` (both world, metres), in one call, with exact rays. Points that are not finite are refused and
     /// counted.
     ///
     /// # Errors
@@ -111,65 +137,110 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         if self.store.lattice().cell_of(origin).is_none() {
             return Ok(ScanStats { refused_poses: 1, ..Default::default() });
         }
-        self.rays(points_world.len(), points_world.len(), |i| Ray {
-            origin,
-            end: points_world[i].into(),
-            hit: true,
-        })
+        let n = points_world.len();
+        self.rays(n, n, None, |i| Ray { origin, end: points_world[i].into(), hit: true, passes: true })
     }
 
     fn has_place(&self, world_from_sensor: &Pose<3>) -> bool {
         world_from_sensor.is_rigid() && self.store.lattice().cell_of(world_from_sensor.translation).is_some()
     }
 
-    fn points_exact(&mut self, world_from_sensor: &Pose<3>, scan: &PointScan) -> Result<ScanStats, MapError> {
+    fn points(&mut self, world_from_sensor: &Pose<3>, scan: &PointScan) -> Result<ScanStats, MapError> {
         let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
-        let common = match &scan.origin {
-            Origin::Common(o) => world_from_sensor.transform_point(*o),
-            Origin::PerPoint(_) => world_from_sensor.translation,
+        let (common, image) = match &scan.origin {
+            Origin::Common(o) => (world_from_sensor.transform_point(*o), self.organised(scan, *o)),
+            Origin::PerPoint(_) => (world_from_sensor.translation, None),
         };
-        self.rays(hits, hits + scan.free_ends.len(), |i| match i.checked_sub(hits) {
-            Some(free) => Ray { origin: common, end: to_world(scan.free_ends[free]), hit: false },
+        let world_from_image = Pose { translation: common, ..*world_from_sensor };
+        let view = image.as_deref().map(|image| (&world_from_image, image));
+        let passes = view.is_none();
+        self.rays(hits, hits + scan.free_ends.len(), view, |i| match i.checked_sub(hits) {
+            Some(free) => {
+                Ray { origin: common, end: to_world(scan.free_ends[free]), hit: false, passes: true }
+            }
             None => {
                 let origin = match &scan.origin {
                     Origin::Common(_) => common,
                     Origin::PerPoint(all) => to_world(all[i]),
                 };
-                Ray { origin, end: to_world(scan.points[i]), hit: true }
+                Ray { origin, end: to_world(scan.points[i]), hit: true, passes }
             }
         })
     }
 
-    fn image_exact(
-        &mut self,
-        world_from_sensor: &Pose<3>,
-        image: &RangeImage,
-    ) -> Result<ScanStats, MapError> {
+    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them.
+    fn organised<'a>(&mut self, scan: &'a PointScan, origin: [f64; 3]) -> Option<Cow<'a, RangeImage>> {
+        if self.sweep == OccupancySweep::Exact {
+            return None;
+        }
+        if let Some(image) = &scan.image {
+            return Some(Cow::Borrowed(image));
+        }
+        if self.layout.is_none() && (self.failed_layouts < 3 || self.sweep == OccupancySweep::Projective) {
+            self.layout = SphericalLayout::of(&scan.points, origin);
+            self.failed_layouts += u32::from(self.layout.is_none());
+        }
+        let image = self.layout.as_ref()?.image(&scan.points, origin);
+        // A layout that most points do not fit is that of another sensor.
+        (2 * image.hits() >= scan.points.len()).then_some(Cow::Owned(image))
+    }
+
+    fn image(&mut self, world_from_sensor: &Pose<3>, image: &RangeImage) -> Result<ScanStats, MapError> {
+        let passes = self.sweep == OccupancySweep::Exact;
         let rays: Vec<Ray> = image
             .readings()
             .map(|(origin, end, hit)| Ray {
                 origin: world_from_sensor.transform_point(origin),
                 end: world_from_sensor.transform_point(end),
                 hit,
+                passes,
             })
             .collect();
         let hits = rays.iter().filter(|r| r.hit).count();
-        self.rays(hits, rays.len(), |i| rays[i])
+        let view = (!passes).then_some((world_from_sensor, image));
+        self.rays(hits, rays.len(), view, |i| rays[i])
     }
 
-    /// Fuses `count` rays, `hits` of which end on surfaces.
+    /// Fuses `count` rays, `hits` of which end on surfaces, and what the range image of a view sees.
     fn rays(
         &mut self,
         hits: usize,
         count: usize,
+        view: Option<(&Pose<3>, &RangeImage)>,
         ray: impl Fn(usize) -> Ray + Sync,
     ) -> Result<ScanStats, MapError> {
         let bounds = self.bounds.as_ref().map(|b| &b.0);
-        let tally = self.exact.plan(self.store.lattice(), bounds, count, ray);
+        let passes_by_view = view.is_some();
+        let further = view.map(|(pose, image)| free_reach(pose, image)).unwrap_or_default();
+        let lattice = self.store.lattice();
+        let mut tally = self.exact.plan(lattice, bounds, count, &ray, &further);
+        let view = view.filter(|_| self.exact.reach_bricks() <= PROJECTIVE_BRICKS);
+        if view.is_none() && passes_by_view {
+            tally = self.exact.plan(lattice, bounds, count, |i| Ray { passes: true, ..ray(i) }, &[]);
+        }
+        let guard = std::mem::take(&mut self.guard);
+        let view = view.map(|(pose, image)| Projective::new(image, pose, self.store.lattice(), guard));
+        let seen = match (&view, self.exact.reach()) {
+            (Some(view), Some((first, last))) => view.bricks(first, last),
+            _ => Vec::new(),
+        };
+        let (keys, parts) = union(self.exact.keys(), &seen);
         let exact = &self.exact;
-        let cells =
-            fuse(&mut self.store, &self.rule, self.bounds.map(|b| b.1), exact.keys(), |i| *exact.bits(i))?;
+        let bits = |i: usize| {
+            let (marked, free): (Option<u32>, Option<bool>) = parts[i];
+            let mut bits = marked.map_or_else(Bits::default, |slot| *exact.bits(slot as usize));
+            let free = match (free, &view) {
+                (Some(true), _) => [u64::MAX; 8],
+                (Some(false), Some(view)) => view.free_cells(keys[i]),
+                _ => return bits,
+            };
+            (0..8).for_each(|w| bits.miss[w] |= free[w]);
+            bits
+        };
+        let cells = fuse(&mut self.store, &self.rule, self.bounds.map(|b| b.1), &keys, bits);
+        self.guard = view.map(Projective::into_guard).unwrap_or_default();
+        let cells = cells?;
         Ok(stats(hits, count, tally, cells))
     }
 
@@ -206,6 +277,20 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         &self.rule
     }
 
+    /// Packs the bricks that did not change after `epoch` ([`Bricks::epoch`]; `None`: all): few values occur in a brick
+    /// that was looked at for long. Answers stay the same; what is written to again unpacks itself. O(cells).
+    pub fn pack(&mut self, epoch: Option<u64>) {
+        let warm = epoch.map(|e| self.store.changed_since(e)).unwrap_or_default();
+        let mut keys = self.store.keys();
+        keys.retain(|key| warm.binary_search(key).is_err());
+        let pack = |_: usize, brick: &mut Option<V::Brick>, (): &mut ()| {
+            *brick = brick.as_ref().map(V::Brick::packed);
+            0
+        };
+        let done = self.store.update(&keys, || (), pack);
+        debug_assert!(done.is_ok(), "no brick was added");
+    }
+
     /// Number of cells that were observed. O(cells).
     pub fn observed_cells(&self) -> usize {
         let observed = |brick: &V::Brick| (0..brick.len()).filter(|&i| brick.get(i).is_some()).count();
@@ -216,43 +301,6 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
     pub fn memory_bytes(&self) -> usize {
         self.store.memory_bytes()
     }
-}
-
-/// Fuses bits brick by brick; returns the number of cells.
-fn fuse<V: LogOddsValue>(
-    store: &mut Bricks<V, 3>,
-    rule: &V::Rule,
-    bounds: Option<CellBox>,
-    keys: &[BlockKey<3>],
-    bits: impl Fn(usize) -> Bits + Sync + Send,
-) -> Result<u64, MapError> {
-    let change = |i: usize, brick: &mut Option<V::Brick>, (): &mut ()| {
-        let mut bits = bits(i);
-        if let Some(mask) = bounds.and_then(|b| b.mask(keys[i])) {
-            for w in 0..8 {
-                bits.hit[w] &= mask[w];
-                bits.miss[w] &= mask[w];
-            }
-        }
-        let evidence = HitMiss::from_words(bits.hit, bits.miss);
-        let observed = evidence.observed();
-        if observed > 0 {
-            V::fuse_brick(
-                brick.get_or_insert_with(|| V::Brick::unobserved(block_cells::<3>())),
-                &evidence,
-                rule,
-            );
-        }
-        observed
-    };
-    Ok(store.update(keys, || (), change)?)
-}
-
-fn stats(hits: usize, count: usize, tally: Tally, cells: u64) -> ScanStats {
-    let mut stats = ScanStats { scans: 1, cells, hits_outside: tally.hits_outside, ..Default::default() };
-    stats.beams = BeamCounts { hit: hits as u64, max_range: (count - hits) as u64, ..Default::default() };
-    stats.refused.not_finite = tally.unusable;
-    stats
 }
 
 impl<V: LogOddsValue> MapRepr<3> for SparseOccupancy<V> {
@@ -268,11 +316,12 @@ impl<V: LogOddsValue> MapRepr<3> for SparseOccupancy<V> {
             .filter(|b| b.free_range() > 0.0)
             .map(|b| {
                 let end = world_from_sensor.transform_point(b.direction.map(|d| d * b.range));
-                Ray { origin, end, hit: b.is_hit() }
+                Ray { origin, end, hit: b.is_hit(), passes: true }
             })
             .collect();
-        let fused =
-            self.rays(0, rays.len(), |i| rays[i]).unwrap_or(ScanStats { scans: 1, ..Default::default() });
+        let fused = self
+            .rays(0, rays.len(), None, |i| rays[i])
+            .unwrap_or(ScanStats { scans: 1, ..Default::default() });
         ScanStats { beams: scan.counts(), refused: scan.refused(), ..fused }
     }
 
@@ -297,6 +346,7 @@ impl<V: LogOddsValue> MapRepr<3> for SparseOccupancy<V> {
 mod tests {
     use super::*;
     use crate::cell::LogOdds32;
+    use crate::geom::BlockKey;
     use crate::scan::{Beam, BeamKind, Pinhole, Projection, RefusedBeams};
 
     type Map = SparseOccupancy<LogOdds8>;
@@ -392,6 +442,26 @@ mod tests {
     }
 
     #[test]
+    fn packed_maps_answer_and_go_on() {
+        let frame = Frame::Points(PointScan::new(shell(3000), [0.0; 3]));
+        let mut flat = map([0.0; 3]);
+        flat.integrate(&Pose::IDENTITY, &frame).unwrap();
+        let mut packed = flat.clone();
+        let (epoch, bytes) = (packed.store().epoch(), packed.memory_bytes());
+        packed.pack(Some(epoch - 1));
+        assert_eq!(packed.memory_bytes(), bytes, "everything changed in the last epoch");
+        packed.pack(None);
+        assert!(packed.memory_bytes() * 2 < bytes);
+        assert!(packed.store().changed_since(epoch).is_empty());
+        assert_eq!(cells(&packed), cells(&flat));
+        let moved = Pose { translation: [0.35, 0.0, 0.0], ..Pose::IDENTITY };
+        flat.integrate(&moved, &frame).unwrap();
+        packed.integrate(&moved, &frame).unwrap();
+        assert_eq!(cells(&packed), cells(&flat));
+        assert_eq!(packed.observed_cells(), flat.observed_cells());
+    }
+
+    #[test]
     fn a_sensor_inside_an_occupied_cell() {
         let mut map = map([0.0; 3]);
         map.integrate_points(&[[0.04, 0.04, 0.04], [1.0, 0.05, 0.05]], [0.05; 3]).unwrap();
@@ -428,9 +498,9 @@ mod tests {
         assert!(same * 100 >= held * 98, "{same} of {held}");
 
         let mut small = map([0.0; 3]);
-        small.set_limit(20_000);
+        small.set_limit(60_000);
         assert!(matches!(small.integrate(&Pose::IDENTITY, &frame), Err(MapError::Full(_))));
-        assert!(small.memory_bytes() <= 20_000 && small.observed_cells() > 0);
+        assert!(small.memory_bytes() <= 70_000 && small.observed_cells() > 0);
     }
 
     #[test]

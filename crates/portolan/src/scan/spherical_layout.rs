@@ -51,7 +51,7 @@ impl SphericalLayout {
         if !descending || !sane || elevations.len() < 2 || elevations.len() > 16_384 {
             return None;
         }
-        if !(4..=65_536).contains(&columns) {
+        if !(4..=32_768).contains(&columns) {
             return None;
         }
         // A point belongs to the nearest row, to an end row only within half of the distance to the row beside it.

@@ -41,7 +41,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
             .collect();
         in_order.sort_unstable_by_key(|(key, _)| interleaved(*key));
         for (key, brick) in in_order {
-            tree.set_block(key, brick.cells());
+            tree.set_block(key, &brick.cells());
         }
         tree.compact();
         Some(tree)
@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(back.keys(), bricks.keys());
         for key in bricks.keys() {
             let (a, b) = (back.brick(key).unwrap().cells(), bricks.brick(key).unwrap().cells());
-            assert!(a.iter().zip(b).all(|(a, b)| a.same(*b)));
+            assert!(a.iter().zip(b.iter()).all(|(a, b)| a.same(*b)));
         }
     }
 

@@ -169,6 +169,7 @@ impl Args {
             },
             sweep: match self.sweep {
                 Some(SweepArg::Exact) => OccupancySweep::Exact,
+                Some(SweepArg::Projective) => OccupancySweep::Projective,
                 Some(_) => OccupancySweep::Auto,
                 None => saved.word("sweep").and_then(sweep_of).unwrap_or_default(),
             },

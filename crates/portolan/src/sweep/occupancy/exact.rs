@@ -14,6 +14,8 @@ pub(crate) struct Ray {
     pub(crate) end: [f64; 3],
     /// Whether there is a surface at the end.
     pub(crate) hit: bool,
+    /// Whether the cells that it passes are missed; else the ray only says where it ends.
+    pub(crate) passes: bool,
 }
 
 /// What became of the rays of a scan.
@@ -34,24 +36,27 @@ pub(crate) struct ExactRays {
     parts: Vec<BrickMasks>,
     keys: Vec<BlockKey<3>>,
     slots: Vec<u32>,
+    reach: Option<(BlockKey<3>, BlockKey<3>)>,
 }
 
 /// Rays that are worth a thread.
 const RAYS_A_PART: usize = 2048;
 
 impl ExactRays {
-    /// Marks `count` rays. Cells outside of `bounds` may be marked, too: see `CellBox::mask`.
+    /// Marks `count` rays; `further` only count for [`ExactRays::reach`]. Cells outside of `bounds` may be marked, too: see `CellBox::mask`.
     pub(crate) fn plan(
         &mut self,
         lattice: &Lattice<3>,
         bounds: Option<&Aabb<3>>,
         count: usize,
         ray: impl Fn(usize) -> Ray + Sync,
+        further: &[Ray],
     ) -> Tally {
         let parts = parts(count);
         self.parts.resize_with(parts.max(self.parts.len()), BrickMasks::default);
         let range = |part: usize| part * count / parts..(part + 1) * count / parts;
-        let (first, last) = reach(lattice, bounds, (0..count).map(&ray));
+        let (first, last) = reach(lattice, bounds, (0..count).map(&ray).chain(further.iter().copied()));
+        self.reach = Some((first, last));
         let mut tallies = vec![Tally::default(); parts];
         let jobs =
             self.parts[..parts].iter_mut().zip(&mut tallies).enumerate().map(|(i, (m, t))| (range(i), m, t));
@@ -73,6 +78,18 @@ impl ExactRays {
         &self.keys
     }
 
+    /// The first and the last brick of the box in which all rays run, with a margin.
+    pub(crate) fn reach(&self) -> Option<(BlockKey<3>, BlockKey<3>)> {
+        self.reach
+    }
+
+    /// Number of bricks in that box.
+    pub(crate) fn reach_bricks(&self) -> u64 {
+        let Some((first, last)) = self.reach else { return 0 };
+        let edge = |k: usize| (i64::from(last.0[k]) - i64::from(first.0[k]) + 1).max(0) as u64;
+        edge(0).saturating_mul(edge(1)).saturating_mul(edge(2))
+    }
+
     /// The bits of the `i`-th brick.
     pub(crate) fn bits(&self, i: usize) -> &Bits {
         self.parts[0].bits(self.slots[i])
@@ -83,6 +100,10 @@ impl ExactRays {
 #[inline]
 fn mark(masks: &mut BrickMasks, lattice: &Lattice<3>, bounds: Option<&Aabb<3>>, ray: Ray, tally: &mut Tally) {
     let end = match bounds {
+        _ if !ray.passes => {
+            tally.hits_outside += u64::from(ray.hit && bounds.is_some_and(|b| !b.contains(ray.end)));
+            lattice.cell_of(ray.end)
+        }
         None => trace(masks, lattice, ray.origin, ray.end),
         Some(bounds) => trace_inside(masks, lattice, bounds, ray, tally),
     };
@@ -122,14 +143,17 @@ fn reach(
     rays: impl Iterator<Item = Ray>,
 ) -> (BlockKey<3>, BlockKey<3>) {
     let mut all = Aabb::EMPTY;
-    for ray in rays {
-        // `min` and `max` pass NaN over.
-        all.include(ray.origin);
-        all.include(ray.end);
+    for p in rays.flat_map(|ray| [ray.origin, ray.end]) {
+        if lattice.cell_of(p).is_some() {
+            all.include(p);
+        }
     }
     if let Some(b) = bounds {
         all.min = std::array::from_fn(|k| all.min[k].max(b.min[k]));
         all.max = std::array::from_fn(|k| all.max[k].min(b.max[k]));
+    }
+    if all.is_empty() {
+        return (BlockKey([0; 3]), BlockKey([-1; 3]));
     }
     let cell = |p| lattice.to_cells(p).map(|v: f64| v.floor().clamp(-1e9, 1e9) as i32);
     let (low, high) = (BlockKey::of_cell(cell(all.min)), BlockKey::of_cell(cell(all.max)));
@@ -200,7 +224,7 @@ mod tests {
     fn equals_the_oracle(lattice: &Lattice<3>, rays: &[Ray]) {
         let mut sweep = ExactRays::default();
         for _ in 0..2 {
-            assert_eq!(sweep.plan(lattice, None, rays.len(), |i| rays[i]), Tally::default());
+            assert_eq!(sweep.plan(lattice, None, rays.len(), |i| rays[i], &[]), Tally::default());
         }
         assert!(sweep.keys().is_sorted());
         let (mut hits, mut misses) = (HashSet::new(), HashSet::new());
@@ -227,7 +251,7 @@ mod tests {
         ) {
             let zero = if utm { UTM } else { [0.0; 3] };
             let shift = |p: [f64; 3]| std::array::from_fn(|k| p[k] + zero[k]);
-            let rays: Vec<_> = ends.iter().map(|&(e, hit)| Ray { origin: shift(o), end: shift(e), hit }).collect();
+            let rays: Vec<_> = ends.iter().map(|&(e, hit)| Ray { origin: shift(o), end: shift(e), hit, passes: true }).collect();
             equals_the_oracle(&Lattice::new(shift([-0.3; 3]), 0.1), &rays);
         }
 
@@ -237,14 +261,14 @@ mod tests {
             ends in prop::collection::vec((prop::array::uniform3(-24..24i32), prop::array::uniform3(-9..9i32), any::<bool>()), 1..60),
         ) {
             let at = |p: [i32; 3]| p.map(|v| f64::from(v) * 0.125);
-            let rays: Vec<_> = ends.iter().map(|&(e, o, hit)| Ray { origin: at(o), end: at(e), hit }).collect();
+            let rays: Vec<_> = ends.iter().map(|&(e, o, hit)| Ray { origin: at(o), end: at(e), hit, passes: true }).collect();
             equals_the_oracle(&Lattice::new([0.0; 3], 0.25), &rays);
         }
     }
 
     #[test]
     fn along_axes_and_without_length() {
-        let ray = |end, hit| Ray { origin: [0.05, 0.05, 0.05], end, hit };
+        let ray = |end, hit| Ray { origin: [0.05, 0.05, 0.05], end, hit, passes: true };
         let rays = [
             ray([0.05, 0.05, 4.0], true),
             ray([0.05, 0.05, -4.0], true),
@@ -258,7 +282,7 @@ mod tests {
 
     #[test]
     fn far_rays_do_without_a_window() {
-        let ray = |x: f64| Ray { origin: [0.0; 3], end: [x, 0.7 * x, 0.3], hit: true };
+        let ray = |x: f64| Ray { origin: [0.0; 3], end: [x, 0.7 * x, 0.3], hit: true, passes: true };
         let rays = [ray(900.0), ray(-900.0), ray(3.0)];
         equals_the_oracle(&Lattice::new([0.0; 3], 0.05), &rays);
     }
@@ -270,9 +294,10 @@ mod tests {
             origin: [0.0; 3],
             end,
             hit: true,
+            passes: true,
         });
         let mut sweep = ExactRays::default();
-        assert_eq!(sweep.plan(&lattice, None, 3, |i| rays[i]), Tally { hits_outside: 0, unusable: 2 });
+        assert_eq!(sweep.plan(&lattice, None, 3, |i| rays[i], &[]), Tally { hits_outside: 0, unusable: 2 });
         assert_eq!(sweep.keys().len(), 2);
     }
 
@@ -280,9 +305,9 @@ mod tests {
     fn only_the_inside_of_bounds_is_walked() {
         let lattice = Lattice::new([0.0; 3], 0.1);
         let bounds = Aabb::new([0.0; 3], [4.0; 3]);
-        let ray = Ray { origin: [-1e6, 0.55, 0.55], end: [1e6, 0.55, 0.55], hit: true };
+        let ray = Ray { origin: [-1e6, 0.55, 0.55], end: [1e6, 0.55, 0.55], hit: true, passes: true };
         let mut sweep = ExactRays::default();
-        let tally = sweep.plan(&lattice, Some(&bounds), 1, |_| ray);
+        let tally = sweep.plan(&lattice, Some(&bounds), 1, |_| ray, &[]);
         assert_eq!(tally, Tally { hits_outside: 1, unusable: 0 });
         assert!((5..=7).contains(&sweep.keys().len()), "{:?}", sweep.keys());
     }

@@ -2,13 +2,19 @@
 //!
 //! [`super::Rays`] is the chapter's sweep in any dimension, with its depth of walls, for dense arrays and trees. Here are
 //! the fast ones for bricks: [`exact`](ExactRays) rays with the meaning that OctoMap gave them (what is passed is missed
-//! once a scan, the cell of the end point is hit, a hit overrules misses).
+//! once a scan, the cell of the end point is hit, a hit overrules misses), and [`projective`](Projective) misses for scans of
+//! rows and columns, whose hits are exact as well.
 
 mod cell_box;
 mod exact;
+mod guard;
+mod lens;
 mod masks;
+mod projective;
 mod trace;
 
 pub(crate) use cell_box::CellBox;
 pub(crate) use exact::{ExactRays, Ray, Tally};
+pub(crate) use guard::Guard;
 pub(crate) use masks::Bits;
+pub(crate) use projective::Projective;
