@@ -28,18 +28,16 @@ fn write_map(folder: &Path) {
             (0..512).map(|i| (WALL - lattice.center(key.cell(i))[0]).clamp(-0.3, 0.3) as f32).collect();
         store.insert(key, DistanceBrick::from_parts(&distances, &[1.0; 512]).unwrap()).unwrap();
     }
-    let file = SpaceMapFile {
-        header: MapHeader { hold_out: Some(2), ..Default::default() },
-        tsdf: Some(TsdfBricks {
-            store,
-            truncation: 0.3,
-            w_max: 64.0,
-            carve_weight: 1.0,
-            weights: WeightModel::Constant,
-            more: Map::new(),
-        }),
-        ..Default::default()
-    };
+    let mut file = SpaceMapFile::default();
+    file.header = MapHeader { hold_out: Some(2), ..Default::default() };
+    file.tsdf = Some(TsdfBricks {
+        store,
+        truncation: 0.3,
+        w_max: 64.0,
+        carve_weight: 1.0,
+        weights: WeightModel::Constant,
+        more: Map::new(),
+    });
     std::fs::create_dir_all(folder).unwrap();
     file.write(folder.join("map.portolan")).unwrap();
 }

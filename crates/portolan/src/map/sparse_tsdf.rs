@@ -152,8 +152,14 @@ impl SparseTsdf {
         world_from_sensor: &Pose<3>,
         scan: &PointScan,
     ) -> Result<ScanStats, MapError> {
-        let (&Origin::Common(origin), PointSweep::Projective) = (&scan.origin, self.config.sweep) else {
-            return self.integrate_rays(world_from_sensor, scan);
+        let origin = match (&scan.origin, &scan.image, self.config.sweep) {
+            (Origin::Common(origin), _, PointSweep::Projective) => *origin,
+            // Parallel rays have no common origin; their image is in the frame of the points.
+            (Origin::PerPoint(_), Some(image), PointSweep::Projective) if image.has_parallel_rays() => {
+                let stats = self.integrate_image(world_from_sensor, image)?;
+                return Ok(ScanStats { refused: stats.refused + scan.refused, ..stats });
+            }
+            _ => return self.integrate_rays(world_from_sensor, scan),
         };
         let at = Pose { translation: world_from_sensor.transform_point(origin), ..*world_from_sensor };
         let found = match &scan.image {

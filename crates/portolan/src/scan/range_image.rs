@@ -122,6 +122,11 @@ impl RangeImage {
         })
     }
 
+    /// Whether the rays are parallel: there is no point that they come from.
+    pub fn has_parallel_rays(&self) -> bool {
+        matches!(self.projection, Projection::Orthographic { .. })
+    }
+
     /// Number of surfaces.
     pub fn hits(&self) -> usize {
         self.values.iter().filter(|v| **v > 0.0).count()

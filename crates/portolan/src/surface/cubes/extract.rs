@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn crossings_without_a_whole_cube_are_no_vertices() {
         let mut random = Random(5);
-        let value = |_: [i32; 3]| if random.next() % 3 == 0 { f32::NAN } else { random.value() };
+        let value = |_: [i32; 3]| if random.next().is_multiple_of(3) { f32::NAN } else { random.value() };
         let value = std::cell::RefCell::new(value);
         let store = bricks(Lattice::new([0.0; 3], 1.0), [-11; 3], [30; 3], |c| value.borrow_mut()(c));
         let mesh = marching_cubes(&store, None, &MeshSettings::default());
