@@ -95,11 +95,7 @@ impl Samples for BrickSamples<'_> {
     #[inline]
     fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
         let (brick, i) = Self::place(node);
-<<<<<<< HEAD
-        let inner = node[0] & 7 != 0 && node[0] & 7 != 7 && (64 + 8..512 - 64 - 8).contains(&i);
-=======
         let inner = node[0] & 7 != 0 && node[0] & 7 != 7 && (72..440).contains(&i);
->>>>>>> mesh
         if inner && node[1] & 7 != 0 && node[1] & 7 != 7 {
             let (from, d, w) = (i - 64, self.distances[brick], self.weights[brick]);
             if let (Some(d), Some(w)) = (d.get(from..from + 129), w.get(from..from + 129)) {
