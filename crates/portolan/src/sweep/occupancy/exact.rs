@@ -40,6 +40,7 @@ pub(crate) struct ExactRays {
 }
 
 /// Rays that are worth a thread.
+#[cfg(feature = "parallel")]
 const RAYS_A_PART: usize = 2048;
 
 impl ExactRays {
@@ -55,7 +56,10 @@ impl ExactRays {
         let parts = parts(count);
         self.parts.resize_with(parts.max(self.parts.len()), BrickMasks::default);
         let range = |part: usize| part * count / parts..(part + 1) * count / parts;
-        let (first, last) = reach(lattice, bounds, (0..count).map(&ray).chain(further.iter().copied()));
+        let mut boxes = vec![Aabb::EMPTY; parts];
+        in_parallel(boxes.iter_mut().enumerate(), |(i, b)| *b = extent(lattice, range(i).map(&ray)));
+        let all = boxes.into_iter().fold(extent(lattice, further.iter().copied()), Aabb::union);
+        let (first, last) = reach(lattice, bounds, all);
         self.reach = Some((first, last));
         let mut tallies = vec![Tally::default(); parts];
         let jobs =
@@ -136,18 +140,19 @@ fn trace_inside(
     Some(end)
 }
 
-/// The bricks between which all rays run, with a margin for rounding.
-fn reach(
-    lattice: &Lattice<3>,
-    bounds: Option<&Aabb<3>>,
-    rays: impl Iterator<Item = Ray>,
-) -> (BlockKey<3>, BlockKey<3>) {
+/// The box of all origins and ends that have a cell.
+fn extent(lattice: &Lattice<3>, rays: impl Iterator<Item = Ray>) -> Aabb<3> {
     let mut all = Aabb::EMPTY;
     for p in rays.flat_map(|ray| [ray.origin, ray.end]) {
         if lattice.cell_of(p).is_some() {
             all.include(p);
         }
     }
+    all
+}
+
+/// The bricks of a box, as far as it is inside of the bounds, with a margin for rounding.
+fn reach(lattice: &Lattice<3>, bounds: Option<&Aabb<3>>, mut all: Aabb<3>) -> (BlockKey<3>, BlockKey<3>) {
     if let Some(b) = bounds {
         all.min = std::array::from_fn(|k| all.min[k].max(b.min[k]));
         all.max = std::array::from_fn(|k| all.max[k].min(b.max[k]));
