@@ -1,4 +1,5 @@
 //! The TSDF in bricks against its definition, cell by cell in f64, for every kind of range image.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use portolan::cell::SignedDistance;
 use portolan::geom::{BlockKey, Lattice, Pose, vector};
@@ -157,7 +158,7 @@ fn said(image: &RangeImage, pose: &Pose<3>, centre: [f64; 3], config: &SparseTsd
 
 /// Every cell of a box around everything, and nothing beyond it.
 fn equals_its_definition(image: RangeImage, pose: &Pose<3>, config: &SparseTsdfConfig, reach: f64) {
-    let mut map = SparseTsdf::new(*config).unwrap();
+    let mut map = SparseTsdf::new(*config).expect("a valid map");
     let frame = Frame::Image(image.clone());
     map.integrate(pose, &frame).unwrap();
     let lattice = *map.lattice();

@@ -1,4 +1,5 @@
 //! The TSDF in bricks on scenes whose surfaces are known, and on input that is none.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use portolan::cell::SignedDistance;
 use portolan::geom::{Aabb, Pose, vector};

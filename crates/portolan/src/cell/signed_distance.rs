@@ -198,23 +198,39 @@ fn fuse_slices(state: (&mut [f32], &mut [f32]), observation: (&[f32], &[f32]), r
 /// In the widest vectors that the processor has: every width gives the same bits.
 #[multiversion(targets = "simd")]
 fn fuse_widest(distance: &mut [f32], weight: &mut [f32], observed: &[f32], gained: &[f32], rule: &TsdfRule) {
-    // Rows of blocks inside a map are eight long: the fixed length lets the compiler use whole vectors.
-    if distance.len().is_multiple_of(8) {
-        let rows = distance.chunks_exact_mut(8).zip(weight.chunks_exact_mut(8));
-        for ((d, w), (o, g)) in rows.zip(observed.chunks_exact(8).zip(gained.chunks_exact(8))) {
-            // Near surfaces most rows of a block say nothing.
-            if g.iter().fold(0.0, |most: f32, &g| most.max(g)) <= 0.0 {
-                continue;
-            }
-            if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into()) {
-                fuse_lanes::<8>(d, w, o, g, rule);
-            }
-        }
+    if distance.len().is_multiple_of(LAYER) {
+        fuse_chunks::<LAYER>(distance, weight, observed, gained, rule);
+    } else if distance.len().is_multiple_of(ROW) {
+        fuse_chunks::<ROW>(distance, weight, observed, gained, rule);
     } else {
         for i in 0..distance.len() {
             let (mut d, mut w) = ([distance[i]], [weight[i]]);
             fuse_lanes::<1>(&mut d, &mut w, &[observed[i]], &[gained[i]], rule);
             (distance[i], weight[i]) = (d[0], w[0]);
+        }
+    }
+}
+
+/// Rows of blocks inside a map are so long, and layers of blocks: a fixed length lets the compiler use whole vectors.
+const ROW: usize = 8;
+const LAYER: usize = 64;
+
+#[inline(always)]
+fn fuse_chunks<const N: usize>(
+    distance: &mut [f32],
+    weight: &mut [f32],
+    observed: &[f32],
+    gained: &[f32],
+    rule: &TsdfRule,
+) {
+    let states = distance.chunks_exact_mut(N).zip(weight.chunks_exact_mut(N));
+    for ((d, w), (o, g)) in states.zip(observed.chunks_exact(N).zip(gained.chunks_exact(N))) {
+        // Near surfaces many parts of a block say nothing.
+        if g.iter().fold(0.0, |most: f32, &g| most.max(g)) <= 0.0 {
+            continue;
+        }
+        if let (Ok(d), Ok(w), Ok(o), Ok(g)) = (d.try_into(), w.try_into(), o.try_into(), g.try_into()) {
+            fuse_lanes::<N>(d, w, o, g, rule);
         }
     }
 }

@@ -43,13 +43,11 @@ struct Rings {
     steps_per_radian: f32,
 }
 
-/// Pixels (with the border counted) that a box can fall on, both ends included, and how far away it is.
+/// Pixels (with the border counted) that a box can fall on, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub columns: [usize; 2],
     pub rows: [usize; 2],
-    /// Smallest and largest value that a pixel would have whose surface were in the box.
-    pub depth: [f64; 2],
 }
 
 /// A lens that no image can have.
@@ -217,11 +215,20 @@ impl Lens {
         ((du * a).powi(2) + (dv * b).powi(2)).sqrt() * depth
     }
 
-    /// Where a box can fall: `centre` and half edges `half` along the sensor's axes hold it, `near` and `far` are
-    /// the distances of its nearest and farthest point from the sensor. `None`: not into the image. A window may pass the
+    /// Smallest and largest value that a pixel would have whose surface were in the box of [`Lens::window`].
+    #[inline]
+    pub(super) fn depth(&self, centre: [f64; 3], half: [f64; 3], near: f64, far: f64) -> [f64; 2] {
+        match &self.kind {
+            Kind::Pinhole { .. } => [centre[2] - half[2], centre[2] + half[2]],
+            Kind::Spherical(_) => [near, far],
+            Kind::Orthographic { top, .. } => [top - centre[2] - half[2], top - centre[2] + half[2]],
+        }
+    }
+
+    /// Where a box can fall: `centre` and half edges `half` along the sensor's axes hold it. `None`: not into the image. A window may pass the
     /// seam of an image that is closed: its last column is then counted on past the border.
-    pub(super) fn window(&self, centre: [f64; 3], half: [f64; 3], near: f64, far: f64) -> Option<Window> {
-        let (u, v, depth) = match &self.kind {
+    pub(super) fn window(&self, centre: [f64; 3], half: [f64; 3]) -> Option<Window> {
+        let (u, v) = match &self.kind {
             Kind::Pinhole { focal, centre: c } => {
                 let (front, back) = (centre[2] - half[2], centre[2] + half[2]);
                 if back <= 0.0 {
@@ -237,19 +244,16 @@ impl Lens {
                     let (a, b) = (focal[k] * low + c[k], focal[k] * high + c[k]);
                     [a.min(b), a.max(b)]
                 };
-                (side(0), side(1), [front.max(0.0), back])
+                (side(0), side(1))
             }
-            Kind::Spherical(rings) => {
-                let (u, v) = rings.window(centre, half);
-                (u, v, [near, far])
-            }
-            Kind::Orthographic { first, step, top } => {
+            Kind::Spherical(rings) => rings.window(centre, half),
+            Kind::Orthographic { first, step, .. } => {
                 let side = |k: usize| {
                     let at = |x: f64| (x - first[k]) / step[k] + 1.0;
                     let (a, b) = (at(centre[k] - half[k]), at(centre[k] + half[k]));
                     [a.min(b), a.max(b)]
                 };
-                (side(0), side(1), [top - centre[2] - half[2], top - centre[2] + half[2]])
+                (side(0), side(1))
             }
         };
         /// Rounding of the lanes (pixels).
@@ -267,7 +271,7 @@ impl Lens {
         } else {
             clamped(u[0] - SLACK, u[1] + SLACK, self.columns)?
         };
-        Some(Window { columns, rows, depth })
+        Some(Window { columns, rows })
     }
 }
 

@@ -304,6 +304,9 @@ impl Node {
     }
 }
 
+/// Extremes of a window that could hold any values: nearest 0, farthest infinitely far. Of neither is anything sure.
+const ANYTHING: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
 /// A block that is seen: its packed indices, and what is known of its octants.
 type Found = (u64, Octants);
 
@@ -311,22 +314,22 @@ impl Search<'_> {
     /// In the order of keys. `span` is the number of blocks along the longest axis.
     fn run(&self, span: i64) -> Vec<Found> {
         let level = BLOCK + span.max(1).ilog2() + u32::from(span.count_ones() > 1);
-        let mut nodes = vec![Node { at: [0; 3], level }];
+        let mut nodes = vec![(Node { at: [0; 3], level }, ANYTHING)];
         // Enough parts for every core, the same ones for any number of them.
         const LEAST: u32 = BLOCK + 2;
-        while nodes.len() < 256 && nodes.iter().any(|n| n.level > LEAST) {
+        while nodes.len() < 256 && nodes.iter().any(|(n, _)| n.level > LEAST) {
             nodes = nodes
                 .into_iter()
-                .flat_map(|n| match (n.level > LEAST).then(|| self.class(n)) {
-                    None => vec![n],
-                    Some(Class::Nothing) => vec![],
-                    Some(Class::Free | Class::Mixed) => n.children().collect(),
+                .flat_map(|(n, known)| match (n.level > LEAST).then(|| self.class(n, known)) {
+                    None => vec![(n, known)],
+                    Some((Class::Nothing, _)) => vec![],
+                    Some((_, known)) => n.children().map(|child| (child, known)).collect(),
                 })
                 .collect();
         }
-        let each = |node: &Node| {
+        let each = |(node, known): &(Node, [f32; 2])| {
             let mut found = Vec::new();
-            self.descend(*node, &mut found);
+            self.descend(*node, *known, &mut found);
             found
         };
         #[cfg(feature = "parallel")]
@@ -345,17 +348,18 @@ impl Search<'_> {
         all
     }
 
-    fn descend(&self, node: Node, found: &mut Vec<Found>) {
+    fn descend(&self, node: Node, known: [f32; 2], found: &mut Vec<Found>) {
         if found.len() > self.most {
             return;
         }
-        match self.class(node) {
+        let (class, known) = self.class(node, known);
+        match class {
             Class::Nothing => {}
             Class::Free => self.all(node, found),
             Class::Mixed if node.level == BLOCK => {
                 let mut octants = Octants::default();
                 for (bit, octant) in node.children().enumerate() {
-                    match self.class(octant) {
+                    match self.class(octant, known).0 {
                         Class::Nothing => {}
                         Class::Free => octants.free |= 1 << bit,
                         Class::Mixed => octants.mixed |= 1 << bit,
@@ -365,7 +369,7 @@ impl Search<'_> {
                     found.push((node.packed(), octants));
                 }
             }
-            Class::Mixed => node.children().for_each(|child| self.descend(child, found)),
+            Class::Mixed => node.children().for_each(|child| self.descend(child, known, found)),
         }
     }
 
@@ -383,10 +387,11 @@ impl Search<'_> {
         (0..3).all(|k| node.at[k] >> BLOCK <= self.last[k] - self.first[k])
     }
 
-    fn class(&self, node: Node) -> Class {
+    /// What the image says of a node, and the extremes of its window: those of the window of its parent are `known`.
+    fn class(&self, node: Node, known: [f32; 2]) -> (Class, [f32; 2]) {
         let sweep = self.sweep;
         if !self.is_inside(node) {
-            return Class::Nothing;
+            return (Class::Nothing, known);
         }
         const OCTANT: i64 = BLOCK_EDGE as i64 / 2;
         let edge = OCTANT << node.level;
@@ -406,20 +411,30 @@ impl Search<'_> {
             centre[k] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
             halves[k] = half * (row[0].abs() + row[1].abs() + row[2].abs());
         }
-        let Some(window) = self.lens.window(centre, halves, f64::sqrt(near), f64::sqrt(far)) else {
-            return Class::Nothing;
+        let (near, far) = (f64::sqrt(near), f64::sqrt(far));
+        let depth = self.lens.depth(centre, halves, near, far);
+        let (tau, slack) = (sweep.settings.truncation, 1e-4 * r + 1e-6 * (depth[1].abs() + far));
+        let class = |[least, most]: [f32; 2]| {
+            let before = depth[1] < f64::from(least) - tau - slack;
+            if depth[0] > f64::from(most) + tau + slack || (before && !sweep.carves()) {
+                Class::Nothing
+            } else if before && depth[0] >= 0.0 {
+                // (What lies behind a camera is before everything, too.)
+                Class::Free
+            } else {
+                Class::Mixed
+            }
         };
-        let [least, most] = self.extremes(&window);
-        let tau = sweep.settings.truncation;
-        let slack = 1e-4 * r + 1e-6 * (window.depth[1].abs() + f64::sqrt(far));
-        if window.depth[0] > f64::from(most) + tau + slack {
-            return Class::Nothing;
-        }
-        let before = window.depth[1] < f64::from(least) - tau - slack;
-        match (before, sweep.carves()) {
-            (true, false) => Class::Nothing,
-            (true, true) if window.depth[0] >= 0.0 => Class::Free,
-            _ => Class::Mixed,
+        // Mostly the parent's window is enough, which costs nothing.
+        match class(known) {
+            Class::Mixed => match self.lens.window(centre, halves) {
+                None => (Class::Nothing, known),
+                Some(window) => {
+                    let extremes = self.extremes(&window);
+                    (class(extremes), extremes)
+                }
+            },
+            sure => (sure, known),
         }
     }
 
