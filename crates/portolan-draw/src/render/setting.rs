@@ -330,15 +330,7 @@ impl Setting {
 
 /// What the sensors call up, corrected by the floor: the mean normal of what lies level within 35 degrees.
 fn upwards(faces: &[Face], sensors: &[Sensor]) -> [f32; 3] {
-    // Some scans of an object are taken from above, with the sensor tilted: what most of them agree on.
-    let some: Vec<[f32; 3]> =
-        sensors.iter().step_by(sensors.len().div_ceil(100).max(1)).map(|s| s.up).collect();
-    let agree = |up: [f32; 3]| some.iter().filter(move |other| dot(up, **other) > 0.94);
-    let first = some.iter().fold((0, [0.0, 0.0, 1.0]), |best, up| {
-        let count = agree(*up).count();
-        if count > best.0 { (count, *up) } else { best }
-    });
-    let sum = agree(first.1).fold([0.0; 3], |m, up| along(m, *up, 1.0));
+    let sum = sensors.iter().fold([0.0; 3], |m, s| along(m, s.up, 1.0));
     let mut up = unit_or(sum, [0.0, 0.0, 1.0]);
     // Of a ball, which has no floor, 9, 3 and 1 % of the area lie so near to level.
     for (cone, least) in [(0.82f32, 0.13), (0.94, 0.09), (0.98, 0.06), (0.99, 0.05)] {
