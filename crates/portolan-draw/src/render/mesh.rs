@@ -15,7 +15,7 @@ pub struct MeshView<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Towards free space, one per vertex. Empty: the mean of the triangles around a vertex.
     pub normals: &'a [[f32; 3]],
-    /// Red, green, blue, one per vertex. Empty: tinted by height.
+    /// Red, green, blue, one per vertex. Empty, or one colour for all, which says nothing: tinted by height.
     pub colors: &'a [[u8; 3]],
 }
 
@@ -24,6 +24,12 @@ impl MeshView<'_> {
     pub(super) fn corners(&self, triangle: usize) -> Option<[[f32; 3]; 3]> {
         let [a, b, c] = self.triangles[triangle].map(|i| self.vertices.get(i as usize).copied());
         Some([a?, b?, c?])
+    }
+
+    /// The same without colours that say nothing.
+    pub(super) fn with_telling_colors(self) -> Self {
+        let told = self.colors.len() == self.vertices.len() && self.colors.windows(2).any(|w| w[0] != w[1]);
+        if told { self } else { Self { colors: &[], ..self } }
     }
 
     /// Unit normals of vertices, weighted by the areas of the triangles around them. O(triangles).

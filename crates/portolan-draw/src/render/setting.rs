@@ -4,14 +4,15 @@ use super::camera::{Camera, Lens};
 use super::mesh::MeshView;
 use super::vector::{along, cross, dot, sub, unit_or};
 
-/// Where a sensor stood.
+/// Where a sensor stood. Of a camera with x right, y down, z forward: forward is z, up is -y. Of a turning lidar: forward is x,
+/// up is z. Of a scanner with parallel rays along -z: forward is -z, up is y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
     /// In the mesh's coordinates (metres).
     pub position: [f32; 3],
-    /// The direction it looked in; of a lidar, any that is level.
+    /// The direction it looked in.
     pub forward: [f32; 3],
-    /// What was above it: of a camera, against its y axis.
+    /// What was above it.
     pub up: [f32; 3],
 }
 
@@ -41,7 +42,7 @@ struct Face {
 /// Triangles and vertices that are looked at.
 const THINNED: usize = 60_000;
 /// Share of vertices at either end of every axis that a view need not hold: what was seen through windows.
-const STRAYS: f32 = 0.01;
+const STRAYS: f32 = 0.015;
 
 impl Setting {
     /// Looks at a mesh and at where its sensors stood. O(triangles / thinning + sensors).
@@ -173,13 +174,24 @@ impl Setting {
         self.seen_from(back, aspect)
     }
 
-    /// Of an object: from its other side, and from above.
+    /// Of an object: from its other side, if it has one that was seen, else as one of the sensors saw it; and from above.
     pub fn other_sides(&self, aspect: f32) -> Vec<Camera> {
         let front = self.sensors_side();
         let rise = dot(front, self.up);
         let other = along(front.map(|v| -v), self.up, 2.0 * rise);
         let above = unit_or(along(self.up, front, 0.15), self.up);
-        [other, above].map(|back| self.seen_from(back, aspect)).to_vec()
+        // Of the surface that would be seen from there, so much faces the viewer.
+        let (facing, all) = self.faces.iter().fold((0.0, 0.0), |(facing, all), f| {
+            let shown = f.area * dot(f.normal, other);
+            (facing + shown.max(0.0), all + shown.abs())
+        });
+        let second = match self.sensors.get(self.sensors.len() / 2) {
+            Some(s) if facing < 0.35 * all => {
+                Camera { up: self.up, ..Camera::new(s.position, along(s.position, s.forward, 1.0)) }
+            }
+            _ => self.seen_from(other, aspect),
+        };
+        vec![second, self.seen_from(above, aspect)]
     }
 
     /// Towards a viewer, from turn and rise (degrees) from straight before the longer side.
@@ -320,11 +332,12 @@ impl Setting {
 fn upwards(faces: &[Face], sensors: &[Sensor]) -> [f32; 3] {
     let sum = sensors.iter().fold([0.0; 3], |m, s| along(m, s.up, 1.0));
     let mut up = unit_or(sum, [0.0, 0.0, 1.0]);
-    for cone in [0.82f32, 0.94, 0.98, 0.99] {
+    // Of a ball, which has no floor, 9, 3 and 1 % of the area lie so near to level.
+    for (cone, least) in [(0.82f32, 0.13), (0.94, 0.09), (0.98, 0.06), (0.99, 0.05)] {
         let level = faces.iter().filter(|f| dot(f.normal, up) > cone);
         let (mean, area) = level.fold(([0.0; 3], 0.0), |(m, a), f| (along(m, f.normal, f.area), a + f.area));
         let whole: f32 = faces.iter().map(|f| f.area).sum();
-        if area < 0.02 * whole {
+        if area < least * whole {
             break;
         }
         up = unit_or(mean, up);

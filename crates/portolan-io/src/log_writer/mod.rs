@@ -3,7 +3,7 @@
 //! | layout | holds | files |
 //! |---|---|---|
 //! | [`LogLayout::Kitti`] | end points | `velodyne/NNNNNN.bin` (x, y, z, intensity), `poses.txt`, `calib.txt`, `times.txt` |
-//! | [`LogLayout::TumRgbd`] | images of a camera | `depth/TIME.png` (5000 units a metre), `rgb/TIME.png`, `depth.txt`, `rgb.txt`, `groundtruth.txt` |
+//! | [`LogLayout::TumRgbd`] | images of a camera | `depth/TIME.png` (5000 units a metre), `rgb/TIME.png`, `depth.txt`, `rgb.txt`, `groundtruth.txt`, `calibration.txt` |
 //! | [`LogLayout::SevenScenes`] | images of a camera | `frame-NNNNNN.depth.png` (millimetres), `.color.png`, `.pose.txt`, `camera-intrinsics.txt` |
 
 mod kitti;
@@ -28,7 +28,7 @@ pub enum LogLayout {
         /// The identity, if there is no camera.
         camera_from_lidar: Pose<3>,
     },
-    /// TUM RGB-D. The layout has no place for the numbers of the camera: readers take 525, 525, 319.5, 239.5.
+    /// TUM RGB-D. The layout has no place for the numbers of the camera; they are put beside it, `fx fy cx cy`.
     TumRgbd,
     /// 7-Scenes, with the numbers of the camera beside the frames.
     SevenScenes,
@@ -87,8 +87,11 @@ impl LogWriter {
     /// # Errors
     /// [`IoError::Os`] where writing fails.
     pub fn finish(mut self) -> Result<usize, IoError> {
-        if let (LogLayout::SevenScenes, Some((camera, _))) = (self.layout, self.camera) {
-            self.texts.push(("camera-intrinsics.txt", seven_scenes::intrinsics(&camera)));
+        if let Some((Pinhole { fx, fy, cx, cy }, _)) = self.camera {
+            self.texts.push(match self.layout {
+                LogLayout::TumRgbd => ("calibration.txt", format!("{fx} {fy} {cx} {cy}\n")),
+                _ => ("camera-intrinsics.txt", format!("{fx} 0 {cx}\n0 {fy} {cy}\n0 0 1\n")),
+            });
         }
         for (name, text) in &self.texts {
             write_text(&self.folder.join(name), text)?;

@@ -1,7 +1,7 @@
 //! 7-Scenes: three files a frame.
 
 use portolan::geom::Pose;
-use portolan::scan::{Frame, Pinhole};
+use portolan::scan::Frame;
 
 use super::picture::{color_png, depth_png};
 use super::{LogWriter, matrix_rows, write_text};
@@ -9,11 +9,6 @@ use crate::IoError;
 
 /// Units of a depth image per metre.
 const UNITS: f64 = 1000.0;
-
-pub(super) fn intrinsics(c: &Pinhole) -> String {
-    let Pinhole { fx, fy, cx, cy } = c;
-    format!("{fx} 0 {cx}\n0 {fy} {cy}\n0 0 1\n")
-}
 
 impl LogWriter {
     pub(super) fn push_seven_scenes(

@@ -5,7 +5,7 @@
 use super::world::SpaceWorld;
 use crate::Random;
 use portolan::gallery::{ErrorSummary, Truth};
-use portolan::geom::vector::{along, distance, scale, sub};
+use portolan::geom::vector::{along, distance, dot, norm, scale, sub};
 use portolan::geom::{Aabb, Pose};
 use portolan::scan::Frame;
 
@@ -47,25 +47,44 @@ pub fn surface_points(world: &SpaceWorld, within: &Aabb<3>, count: usize, seed: 
     points
 }
 
-/// Those of the surface points that some scan saw: within `reach` metres of one of its end points.
+/// Those of the surface points that some scan saw: a ray of it ended within `reach` metres, nothing stands between the
+/// point and the sensor, and the cosine of the angle of incidence is at least `least_cos`.
 ///
-/// What no scan saw is unknown to any map, and says nothing about it. O(end points + points).
-pub fn seen_surface(points: &[SurfacePoint], scans: &[(Pose<3>, Frame)], reach: f64) -> Vec<SurfacePoint> {
+/// What no scan saw is unknown to any map. What rays only graze is lost to maps of rays where the surface runs through the
+/// lowest part of a cell: rays that end further on pass through the rest of it. O(points x scans + end points).
+pub fn seen_surface(
+    world: &SpaceWorld,
+    points: &[SurfacePoint],
+    scans: &[(Pose<3>, Frame)],
+    reach: f64,
+    least_cos: f64,
+) -> Vec<SurfacePoint> {
     let cell = |p: [f64; 3]| p.map(|v| (v / reach).floor() as i64);
-    let mut ends: Vec<([i64; 3], [f64; 3])> = Vec::new();
+    let mut seen = vec![false; points.len()];
     for (pose, frame) in scans {
-        ends.extend(end_points(frame).map(|p| pose.transform_point(p)).map(|p| (cell(p), p)));
+        let mut ends: Vec<_> =
+            end_points(frame).map(|p| pose.transform_point(p)).map(|p| (cell(p), p)).collect();
+        ends.sort_by_key(|e| e.0);
+        let near = |p: [f64; 3]| {
+            let c = cell(p);
+            (0..27).any(|k: i64| {
+                let there = [c[0] + k % 3 - 1, c[1] + k / 3 % 3 - 1, c[2] + k / 9 - 1];
+                let first = ends.partition_point(|e| e.0 < there);
+                ends[first..].iter().take_while(|e| e.0 == there).any(|e| distance(e.1, p) <= reach)
+            })
+        };
+        for (s, seen) in points.iter().zip(&mut seen).filter(|(_, seen)| !**seen) {
+            let way = sub(s.point, pose.translation);
+            let length = norm(way);
+            let direction = scale(way, 1.0 / length);
+            if -dot(direction, s.normal) < least_cos {
+                continue;
+            }
+            let open = world.cast_ray(pose.translation, direction).is_none_or(|h| h.range > length - 1e-6);
+            *seen = open && near(s.point);
+        }
     }
-    ends.sort_by_key(|e| e.0);
-    let near = |p: [f64; 3]| {
-        let c = cell(p);
-        (0..27).any(|k: i64| {
-            let there = [c[0] + k % 3 - 1, c[1] + k / 3 % 3 - 1, c[2] + k / 9 - 1];
-            let first = ends.partition_point(|e| e.0 < there);
-            ends[first..].iter().take_while(|e| e.0 == there).any(|e| distance(e.1, p) <= reach)
-        })
-    };
-    points.iter().filter(|s| near(s.point)).copied().collect()
+    points.iter().zip(seen).filter(|(_, seen)| *seen).map(|(s, _)| *s).collect()
 }
 
 /// Surfaces of a frame, in the sensor's frame.
@@ -108,11 +127,14 @@ pub fn free_points(
         let pose = &scans[*scan].0;
         let end = pose.transform_point(ends[(pick * ends.len() as f64) as usize]);
         let length = distance(end, pose.translation);
+        if reach > length - margin {
+            continue;
+        }
         let direction = scale(sub(end, pose.translation), 1.0 / length);
         // The noisy end may lie behind the surface: the ray itself ended at the true one.
         let true_length = world.cast_ray(pose.translation, direction).map_or(0.0, |h| h.range);
         let p = along(pose.translation, direction, reach);
-        if reach <= true_length.min(length) - margin && Truth::signed_distance(world, p) >= margin {
+        if reach <= true_length - margin && Truth::signed_distance(world, p) >= margin {
             points.push(p);
         }
     }
@@ -203,9 +225,9 @@ mod tests {
             assert!(world.signed_distance(s.point).abs() < 1e-9 && inner.contains(s.point));
             assert!(world.signed_distance(along(s.point, s.normal, 1e-3)) > 0.0);
         }
-        let seen = seen_surface(&surface, &log.scans, 0.1);
+        let seen = seen_surface(world, &surface, &log.scans, 0.1, 0.1);
         println!("{} of {} surface points seen", seen.len(), surface.len());
-        assert!(seen.len() > 1500 && seen.len() < 4000);
+        assert!(seen.len() > 1000 && seen.len() < 4000);
         let free = free_points(world, &log.scans, 0.2, 3000, 1);
         assert_eq!(free.len(), 3000);
         assert!(free.iter().all(|&p| world.signed_distance(p) >= 0.2));

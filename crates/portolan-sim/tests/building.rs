@@ -1,0 +1,117 @@
+//! Maps of the Building against the truth: free space, surfaces, distances, colours.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
+
+use portolan::cell::LogOdds8;
+use portolan::geom::Lattice;
+use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::surface::{MeshSettings, marching_cubes};
+use portolan_sim::space::{
+    BuildingConfig, BuildingLog, DepthCamera, SpaceSensor, building, free_points, score_free, score_surface,
+    seen_surface, surface_errors, surface_points,
+};
+use std::sync::LazyLock;
+
+/// The default lidar: 40 scans of 64 x 1024 rays, noise 1 cm.
+static LIDAR: LazyLock<BuildingLog> = LazyLock::new(|| building(&BuildingConfig::default()));
+
+fn occupancy(resolution: f64, sweep: OccupancySweep) -> SparseOccupancy {
+    let lattice = Lattice::new([0.0; 3], resolution);
+    let mut map = SparseOccupancy::<LogOdds8>::new(lattice, Default::default(), sweep).unwrap();
+    for (pose, frame) in &LIDAR.scans {
+        map.integrate(pose, frame).unwrap();
+    }
+    map
+}
+
+/// Free space 0.3 m or more before a surface is called free; surfaces that a ray met within half a voxel, at less than 75
+/// degrees of incidence, are not.
+fn assert_labels(resolution: f64, sweep: OccupancySweep, most_lost: f64) {
+    let log = &*LIDAR;
+    let map = occupancy(resolution, sweep);
+    let is_free = |p: [f64; 3]| map.probability(p).known().map(|p| p < 0.5);
+    let free = score_free(&free_points(&log.world, &log.scans, 0.3, 40_000, 1), is_free);
+    println!(
+        "{sweep:?} at {resolution} m: {:.3} % of free space called free, {:.3} % occupied",
+        100.0 * free.free_share(),
+        100.0 * free.occupied_share(),
+    );
+    let surface = surface_points(&log.world, &log.world.aabb(), 60_000, 2);
+    let lost = [0.26, 0.0].map(|least_cos| {
+        let seen = seen_surface(&log.world, &surface, &log.scans, 0.5 * resolution, least_cos);
+        let lost = score_surface(&seen, resolution, is_free);
+        println!(
+            "  of {} points of surface seen with a cosine of {least_cos} or more {:.3} % called free, {:.2} % occupied",
+            seen.len(),
+            100.0 * lost.free_share(),
+            100.0 * lost.occupied_share(),
+        );
+        lost
+    });
+    assert!(free.free_share() >= 0.99, "{free:?}");
+    assert!(lost[0].free_share() <= most_lost, "{lost:?}");
+}
+
+#[test]
+fn free_space_is_free_and_surfaces_are_not_at_10_cm() {
+    assert_labels(0.1, OccupancySweep::Exact, 2e-4);
+}
+
+#[test]
+fn free_space_is_free_and_surfaces_are_not_at_5_cm() {
+    // Measured 0.2 %: rays that pass a cell's free part clear it again after the few that end in it.
+    assert_labels(0.05, OccupancySweep::Exact, 3e-3);
+}
+
+/// The mesh's vertices.
+fn vertices(map: &SparseTsdf) -> Vec<[f64; 3]> {
+    let mesh = marching_cubes(map.store(), None, &MeshSettings::default());
+    (0..mesh.vertices.len()).map(|i| mesh.vertex_world(i)).collect()
+}
+
+fn tsdf_of(log: &BuildingLog, config: SparseTsdfConfig) -> SparseTsdf {
+    let mut map = SparseTsdf::new(config).unwrap();
+    for (pose, frame) in &log.scans {
+        map.integrate(pose, frame).unwrap();
+    }
+    map
+}
+
+#[test]
+fn the_surface_of_lidar_scans_is_3_mm_off_in_the_median() {
+    let log = &*LIDAR;
+    let map = tsdf_of(log, SparseTsdfConfig { truncation: 0.15, ..Default::default() });
+    let errors = surface_errors(&log.world, vertices(&map).into_iter()).unwrap();
+    println!("lidar, 5 cm, noise 1 cm: {errors:?}");
+    assert!(errors.count > 50_000 && errors.median <= 3e-3, "{errors:?}");
+}
+
+#[test]
+fn the_surface_and_colours_of_depth_images_are_right() {
+    let camera = DepthCamera::default().with_noise(0.01);
+    let log =
+        building(&BuildingConfig { scans: 60, sensor: SpaceSensor::Camera(camera), ..Default::default() });
+    let map = tsdf_of(&log, SparseTsdfConfig { color: true, truncation: 0.15, ..Default::default() });
+    let points = vertices(&map);
+    let errors = surface_errors(&log.world, points.iter().copied()).unwrap();
+    println!("depth camera, 5 cm, noise 1 cm: {errors:?}");
+    assert!(errors.count > 20_000 && errors.median <= 3e-3, "{errors:?}");
+    // Colours of squares and bodies that are larger than a voxel come back where nothing else is near.
+    let (mut right, mut all) = (0, 0);
+    for p in points {
+        let around = |k: usize| {
+            let mut q = p;
+            q[k / 2] += if k.is_multiple_of(2) { 0.08 } else { -0.08 };
+            log.world.color_near(q)
+        };
+        let want = log.world.color_near(p);
+        if (0..6).any(|k| around(k) != want) {
+            continue;
+        }
+        let Some(color) = map.color(p) else { continue };
+        all += 1;
+        right += usize::from(color.rgb8().iter().zip(&want).all(|(a, b)| a.abs_diff(*b) <= 4));
+    }
+    println!("{right} of {all} colours right to 4 of 255");
+    assert!(all > 3000 && right as f64 > 0.95 * f64::from(all));
+}
