@@ -15,9 +15,10 @@ use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::output::Output;
 use crate::progress::Progress;
-use crate::source::open_map;
+use crate::source::{Source, open};
 
 mod nearest;
+mod space;
 mod spread;
 
 use nearest::SegmentIndex;
@@ -26,7 +27,8 @@ use spread::Spread;
 #[derive(clap::Args)]
 #[command(
     after_help = "Example:\n  portolan map intel.log.gz --resolution 0.05 --hold-out 10 --out intel\n  \
-                  portolan eval intel --scans intel.log.gz"
+                  portolan eval intel --scans intel.log.gz\n  \
+                  portolan eval kitchen --reference kitchen.ply --crop"
 )]
 pub(crate) struct Args {
     /// map.portolan or its folder
@@ -34,7 +36,7 @@ pub(crate) struct Args {
     /// Log with scans that were not fused: their ranges are predicted
     #[arg(long, value_name = "LOG", required_unless_present = "reference")]
     scans: Option<PathBuf>,
-    /// Contour to compare with (GeoJSON)
+    /// What to compare with: a contour (GeoJSON); in space a mesh (PLY) or a cloud (PLY, PCD, XYZ, ..)
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     #[command(flatten)]
@@ -47,13 +49,35 @@ pub(crate) struct Args {
     /// Predict every N-th scan; default: those that the map held out, else all
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     hold_out: Option<u64>,
+    /// In space: leave out what the map did not observe of the reference
+    #[arg(long, requires = "reference")]
+    crop: bool,
+    /// In space: rays of each scan to predict, at most, evenly taken
+    #[arg(long, value_name = "N", default_value_t = 5000, value_parser = at_least_one)]
+    rays: usize,
     #[command(flatten)]
     output: Output,
 }
 
+fn at_least_one(word: &str) -> Result<usize, String> {
+    word.parse().ok().filter(|n| *n > 0).ok_or_else(|| "must be a whole number, 1 or more".into())
+}
+
 /// Evaluates the map.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let file = open_map(&args.map, "evaluate it")?;
+    match open(&args.map)? {
+        Source::Map(file) => plane(args, &file),
+        Source::SpaceMap(file) => space::run(args, &file),
+        other => bail!(
+            "{}: is {}; to evaluate it, give a map.portolan or its folder",
+            args.map.display(),
+            other.describe()
+        ),
+    }
+}
+
+/// Evaluates a map of the plane.
+fn plane(args: &Args, file: &MapFile) -> anyhow::Result<()> {
     let Some(tsdf) = &file.tsdf else {
         bail!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display());
     };
@@ -69,7 +93,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         100.0 * doubled.share()
     );
     if let Some(path) = &args.scans {
-        let prediction = predict(args, &file, path)?;
+        let prediction = predict(args, file, path)?;
         text += &prediction_text(&prediction);
         document["scans"] = prediction;
     }

@@ -58,6 +58,12 @@ pub fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
+/// The cross product of two vectors of space.
+#[inline(always)]
+pub fn cross3(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// Distance from `p` to the segment `a`-`b` (metres), and the parameter in `[0, 1]` of the nearest point.
 pub fn point_segment<const D: usize>(p: [f64; D], a: [f64; D], b: [f64; D]) -> (f64, f64) {
     let ab = sub(b, a);
@@ -75,6 +81,12 @@ mod tests {
         assert_eq!(unit([0.0, 0.0]), None);
         assert_eq!(unit([f64::INFINITY, 0.0]), None);
         assert_eq!(unit([3.0, 4.0]), Some([0.6000000000000001, 0.8]));
+    }
+
+    #[test]
+    fn the_cross_product_is_right_handed() {
+        assert_eq!(cross3([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+        assert_eq!(cross3([0.0, 2.0, 0.0], [0.0, 1.0, 3.0]), [6.0, 0.0, 0.0]);
     }
 
     #[test]

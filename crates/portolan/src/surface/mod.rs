@@ -1,17 +1,25 @@
 //! Surfaces extracted from distance fields, and the questions they answer.
 
+mod compare;
 mod contour;
 mod cubes;
 mod measures;
 mod mesh;
+mod nearest;
 mod polyline;
+mod predict;
 mod ray_cast;
 mod squares;
 
+pub use compare::{
+    CompareSettings, Reference, SurfaceComparison, SurfaceDistances, area_samples, compare_surfaces,
+};
 pub use contour::Contour;
 pub use cubes::{MeshSettings, isosurface, marching_cubes};
 pub use measures::{DoubledLength, ThinWalls, doubled_length, thin_walls};
 pub use mesh::{EdgeCounts, Mesh};
+pub use nearest::NearestSurface;
 pub use polyline::Polyline;
-pub use ray_cast::{RayCast, RayCastSettings, cast_ray};
+pub use predict::{PredictionScore, RangeNoise, RangePredictions};
+pub use ray_cast::{RayCast, RayCastSettings, RayCaster, cast_ray};
 pub use squares::{Ambiguity, ContourSettings, level_set, marching_squares};

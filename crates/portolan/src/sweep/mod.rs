@@ -53,7 +53,7 @@ pub trait Sweep<const D: usize> {
 }
 
 /// The part of `origin + s * direction`, `0 <= s <= length`, inside a box: `None` where it misses.
-fn clip<const D: usize>(
+pub(crate) fn clip<const D: usize>(
     bounds: &Aabb<D>,
     origin: [f64; D],
     direction: [f64; D],

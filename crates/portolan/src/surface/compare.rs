@@ -1,0 +1,269 @@
+//! How far two surfaces are from each other.
+
+use super::{Mesh, NearestSurface};
+use crate::geom::vector::{along, cross3, norm, sub};
+
+/// What a map is compared with.
+#[derive(Clone, Copy, Debug)]
+pub enum Reference<'a> {
+    /// Triangles.
+    Mesh(&'a Mesh),
+    /// Points (metres, about `origin`).
+    Points {
+        /// World position of the point (0, 0, 0) (metres).
+        origin: [f64; 3],
+        /// The points.
+        points: &'a [[f32; 3]],
+    },
+}
+
+/// How surfaces are compared.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CompareSettings {
+    /// Points of each surface, at most.
+    pub samples: usize,
+    /// Distances (metres) for which shares and F-scores are given.
+    pub thresholds: Vec<f64>,
+}
+
+impl Default for CompareSettings {
+    /// 200,000 points; 1, 2 and 5 cm.
+    fn default() -> Self {
+        Self { samples: 200_000, thresholds: vec![0.01, 0.02, 0.05] }
+    }
+}
+
+/// Distances from points of one surface to another one (metres).
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceDistances {
+    /// Points measured.
+    pub samples: usize,
+    /// Mean.
+    pub mean: f64,
+    /// Half of the points are no further away.
+    pub median: f64,
+    /// 95 % of the points are no further away.
+    pub p95: f64,
+    /// The largest.
+    pub largest: f64,
+    /// Share of the points within each threshold.
+    pub within: Vec<f64>,
+}
+
+/// Two surfaces compared both ways.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceComparison {
+    /// From the map's surface to the reference: is what the map says true?
+    pub accuracy: SurfaceDistances,
+    /// From the reference to the map's surface: does the map say all that is true?
+    pub completeness: SurfaceDistances,
+    /// For each threshold, the harmonic mean of the two shares within it *(Knapitsch et al. 2017, section 4)*.
+    pub f_scores: Vec<f64>,
+    /// Points of the reference that were left out.
+    pub cropped: usize,
+}
+
+/// Compares the surface of a map with a reference: distances between evenly spread points of the one and the nearest
+/// triangle (or point) of the other, both ways. Only points of the reference that `keep` wants are measured, so that
+/// what a sensor could not see need not count.
+///
+/// `None` where a surface has no area or point, or nothing of the reference is kept. Deterministic.
+/// O((samples + elements) log elements).
+pub fn compare_surfaces(
+    map: &Mesh,
+    reference: Reference<'_>,
+    settings: &CompareSettings,
+    keep: impl Fn([f64; 3]) -> bool,
+) -> Option<SurfaceComparison> {
+    let (index, mut points) = match reference {
+        Reference::Mesh(mesh) => (NearestSurface::of_mesh(mesh), area_samples(mesh, settings.samples)),
+        Reference::Points { origin, points } => {
+            (NearestSurface::of_points(origin, points), thinned(origin, points, settings.samples))
+        }
+    };
+    let accuracy = distances(&area_samples(map, settings.samples), &index, settings)?;
+    let all = points.len();
+    points.retain(|p| keep(*p));
+    let completeness = distances(&points, &NearestSurface::of_mesh(map), settings)?;
+    let f_scores = accuracy.within.iter().zip(&completeness.within).map(|(&precision, &recall)| {
+        if precision + recall > 0.0 { 2.0 * precision * recall / (precision + recall) } else { 0.0 }
+    });
+    let f_scores = f_scores.collect();
+    Some(SurfaceComparison { accuracy, completeness, f_scores, cropped: all - points.len() })
+}
+
+/// `count` points of a mesh (world), as many on each piece of surface as its area asks for: one per equal share of the
+/// area in the order of the triangles, placed inside its triangle by a low-discrepancy sequence. None where the mesh
+/// has no area.
+pub fn area_samples(mesh: &Mesh, count: usize) -> Vec<[f64; 3]> {
+    let areas: Vec<f64> = mesh
+        .triangles
+        .iter()
+        .map(|&t| {
+            let [a, b, c] = mesh.corners_world(t);
+            0.5 * norm(cross3(sub(b, a), sub(c, a)))
+        })
+        .collect();
+    let total: f64 = areas.iter().sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return Vec::new();
+    }
+    let mut samples = Vec::with_capacity(count);
+    let (mut triangle, mut passed) = (0, 0.0);
+    for i in 0..count {
+        let at = (i as f64 + 0.5) / count as f64 * total;
+        while triangle + 1 < areas.len() && passed + areas[triangle] <= at {
+            passed += areas[triangle];
+            triangle += 1;
+        }
+        // The plastic number's sequence *(Roberts 2018)*, spread evenly over the triangle by the root.
+        let [u, v] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2].map(|a| (0.5 + i as f64 * a).fract());
+        let [a, b, c] = mesh.corners_world(mesh.triangles[triangle]);
+        let root = u.sqrt();
+        samples.push(along(along(a, sub(b, a), root * (1.0 - v)), sub(c, a), root * v));
+    }
+    samples
+}
+
+/// At most `count` of the points (world), evenly taken.
+fn thinned(origin: [f64; 3], points: &[[f32; 3]], count: usize) -> Vec<[f64; 3]> {
+    let taken = count.min(points.len());
+    let world = |i: usize| -> [f64; 3] {
+        let p = points[(i as u128 * points.len() as u128 / taken as u128) as usize];
+        std::array::from_fn(|k| origin[k] + f64::from(p[k]))
+    };
+    (0..taken).map(world).collect()
+}
+
+fn distances(
+    points: &[[f64; 3]],
+    to: &NearestSurface,
+    settings: &CompareSettings,
+) -> Option<SurfaceDistances> {
+    let mut sorted = measured(points, to);
+    let n = sorted.len();
+    if n == 0 {
+        return None;
+    }
+    let mean = sorted.iter().sum::<f64>() / n as f64;
+    sorted.sort_unstable_by(f64::total_cmp);
+    // The nearest rank, which is always one of the numbers.
+    let at = |q: f64| sorted[((q * n as f64).ceil() as usize).clamp(1, n) - 1];
+    let share = |t: &f64| sorted.partition_point(|d| d <= t) as f64 / n as f64;
+    Some(SurfaceDistances {
+        samples: n,
+        mean,
+        median: at(0.5),
+        p95: at(0.95),
+        largest: at(1.0),
+        within: settings.thresholds.iter().map(share).collect(),
+    })
+}
+
+/// In the order of the points.
+#[cfg(feature = "parallel")]
+fn measured(points: &[[f64; 3]], to: &NearestSurface) -> Vec<f64> {
+    use rayon::prelude::*;
+    points.par_iter().with_min_len(256).filter_map(|&p| to.distance(p)).collect()
+}
+
+#[cfg(not(feature = "parallel"))]
+fn measured(points: &[[f64; 3]], to: &NearestSurface) -> Vec<f64> {
+    points.iter().filter_map(|&p| to.distance(p)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::vector::distance;
+
+    /// A ball of fine triangles about a far point.
+    fn sphere(radius: f64) -> Mesh {
+        let (rings, sectors) = (90u32, 180u32);
+        let mut mesh = Mesh { origin: [500_000.0, 4_000_000.0, 100.0], ..Default::default() };
+        for i in 0..=rings {
+            for j in 0..sectors {
+                let (polar, azimuth) = (
+                    std::f64::consts::PI * f64::from(i) / f64::from(rings),
+                    std::f64::consts::TAU * f64::from(j) / f64::from(sectors),
+                );
+                let p = [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()];
+                mesh.vertices.push(p.map(|v| (radius * v) as f32));
+            }
+        }
+        for i in 0..rings {
+            for j in 0..sectors {
+                let (a, b) = (i * sectors + j, i * sectors + (j + 1) % sectors);
+                mesh.triangles.extend([[a, a + sectors, b], [b, a + sectors, b + sectors]]);
+            }
+        }
+        mesh
+    }
+
+    fn plane(z: f32, half: f32) -> Mesh {
+        Mesh {
+            vertices: vec![[-half, -half, z], [half, -half, z], [half, half, z], [-half, half, z]],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn balls_are_as_far_apart_as_their_radii() {
+        let settings = CompareSettings { samples: 20_000, ..Default::default() };
+        let (map, truth) = (sphere(1.03), sphere(1.0));
+        let c = compare_surfaces(&map, Reference::Mesh(&truth), &settings, |_| true).unwrap();
+        for way in [&c.accuracy, &c.completeness] {
+            assert_eq!(way.samples, 20_000);
+            // Chords of two degrees lie 0.15 mm inside of a ball of a metre.
+            for d in [way.median, way.mean, way.p95, way.largest] {
+                assert!((d - 0.03).abs() < 5e-4, "{d}");
+            }
+            assert_eq!(way.within, [0.0, 0.0, 1.0]);
+        }
+        assert_eq!((c.f_scores, c.cropped), (vec![0.0, 0.0, 1.0], 0));
+        let points: Vec<[f32; 3]> = truth.vertices.clone();
+        let cloud = Reference::Points { origin: truth.origin, points: &points };
+        let c = compare_surfaces(&map, cloud, &settings, |_| true).unwrap();
+        // Points two degrees apart: up to 25 mm along the surface to the nearest one.
+        assert!(c.accuracy.median >= 0.03 && c.accuracy.median < 0.035, "{}", c.accuracy.median);
+        assert!((c.completeness.median - 0.03).abs() < 5e-4);
+        assert_eq!(c.completeness.samples, points.len());
+    }
+
+    #[test]
+    fn a_shifted_plane_and_what_it_does_not_cover() {
+        let settings = CompareSettings { samples: 40_000, ..Default::default() };
+        let (map, truth) = (plane(0.015, 1.0), plane(0.0, 2.0));
+        let all = compare_surfaces(&map, Reference::Mesh(&truth), &settings, |_| true).unwrap();
+        assert!((all.accuracy.median - 0.015).abs() < 1e-6 && (all.accuracy.largest - 0.015).abs() < 1e-6);
+        assert_eq!(all.accuracy.within, [0.0, 1.0, 1.0]);
+        // A quarter of the reference lies below the map; the furthest corner is a diagonal metre away.
+        assert!((all.completeness.within[1] - 0.25).abs() < 0.01, "{:?}", all.completeness.within);
+        assert!((all.completeness.largest - 2f64.sqrt()).abs() < 0.03);
+        let f = 2.0 * all.completeness.within[1] / (1.0 + all.completeness.within[1]);
+        assert!((all.f_scores[1] - f).abs() < 1e-12);
+        let seen = |p: [f64; 3]| p[0].abs() <= 1.0 && p[1].abs() <= 1.0;
+        let seen = compare_surfaces(&map, Reference::Mesh(&truth), &settings, seen).unwrap();
+        assert_eq!(seen.completeness.within[1], 1.0);
+        assert_eq!(seen.cropped + seen.completeness.samples, 40_000);
+        assert!(compare_surfaces(&map, Reference::Mesh(&truth), &settings, |_| false).is_none());
+        assert!(compare_surfaces(&Mesh::default(), Reference::Mesh(&truth), &settings, |_| true).is_none());
+    }
+
+    #[test]
+    fn samples_are_spread_by_area() {
+        // Two squares, one of four times the area.
+        let (mut mesh, other) = (plane(0.0, 1.0), plane(1.0, 2.0));
+        mesh.vertices.extend(&other.vertices);
+        mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + 4)));
+        let samples = area_samples(&mesh, 5000);
+        let upper: Vec<_> = samples.iter().filter(|p| p[2] > 0.5).collect();
+        assert_eq!(upper.len(), 4000);
+        let middle = upper.iter().fold([0.0; 3], |m, p| along(m, **p, 1.0 / 4000.0));
+        assert!(distance(middle, [0.0, 0.0, 1.0]) < 0.02, "{middle:?}");
+        let quarter = upper.iter().filter(|p| p[0] < 0.0 && p[1] < 0.0).count();
+        assert!((quarter as f64 - 1000.0).abs() < 20.0, "{quarter}");
+        assert_eq!(area_samples(&mesh, 5000), samples);
+    }
+}
