@@ -9,7 +9,7 @@ use std::path::Path;
 
 use portolan::cell::DistanceBrick;
 use portolan::geom::{BlockKey, Lattice, Pose};
-use portolan::scan::{Frame, PointScan};
+use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
 use portolan::store::Bricks;
 use portolan::sweep::WeightModel;
 use portolan_io::{LogLayout, LogWriter, MapHeader, SpaceMapFile, TsdfBricks};
@@ -103,14 +103,20 @@ fn ranges_of_scans_are_predicted() {
     let folder = tempfile::tempdir().unwrap();
     let (map, log) = (folder.path().join("map"), folder.path().join("log"));
     write_map(&map);
-    let layout = LogLayout::Kitti { camera_from_lidar: Pose::IDENTITY };
-    let mut writer = LogWriter::create(&log, layout).unwrap();
+    let mut writer = LogWriter::create(&log, LogLayout::SevenScenes).unwrap();
+    // The camera stands in the map, 0.8 m before the true wall, and looks along x.
+    let rotation = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]];
+    let pose = Pose { rotation, translation: [0.2, 0.8, 0.8] };
+    let frame = Frame::Image(RangeImage {
+        projection: Projection::Pinhole(Pinhole { fx: 40.0, fy: 40.0, cx: 9.5, cy: 4.5 }),
+        columns: 20,
+        rows: 10,
+        values: (0..200).map(|i| if i < 20 { 0.0 } else { 0.8 }).collect(),
+        colors: Vec::new(),
+        refused: RefusedBeams::default(),
+    });
     for scan in 0..4 {
-        // The sensor stands in the map and sees the true wall, and past the map.
-        let pose = Pose::<3>::from_quaternion([0.2, 0.8, 0.8], [0.0, 0.0, 0.0, 1.0]).unwrap();
-        let mut points: Vec<[f32; 3]> = (0..90).map(|i| [0.8, -0.4 + 0.009 * i as f32, 0.1]).collect();
-        points.extend((0..10).map(|i| [-0.5, 4.0 + 0.01 * i as f32, 0.0]));
-        writer.push(&pose, f64::from(scan), &Frame::Points(PointScan::new(points, [0.0; 3]))).unwrap();
+        writer.push(&pose, f64::from(scan), &frame).unwrap();
     }
     writer.finish().unwrap();
     let found = json(["eval", arg(&map), "--scans", arg(&log), "--json"]);
@@ -118,17 +124,17 @@ fn ranges_of_scans_are_predicted() {
     // Every second scan was held out.
     assert_eq!(
         (&scans["scans"], &scans["beams"], &scans["predicted"]),
-        (&2.into(), &200.into(), &180.into())
+        (&2.into(), &360.into(), &360.into())
     );
     assert_eq!(scans["held_out"], true);
     assert!((number(scans, "/bias") - 0.032).abs() < 0.003, "{scans}");
     assert_eq!(number(scans, "/within_one_cell"), 1.0);
-    assert!((number(scans, "/within_one_cell_of_all") - 0.9).abs() < 1e-9);
+    assert!((number(scans, "/within_one_cell_of_all") - 1.0).abs() < 1e-9);
     assert!(number(scans, "/negative_log_likelihood").is_finite());
     let some = json(["eval", arg(&map), "--scans", arg(&log), "--rays", "10", "--json"]);
     assert_eq!(some["scans"]["beams"], 20);
     let text = succeed(["eval", arg(&map), "--scans", arg(&log)]);
-    assert!(text.contains("predicted 180 of 200 hits of 2 scans") && text.contains("nats a ray"), "{text}");
+    assert!(text.contains("predicted 360 of 360 hits of 2 scans") && text.contains("nats a ray"), "{text}");
 }
 
 #[test]
