@@ -72,6 +72,7 @@ pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
 pub(crate) fn space_log_stats(stats: &SpaceLogStats) -> Value {
     json!({
         "scans": stats.scans,
+        "missing_files": stats.missing_files,
         "poses": stats.poses,
         "scans_without_pose": stats.scans_without_pose,
         "poses_without_scan": stats.poses_without_scan,

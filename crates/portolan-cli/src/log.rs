@@ -45,7 +45,8 @@ pub(crate) struct LogArgs {
     /// KITTI rows, TUM lines, 4x4 matrices or a Redwood trajectory
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
-    /// Kind of LOG, where it is not recognised: carmen, or a kind of log of space that a wrong word lists
+    /// Kind of LOG, where it is not recognised: carmen; in space seven-scenes, tum, redwood, bigbird, kitti, stanford,
+    /// scan-graph, clouds
     #[arg(long, value_name = "KIND", value_parser = log_format)]
     pub(crate) format: Option<LogFormat>,
     /// In space: what the numbers of the poses mean, where it is not what the format says: world-from-sensor,
@@ -67,6 +68,15 @@ pub(crate) struct LogArgs {
 }
 
 impl LogArgs {
+    /// Whether anything is said that only logs of space have.
+    pub(crate) fn is_about_space(&self) -> bool {
+        self.pose_convention.is_some()
+            || self.origin.is_some()
+            || self.intrinsics.is_some()
+            || self.depth_scale.is_some()
+            || self.time_tolerance.is_some()
+    }
+
     /// Whether the log is one of scans of space. What is not recognised counts as planar: that reader says what is wrong.
     pub(crate) fn is_space(&self, path: &Path) -> anyhow::Result<bool> {
         match self.format {

@@ -14,8 +14,10 @@ mod picture;
 mod pictures;
 mod progress;
 mod report;
+mod saved;
 mod source;
 mod space;
+mod stale;
 
 use std::process::ExitCode;
 

@@ -10,6 +10,7 @@ use portolan_io::{
 };
 
 use crate::log::describe;
+use crate::space::available_memory;
 
 /// What a file holds.
 pub(crate) enum Source {
@@ -36,8 +37,8 @@ pub(crate) enum Source {
 /// Opens a file or a folder.
 pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
     Ok(match detect(path)? {
-        FileKind::Portolan => of_map(AnyMapFile::read(path)?),
-        FileKind::PortolanFolder => of_map(AnyMapFile::read(path.join("map.portolan"))?),
+        FileKind::Portolan => of_map(AnyMapFile::read_within(path, readable())?),
+        FileKind::PortolanFolder => of_map(AnyMapFile::read_within(path.join("map.portolan"), readable())?),
         FileKind::EsdfBin => Source::Esdf(EsdfFile::read(path)?),
         FileKind::MapServerYaml => Source::Server(MapServerMap::read(path)?),
         FileKind::Pgm => match yaml_beside(path) {
@@ -62,14 +63,9 @@ fn of_map(file: AnyMapFile) -> Source {
     }
 }
 
-/// Opens a map of the plane made by `map`; `what` is to be done with it.
-pub(crate) fn open_map(path: &Path, what: &str) -> anyhow::Result<MapFile> {
-    match open(path)? {
-        Source::Map(file) => Ok(*file),
-        other => {
-            bail!("{}: is {}; to {what}, give a map.portolan or its folder", path.display(), other.describe())
-        }
-    }
+/// What a map may take in memory (bytes): what the machine has free, 4 GiB at least.
+fn readable() -> u64 {
+    available_memory().unwrap_or(0).max(4 << 30)
 }
 
 /// The yaml file that belongs to an image.

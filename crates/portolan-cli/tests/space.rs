@@ -204,3 +204,89 @@ fn a_broken_scan_is_counted_and_a_broken_log_refused() {
     assert!(error.contains("frame-000000.depth.png"), "{error}");
     assert!(!other.exists());
 }
+
+#[test]
+fn a_folder_keeps_what_is_not_of_an_earlier_run() {
+    let (folder, log) = lidar_log();
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("mesh.ply"), "mine").unwrap();
+    map(&log, &out, &["--maps", "tree"]);
+    assert_eq!(std::fs::read(out.join("mesh.ply")).unwrap(), b"mine");
+    map(&log, &out, &["--maps", "mesh"]);
+    map(&log, &out, &["--maps", "tree"]);
+    assert_eq!(files_in(&out), ["map.portolan", "octree.bt", "octree.ot", "summary.json"]);
+    let refused = fail(2, ["map", arg(&log), "--out", arg(&log), "--resolution", "0.1"]);
+    assert!(refused.contains("the log's own folder"), "{refused}");
+}
+
+#[test]
+fn appending_keeps_bounds_and_distances_and_names_what_differs() {
+    let (folder, log) = lidar_log();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--bounds", "-2,-2,0,4,4,2", "--max-distance", "0.5", "--hold-out", "3"]);
+    let before = summary(&out);
+    succeed(["map", arg(&log), "--out", arg(&out), "--append"]);
+    let after = summary(&out);
+    for key in ["bounds", "max_distance", "hold_out"] {
+        assert_eq!(before["settings"][key], after["settings"][key], "{key}");
+    }
+    for (option, value, word) in [
+        ("--every", "2", "--every"),
+        ("--w-max", "5", "--half-life"),
+        ("--truncation", "0.5", "--truncation"),
+    ] {
+        let error = fail(1, ["map", arg(&log), "--out", arg(&out), "--append", option, value]);
+        assert!(error.contains(word), "{error}");
+    }
+    let error = fail(1, ["map", arg(&log), "--out", arg(&out), "--append", "--no-color"]);
+    assert!(error.contains("leave --no-color out"), "{error}");
+}
+
+#[test]
+fn held_out_scans_are_predicted_and_meshes_compared() {
+    let (folder, log) = lidar_log();
+    let out = folder.path().join("out");
+    map(&log, &out, &["--hold-out", "3"]);
+    let prediction = json(["eval", arg(&out), "--scans", arg(&log), "--json"]);
+    let scans = &prediction["scans"];
+    assert_eq!((&scans["scans"], &scans["held_out"]), (&2.into(), &true.into()));
+    // 24 rings of a moving lidar: most of what a held-out scan sees, another has seen from nearby.
+    assert!(scans["median_error"].as_f64().unwrap() < 0.05, "{scans}");
+    assert!(scans["within_one_cell"].as_f64().unwrap() > 0.6, "{scans}");
+    for name in ["again.ply", "again.glb", "again.obj"] {
+        let made = json(["mesh", arg(&out), arg(&folder.path().join(name)), "--json"]);
+        assert!(made["triangles"].as_u64().unwrap() > 1000);
+    }
+    let same = folder.path().join("again.ply");
+    let compared = json(["eval", arg(&out), "--reference", arg(&same), "--json"]);
+    assert!(compared["reference"]["accuracy"]["p95"].as_f64().unwrap() < 1e-4, "{compared}");
+    assert!(compared["reference"]["f_scores"][0].as_f64().unwrap() > 0.999, "{compared}");
+    for name in ["a.bt", "a.ot", "a.bin", "a.ply", "a.portolan"] {
+        let to = folder.path().join(name);
+        succeed(["convert", arg(&out), arg(&to)]);
+        assert!(to.metadata().unwrap().len() > 100, "{name}");
+    }
+    let bytes = |path: &Path| std::fs::read(path).unwrap();
+    assert!(bytes(&out.join("octree.bt")) == bytes(&folder.path().join("a.bt")));
+    assert!(bytes(&out.join("map.portolan")) == bytes(&folder.path().join("a.portolan")));
+}
+
+#[test]
+fn the_box_that_would_fit_fits() {
+    let (folder, log) = lidar_log();
+    // One far return makes the box of everything too large for an array.
+    let far: Vec<u8> = [90.0f32, 80.0, 70.0, 0.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let scan = log.join("velodyne/000000.bin");
+    let mut bytes = std::fs::read(&scan).unwrap();
+    bytes.extend(far);
+    std::fs::write(&scan, bytes).unwrap();
+    let out = folder.path().join("out");
+    let text = map(&log, &out, &["--maps", "esdf"]);
+    assert!(!out.join("esdf.bin").exists(), "{text}");
+    let start = text.find("--dense ").unwrap() + "--dense ".len();
+    let fitting = text[start..].split(' ').next().unwrap();
+    map(&log, &out, &["--maps", "esdf", "--dense", fitting]);
+    let size = out.join("esdf.bin").metadata().unwrap().len();
+    assert!(size <= 256 << 20 && size > 200 << 20, "{size}");
+}

@@ -69,6 +69,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
                 convert_esdf(&Esdf::from_samples(field.grid, samples)?, target, args)?
             }
         }
+        Source::Esdf(EsdfFile::Three(field)) if target == Target::Esdf => {
+            field.write(&args.out)?;
+            true
+        }
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
         Source::Octomap(file) => convert_octomap(file, target, args)?,
         Source::SpaceMap(file) => space::convert(file, target, args)?,
@@ -109,7 +113,7 @@ fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
         Source::Map(_) => ".yaml, .bin (esdf), .geojson, .svg or .portolan, as far as its maps go",
         Source::Server(_) => ".bin (esdf), .geojson, .svg, .portolan or .yaml",
         Source::Esdf(EsdfFile::Two(_)) => ".yaml, .geojson, .svg or .bin",
-        Source::Esdf(EsdfFile::Three(_)) => "nothing yet: it is in space",
+        Source::Esdf(EsdfFile::Three(_)) => ".bin: it is in space",
         Source::Contour(_) => ".geojson or .svg",
         Source::Image(_) => "nothing without its yaml file",
         Source::Octomap(_) => ".bt or .ot",

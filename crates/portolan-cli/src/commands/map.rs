@@ -4,13 +4,14 @@ mod common;
 mod plane;
 mod space;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use portolan::geom::Aabb;
 use portolan::scan::Body;
 use portolan::sweep::WeightModel;
 
 use crate::arguments::{Bounds, ForgettingArgs, body, bounds, box3, bytes, length, share};
+use crate::error::bad_call;
 use crate::log::{LimitArgs, LogArgs};
 use crate::mapping::MapKind;
 use crate::output::Output;
@@ -100,9 +101,9 @@ pub(crate) struct Args {
     /// x,y,z,radius (metres); may be given several times
     #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true)]
     self_filter: Vec<Body>,
-    /// In space: distances of the esdf are kept up to here (metres)
-    #[arg(long, value_name = "M", value_parser = length, default_value = "1")]
-    max_distance: f64,
+    /// In space: distances of the esdf are kept up to here (metres); default 1
+    #[arg(long, value_name = "M", value_parser = length)]
+    max_distance: Option<f64>,
     /// In space: write this box of the esdf into esdf.bin, where the whole would be larger than 256 MiB
     #[arg(long, value_name = "BOX", value_parser = box3, allow_hyphen_values = true)]
     dense: Option<Aabb<3>>,
@@ -140,6 +141,11 @@ impl Args {
 
     /// A file in place of the folder is found out before the work, not after it.
     fn check_out(&self) -> anyhow::Result<()> {
+        let same =
+            |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+        if same(&self.out, &self.log) {
+            return Err(bad_call("--out is the log's own folder; name another one"));
+        }
         if self.out.exists() && !self.out.is_dir() {
             anyhow::bail!("{}: is a file, not a folder; name a folder for the results", self.out.display());
         }

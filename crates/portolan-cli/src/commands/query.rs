@@ -16,6 +16,7 @@ use portolan_io::{
 use serde_json::{Value, json};
 
 use crate::arguments::length;
+use crate::error::bad_call;
 use crate::output::Output;
 use crate::source::{Source, open};
 use crate::space::esdf_settings;
@@ -38,6 +39,9 @@ pub(crate) struct Args {
 /// Answers at all points.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let source = open(&args.map)?;
+    if args.max_distance.is_some() && !matches!(source, Source::SpaceMap(_)) {
+        return Err(bad_call(format!("--max-distance is for maps of space; this is {}", source.describe())));
+    }
     if let Some(warning) = source.warning().filter(|_| !args.output.quiet) {
         // Standard output is for the answers.
         writeln!(io::stderr(), "portolan: warning: {}: {warning}", args.map.display())?;

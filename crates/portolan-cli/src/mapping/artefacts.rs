@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::bail;
 use portolan::cell::LogOddsValue;
 use portolan::field::{Esdf, EsdfSettings, esdf_from_tsdf};
 use portolan::geom::Grid;
@@ -18,6 +17,7 @@ use portolan_io::{
 
 use super::{MapKind, Settings};
 use crate::picture;
+use crate::stale::remove_stale;
 
 /// Contours nearer to each other than this and facing the same way are one wall seen twice (metres).
 const DOUBLED_REACH: f64 = 0.15;
@@ -71,18 +71,6 @@ pub(crate) struct Artefacts<'a> {
     pub(crate) title: String,
 }
 
-/// Files of the folder that belong to a map and would be wrong beside another one.
-const NAMES: [&str; 8] = [
-    "map.portolan",
-    "map.pgm",
-    "map.yaml",
-    "esdf.bin",
-    "contour.geojson",
-    "contour.svg",
-    "map.png",
-    "summary.json",
-];
-
 impl Artefacts<'_> {
     /// Writes all files but `summary.json` and gives their names and the seconds that they took. What an
     /// earlier run left in the folder and this one does not make is removed: it would belong to another map.
@@ -117,17 +105,7 @@ impl Artefacts<'_> {
         let start = Instant::now();
         self.file.write(folder.join("map.portolan"))?;
         written.push("map.portolan");
-        for stale in NAMES.iter().filter(|n| !written.contains(n) && **n != "summary.json") {
-            match std::fs::remove_file(folder.join(stale)) {
-                Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                    bail!(
-                        "{}: cannot remove what an earlier run left: {e}; remove it",
-                        folder.join(stale).display()
-                    )
-                }
-                _ => {}
-            }
-        }
+        remove_stale(folder, &written)?;
         *seconds.entry("write").or_default() += start.elapsed().as_secs_f64();
         Ok((written, seconds))
     }

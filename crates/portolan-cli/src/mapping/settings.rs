@@ -1,6 +1,5 @@
 //! What the maps of a run are made with.
 
-use anyhow::bail;
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Grid};
 use portolan::map::{OccupancyGrid, Quadtree, SweepKind, Tsdf, TsdfConfig};
@@ -11,6 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::Maps;
 use crate::json::object;
+use crate::saved::check_agree;
 
 /// Maps that can be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -127,18 +127,7 @@ impl Settings {
             "max_range",
             "hold_out",
         ];
-        for key in SHAPING {
-            let (new, old) = (&ours[key], theirs.get(key).unwrap_or(&Value::Null));
-            if new != old {
-                let option =
-                    if key == "w_max" { "w-max or --half-life".into() } else { key.replace('_', "-") };
-                bail!(
-                    "{name}: {key} is {old} in the map and {new} in this call; leave --{option} out to go on \
-                     with the map's, or write to another folder"
-                );
-            }
-        }
-        Ok(())
+        check_agree(&ours, theirs, &SHAPING, name)
     }
 }
 

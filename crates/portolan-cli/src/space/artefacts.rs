@@ -5,10 +5,11 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::bail;
 use portolan::cell::LogOddsRule;
 use portolan::geom::Aabb;
 use portolan_io::{IoError, SpaceMapFile, write_atomic, write_esdf, write_octomap_bt, write_octomap_ot};
+
+use crate::stale::remove_stale;
 
 use super::files::{dense_esdf, write_mesh};
 use super::{Derived, preview};
@@ -34,15 +35,11 @@ pub(crate) struct Written {
     pub(crate) notes: Vec<String>,
 }
 
-/// Files of the folder that belong to a map and would be wrong beside another one.
-const NAMES: [&str; 7] =
-    ["map.portolan", "mesh.ply", "octree.bt", "octree.ot", "esdf.bin", "preview.png", "summary.json"];
-
 impl Artefacts<'_> {
-    /// Writes all files but `summary.json`. What an earlier run left in the folder and this one does not make is removed:
+    /// Writes all files but `map.portolan` and `summary.json`. What an earlier run left in the folder and this one does not make is removed:
     /// it would belong to another map.
     pub(crate) fn write(&self, folder: &Path) -> anyhow::Result<Written> {
-        let mut written = Written::default();
+        let mut written = Written { notes: self.derived.notes.clone(), ..Written::default() };
         let start = Instant::now();
         if let Some(mesh) = &self.derived.mesh {
             write_mesh(&folder.join("mesh.ply"), mesh)?;
@@ -50,7 +47,7 @@ impl Artefacts<'_> {
         }
         self.write_octree(folder, &mut written)?;
         self.write_esdf(folder, &mut written)?;
-        self.file.write(folder.join("map.portolan"))?;
+        // Saved before anything was derived from it.
         written.files.push("map.portolan");
         written.seconds.insert("write", start.elapsed().as_secs_f64());
         let start = Instant::now();
@@ -64,17 +61,7 @@ impl Artefacts<'_> {
             written.files.push("preview.png");
         }
         written.seconds.insert("preview", start.elapsed().as_secs_f64());
-        for stale in NAMES.iter().filter(|n| !written.files.contains(n) && **n != "summary.json") {
-            match std::fs::remove_file(folder.join(stale)) {
-                Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                    bail!(
-                        "{}: cannot remove what an earlier run left: {e}; remove it",
-                        folder.join(stale).display()
-                    )
-                }
-                _ => {}
-            }
-        }
+        remove_stale(folder, &written.files)?;
         Ok(written)
     }
 

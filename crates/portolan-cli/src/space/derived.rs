@@ -8,8 +8,10 @@ use portolan::field::{SparseEsdf, SparseEsdfSettings};
 use portolan::store::{Store, Tree};
 use portolan::surface::{Mesh, MeshSettings, marching_cubes};
 use portolan::sweep::WeightModel;
+use portolan_io::SpaceMapFile;
 
-use super::{Settings, SpaceMaps};
+use super::Settings;
+use crate::arguments::shown_bytes;
 use crate::mapping::MapKind;
 
 /// Octree, mesh and distance field, as far as they are wanted and there is something to derive them from.
@@ -19,27 +21,44 @@ pub(crate) struct Derived {
     pub(crate) mesh: Option<Mesh>,
     pub(crate) esdf: Option<SparseEsdf<3>>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
+    /// What was not made, and why.
+    pub(crate) notes: Vec<String>,
 }
 
 impl Derived {
-    pub(crate) fn of(maps: &SpaceMaps, settings: &Settings) -> Self {
+    /// `memory`: what maps and fields may take together (bytes).
+    pub(crate) fn of(file: &SpaceMapFile, settings: &Settings, memory: usize) -> Self {
         let mut derived = Self::default();
-        if let Some(map) = &maps.occupancy {
+        if let Some(map) = &file.occupancy {
             let start = Instant::now();
-            derived.tree = Tree::from_bricks(map.store());
+            derived.tree = Tree::from_bricks(&map.store);
+            if derived.tree.is_none() {
+                derived.notes.push("the octree was not made: the map spans more than 2^28 cells".to_owned());
+            }
             derived.seconds.insert("octree", start.elapsed().as_secs_f64());
         }
-        let Some(tsdf) = &maps.tsdf else { return derived };
+        let Some(tsdf) = &file.tsdf else { return derived };
         if settings.wants(MapKind::Mesh) {
             let start = Instant::now();
-            derived.mesh =
-                Some(marching_cubes(tsdf.store(), tsdf.colors(), &mesh_settings(settings.weights)));
+            let colors = file.colors.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
+            derived.mesh = Some(marching_cubes(&tsdf.store, colors, &mesh_settings(settings.weights)));
             derived.seconds.insert("mesh", start.elapsed().as_secs_f64());
         }
         if settings.wants(MapKind::Esdf) {
             let start = Instant::now();
+            let held =
+                tsdf.store.memory_bytes() + file.occupancy.as_ref().map_or(0, |o| o.store.memory_bytes());
+            // The field, and as much again while it is made.
+            let needed = 2 * tsdf.store.len() * 512 * size_of::<f32>();
+            if held.saturating_add(needed) > memory {
+                let needed = shown_bytes(needed as f64);
+                derived
+                    .notes
+                    .push(format!("the esdf was not made: it needs {needed} more than --memory leaves"));
+                return derived;
+            }
             let how = esdf_settings(settings.weights, settings.carve_weight, settings.max_distance);
-            derived.esdf = Some(SparseEsdf::of(tsdf.store(), &how));
+            derived.esdf = Some(SparseEsdf::of(&tsdf.store, &how));
             derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
         }
         derived

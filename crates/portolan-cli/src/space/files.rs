@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use portolan::field::{DenseEsdf, SparseEsdf};
-use portolan::geom::Aabb;
+use portolan::geom::{Aabb, Grid};
 use portolan::surface::Mesh;
 use portolan_io::{write_glb, write_obj, write_ply_mesh};
 
@@ -27,19 +27,20 @@ pub(crate) fn write_mesh(path: &Path, mesh: &Mesh) -> anyhow::Result<bool> {
 pub(crate) fn dense_esdf(esdf: &SparseEsdf<3>, bounds: Option<&Aabb<3>>) -> Result<DenseEsdf<3>, String> {
     let asked = bounds.map_or_else(|| esdf.grid(), |bounds| esdf.grid_within(bounds));
     let grid = asked.ok_or("nothing was observed there")?;
-    let most = LARGEST_DENSE / DENSE_CELL;
+    let most = (LARGEST_DENSE - 64) / DENSE_CELL;
     if grid.checked_len().is_none_or(|cells| cells > most) {
-        let fitting = esdf.grid_of_at_most(most).map(|g| shown_box(&g.aabb())).unwrap_or_default();
-        return Err(format!(
-            "{} cells are more than 256 MiB; --dense {fitting} would fit",
-            grid.shape.map(|n| n.to_string()).join(" x ")
-        ));
+        let fitting = esdf.grid_of_at_most(most).map(|g| format!("; --dense {} would fit", shown_box(&g)));
+        let shape = grid.shape.map(|n| n.to_string()).join(" x ");
+        return Err(format!("{shape} cells are more than 256 MiB{}", fitting.unwrap_or_default()));
     }
     Ok(esdf.dense(&grid))
 }
 
-/// A box as the command line takes it.
-fn shown_box(bounds: &Aabb<3>) -> String {
+/// A box of cells as the command line takes it: a quarter of a cell inside of it, so that rounding adds no cell.
+fn shown_box(grid: &Grid<3>) -> String {
+    let r = grid.lattice.resolution;
+    let digits = (2.0 - r.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let bounds = grid.aabb().grown(-0.25 * r);
     let numbers = bounds.min.iter().chain(&bounds.max);
-    numbers.map(|v| ((v * 1000.0).round() / 1000.0).to_string()).collect::<Vec<_>>().join(",")
+    numbers.map(|v| format!("{v:.digits$}")).collect::<Vec<_>>().join(",")
 }

@@ -5,6 +5,7 @@ use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
 use portolan::geom::Pose;
+use portolan::map::MapError;
 use portolan::scan::{BeamCounts, Frame, FrameFilter, ScanStats};
 use portolan_io::IoError;
 use portolan_io::space_log::SpaceLog;
@@ -26,13 +27,18 @@ pub(crate) struct Fusion {
     pub(crate) observations: BTreeMap<&'static str, u64>,
     /// Poses of the frames that were fused, in order.
     pub(crate) poses: Vec<Pose<3>>,
-    /// Frames that could not be read, and why the first could not.
-    pub(crate) unreadable: (u64, Option<IoError>),
+    /// Frames that could not be read or fused, and why the first could not.
+    pub(crate) unreadable: (u64, Option<String>),
     /// Why fusing ended early: the maps hold what was fused up to there.
     pub(crate) full: Option<String>,
 }
 
 impl Fusion {
+    fn leave_out(&mut self, why: String) {
+        self.unreadable.0 += 1;
+        self.unreadable.1.get_or_insert(why);
+    }
+
     /// A map has taken a frame since `start`.
     pub(super) fn add(&mut self, map: &'static str, start: Instant, stats: &ScanStats) {
         *self.seconds.entry(map).or_default() += start.elapsed().as_secs_f64();
@@ -94,15 +100,13 @@ fn fuse_all(
                     }
                     report.stats += stats;
                 }
-                Err(error) => {
-                    report.full = Some(error.to_string());
+                Err(full @ MapError::Full(_)) => {
+                    report.full = Some(full.to_string());
                     return;
                 }
+                Err(error) => report.leave_out(format!("{}: scan {i}: {error}", log.path().display())),
             },
-            Err(error) => {
-                report.unreadable.0 += 1;
-                report.unreadable.1.get_or_insert(error);
-            }
+            Err(error) => report.leave_out(error.to_string()),
         }
         progress.add(1);
         progress.holding(maps.total());

@@ -17,6 +17,6 @@ pub(crate) use extent::brick_extent;
 pub(crate) use files::{dense_esdf, write_mesh};
 pub(crate) use fuse::{Fusion, fuse};
 pub(crate) use maps::SpaceMaps;
-pub(crate) use memory::peak_memory;
+pub(crate) use memory::{available_memory, peak_memory};
 pub(crate) use settings::{Settings, sweep_of};
 pub(crate) use words::{Summary, report};

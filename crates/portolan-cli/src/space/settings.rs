@@ -1,6 +1,5 @@
 //! What the maps of a run in space are made with.
 
-use anyhow::bail;
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Lattice};
 use portolan::map::{OccupancySweep, PointSweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
@@ -12,6 +11,7 @@ use serde_json::{Map, Value, json};
 use super::SpaceMaps;
 use crate::json::object;
 use crate::mapping::{MapKind, map_word};
+use crate::saved::check_agree;
 
 /// Rays are followed so far (cells): beyond a million cells a range is no measurement.
 const FARTHEST_CELLS: f64 = (1u32 << 20) as f64;
@@ -122,17 +122,7 @@ impl Settings {
             "self_filter",
             "hold_out",
         ];
-        for key in SHAPING {
-            let (new, old) = (&ours[key], theirs.get(key).unwrap_or(&Value::Null));
-            if new != old {
-                bail!(
-                    "{name}: {key} is {old} in the map and {new} in this call; leave --{} out to go on with the map's, \
-                     or write to another folder",
-                    key.replace('_', "-")
-                );
-            }
-        }
-        Ok(())
+        check_agree(&ours, theirs, &SHAPING, name)
     }
 }
 

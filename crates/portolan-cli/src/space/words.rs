@@ -182,6 +182,8 @@ fn log_warnings(stats: &SpaceLogStats) -> Vec<String> {
             warnings.push(format!("{n} {what}"));
         }
     };
+    say(stats.missing_files, "files of scans that the log names are not there");
+    say(stats.poses_without_scan, "poses belong to no scan");
     say(stats.scans_without_pose, "scans have no pose and were left out");
     say(stats.unmatched_times, "scans have no pose near in time and were left out");
     say(stats.scans_without_color, "scans have no colour picture");

@@ -16,6 +16,7 @@ use super::{Args, prediction_text};
 use crate::error::bad_call;
 use crate::log::{self, Selection};
 use crate::progress::Progress;
+use crate::saved::Saved;
 use crate::space::mesh_settings;
 
 /// Rays are followed no further (metres), unless the map was made with less.
@@ -108,7 +109,7 @@ fn predict(args: &Args, file: &SpaceMapFile, tsdf: &TsdfBricks, path: &Path) -> 
     let filter = FrameFilter {
         min_range: args.limits.min_range.or(number("min_range")).unwrap_or(0.0),
         max_range: args.limits.max_range.or(number("max_range")).unwrap_or(f64::INFINITY),
-        body: Vec::new(),
+        body: Saved(Some(&file.header.settings)).bodies()?,
     };
     let selection = Selection {
         every: args.every.or(file.header.every),
@@ -134,18 +135,24 @@ fn predict(args: &Args, file: &SpaceMapFile, tsdf: &TsdfBricks, path: &Path) -> 
     };
     let rays = RayCaster::new(&tsdf.store, settings);
     let mut predictions = RangePredictions::default();
-    let mut unreadable = 0u64;
+    let (mut unreadable, mut first) = (0u64, None);
     let progress = Progress::new(indices.len(), "predicting", args.output);
     for &i in &indices {
         match log.frame(i) {
             Ok(frame) => predictions.add(&rays, log.pose(i), &filter.apply(frame).0, args.rays),
-            Err(_) => unreadable += 1,
+            Err(error) => {
+                unreadable += 1;
+                first.get_or_insert(error);
+            }
         }
         progress.add(1);
     }
     drop(progress);
     let noise = RangeNoise::of_cells(resolution, settings.max_range);
     let (rays, predicted) = (predictions.rays() as f64, predictions.pairs.len() as f64);
+    if let (true, Some(error)) = (unreadable == indices.len() as u64, &first) {
+        bail!("{error}");
+    }
     let Some(score) = predictions.score(resolution, &noise) else {
         bail!(
             "{}: none of {rays} rays of {} scans could be predicted; is this the log of that map?",
@@ -157,7 +164,7 @@ fn predict(args: &Args, file: &SpaceMapFile, tsdf: &TsdfBricks, path: &Path) -> 
     Ok(json!({
         "log": path.display().to_string(),
         "scans": indices.len() as u64 - unreadable,
-        "unreadable": unreadable,
+        "unreadable": { "scans": unreadable, "first": first.map(|e| e.to_string()) },
         "held_out": fresh,
         "beams": predictions.rays(),
         "predicted": predictions.pairs.len(),

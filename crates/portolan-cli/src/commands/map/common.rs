@@ -4,13 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, anyhow};
-use clap::ValueEnum;
-use portolan::scan::Body;
-use serde_json::{Map, Value};
-
-use crate::arguments::body;
-use crate::mapping::MapKind;
+use anyhow::Context;
 
 /// Seconds per stage.
 pub(super) struct Watch {
@@ -49,40 +43,6 @@ pub(super) fn start_threads(threads: Option<u16>) -> anyhow::Result<usize> {
     Ok(threads)
 }
 
-/// Settings of a saved map.
-pub(super) struct Saved<'a>(pub(super) Option<&'a Map<String, Value>>);
-
-impl Saved<'_> {
-    pub(super) fn number(&self, key: &str) -> Option<f64> {
-        self.0?.get(key)?.as_f64()
-    }
-
-    pub(super) fn word(&self, key: &str) -> Option<&str> {
-        self.0?.get(key)?.as_str()
-    }
-
-    pub(super) fn maps(&self) -> Option<Vec<MapKind>> {
-        let words = self.0?.get("maps")?.as_array()?;
-        words.iter().map(|word| MapKind::from_str(word.as_str()?, false).ok()).collect()
-    }
-
-    /// The parts of the sensor's frame that a saved map left out.
-    pub(super) fn bodies(&self) -> anyhow::Result<Vec<Body>> {
-        let Some(list) = self.0.and_then(|s| s.get("self_filter")).and_then(Value::as_array) else {
-            return Ok(Vec::new());
-        };
-        let text = |numbers: &Value| {
-            let numbers = numbers.as_array().map(Vec::as_slice).unwrap_or_default();
-            numbers.iter().map(Value::to_string).collect::<Vec<_>>().join(",")
-        };
-        list.iter().map(|b| body(&text(b)).map_err(|e| anyhow!("the map's self_filter: {e}"))).collect()
-    }
-
-    pub(super) fn flag(&self, key: &str) -> Option<bool> {
-        self.0?.get(key)?.as_bool()
-    }
-}
-
 /// Free space weighs less than a surface: on real logs, full of table legs, surfaces that weigh as much as the beams
 /// that pass beside them are carved away (Intel at 5 cm: 85.0 % of held-out ranges within two cells, 82.1 with 1).
 pub(super) const CARVE_WEIGHT: f32 = 0.3;
@@ -106,10 +66,8 @@ fn stem(path: &Path) -> String {
 /// What a picture of a map is called: its logs, its cells, its scans.
 pub(super) fn title(logs: &[String], resolution: f64, scans: u64) -> String {
     let names: Vec<_> = logs.iter().map(|n| stem(Path::new(n))).collect();
-    let cells = if resolution < 1.0 {
-        format!("{} cm", (resolution * 1000.0).round() / 10.0)
-    } else {
-        format!("{resolution} m")
-    };
+    // Without the rounding error of the product: 0.07 m are 7 cm.
+    let in_cm = (resolution * 1e8).round() / 1e6;
+    let cells = if resolution < 1.0 { format!("{in_cm} cm") } else { format!("{resolution} m") };
     format!("{} · cells of {cells} · {scans} scans", names.join(" + "))
 }

@@ -8,7 +8,7 @@ use portolan::map::SweepKind;
 use portolan::scan::RangeLimits;
 use portolan_io::{CarmenLog, MapFile, sweep_of, weights_of, write_atomic};
 
-use super::common::{CARVE_WEIGHT, Saved, Watch, start_threads, three_cells, title};
+use super::common::{CARVE_WEIGHT, Watch, start_threads, three_cells, title};
 use super::{Args, SweepArg};
 use crate::arguments::Bounds;
 use crate::error::bad_call;
@@ -19,6 +19,7 @@ use crate::mapping::{
     seen_by_tree, with_outlier,
 };
 use crate::progress::Progress;
+use crate::saved::Saved;
 
 /// The maps that a planar log can make; all of them where the call names none.
 const PLANE: [MapKind; 5] = [MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour];
@@ -98,6 +99,11 @@ impl Args {
             Some(SweepArg::Auto | SweepArg::Exact | SweepArg::Projective) => {
                 return refused("this --sweep");
             }
+            _ if self.no_color => return refused("--no-color"),
+            _ if self.max_distance.is_some() => return refused("--max-distance"),
+            _ if self.source.is_about_space() => {
+                return refused("--pose-convention, --intrinsics or another option");
+            }
             _ if !self.self_filter.is_empty() => return refused("--self-filter"),
             _ if self.dense.is_some() => return refused("--dense"),
             _ if self.maps.iter().flatten().any(|m| *m == MapKind::Mesh) => return refused("--maps mesh"),
@@ -157,7 +163,7 @@ impl Args {
             limits,
             every: self.every.or(saved.number("every").map(|n| n as u64)),
             hold_out: self.hold_out.or(saved.number("hold_out").map(|n| n as u64)),
-            bounds,
+            bounds: bounds.or(saved.bounds()),
             maps,
         }
     }

@@ -9,7 +9,7 @@ use portolan::scan::{FrameFilter, ScanStats};
 use portolan_io::space_log::SpaceLog;
 use portolan_io::{SpaceMapFile, weights_of, write_atomic};
 
-use super::common::{CARVE_WEIGHT, Saved, Watch, start_threads, three_cells, title};
+use super::common::{CARVE_WEIGHT, Watch, start_threads, three_cells, title};
 use super::{Args, SweepArg};
 use crate::arguments::Bounds;
 use crate::error::bad_call;
@@ -17,6 +17,7 @@ use crate::json;
 use crate::log::{self, Selection};
 use crate::mapping::MapKind;
 use crate::progress::Progress;
+use crate::saved::Saved;
 use crate::space::{Artefacts, Derived, Settings, SpaceMaps, Summary, fuse, report, sweep_of};
 
 /// The maps that a log of space can make; all of them where the call names none.
@@ -32,6 +33,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     watch.stage("read");
 
     let settings = args.space_settings(before.as_ref(), bounds)?;
+    args.check_fits(&log, &settings)?;
     if let Some(before) = &before {
         settings.check_agree(&before.header.settings, &args.map_path().display().to_string())?;
     }
@@ -49,21 +51,24 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     if fusion.stats.scans == 0
         && let Some(error) = fusion.unreadable.1.take()
     {
-        // Not one frame could be used: the reader's own error tells more than an empty map.
-        return Err(error.into());
+        // Not one frame could be used: what was wrong with the first tells more than an empty map.
+        bail!(error);
     }
     let mut bytes = maps.bytes();
     file.poses.extend(&fusion.poses);
     describe(&mut file, &settings, &log, &fusion.stats);
-
-    let derived = Derived::of(&maps, &settings);
-    bytes.extend(derived.bytes());
-    let mut seconds = watch.total();
+    maps.store_into(&mut file);
     std::fs::create_dir_all(&args.out).with_context(|| {
         format!("{}: cannot make the folder; name one that can be written to", args.out.display())
     })?;
+    // Before anything is derived from it: whatever happens then, what was fused is saved.
+    file.write(args.map_path())?;
+    watch.stage("save");
+
+    let derived = Derived::of(&file, &settings, memory);
+    bytes.extend(derived.bytes());
+    let mut seconds = watch.total();
     let title = title(&file.header.logs, settings.resolution, file.header.scans);
-    maps.store_into(&mut file);
     let written = Artefacts {
         file: &file,
         derived: &derived,
@@ -93,7 +98,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     args.output.print(&document, report(&summary, &args.out.display().to_string()))?;
     if let Some(full) = &fusion.full {
         bail!(
-            "{}: {full}; {} of {} scans were fused and saved; give more --memory, a coarser --resolution or --bounds",
+            "{}: {full}; {} of {} scans were fused and saved; start again with more --memory, a coarser --resolution or --bounds",
             args.log.display(),
             fusion.stats.scans,
             fused.len()
@@ -131,6 +136,27 @@ impl Args {
             Some(Bounds::Space(bounds)) => Ok(Some(bounds)),
             None => Ok(None),
         }
+    }
+
+    /// Refuses options that this log or these maps have no use for.
+    fn check_fits(&self, log: &SpaceLog, settings: &Settings) -> anyhow::Result<()> {
+        let kind = log.kind().word();
+        let (camera, source) = (log.camera().is_some(), &self.source);
+        if !camera && (source.intrinsics.is_some() || source.depth_scale.is_some()) {
+            return Err(bad_call(format!(
+                "--intrinsics and --depth-scale are for depth images; the log is {kind}"
+            )));
+        }
+        if camera && source.origin.is_some() {
+            return Err(bad_call(format!("--origin is for clouds; the log is {kind}")));
+        }
+        if self.dense.is_some() && !settings.wants(MapKind::Esdf) {
+            return Err(bad_call("--dense writes the esdf, which --maps leaves out"));
+        }
+        if settings.filter.min_range >= settings.filter.max_range {
+            return Err(bad_call("--min-range must be smaller than --max-range"));
+        }
+        Ok(())
     }
 
     /// The map to go on with.
@@ -186,8 +212,8 @@ impl Args {
             },
             every: self.every.or(saved.number("every").map(|n| n as u64)),
             hold_out: self.hold_out.or(saved.number("hold_out").map(|n| n as u64)),
-            bounds,
-            max_distance: self.max_distance,
+            bounds: bounds.or(saved.bounds()),
+            max_distance: self.max_distance.or(saved.number("max_distance")).unwrap_or(1.0),
             maps,
         })
     }

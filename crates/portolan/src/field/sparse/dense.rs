@@ -22,7 +22,8 @@ impl<const D: usize> SparseEsdf<D> {
         Some(self.grid_of(first, end))
     }
 
-    /// The part of [`SparseEsdf::grid`] inside a box (world): the cells that it touches. `None` where there is none.
+    /// The part of [`SparseEsdf::grid`] inside a box (world): the cells that it touches, not those that only begin where it
+    /// ends. `None` where there is none.
     pub fn grid_within(&self, bounds: &Aabb<D>) -> Option<Grid<D>> {
         let (first, end) = self.extent()?;
         // Clamped before they become indices: a box may be as large as it likes.
@@ -35,7 +36,10 @@ impl<const D: usize> SparseEsdf<D> {
         let low = self.lattice.cell_of(inside(bounds.min))?;
         let high = self.lattice.cell_of(inside(bounds.max))?;
         let first: [i32; D] = std::array::from_fn(|k| low[k].max(first[k]));
-        let end: [i32; D] = std::array::from_fn(|k| (high[k] + 1).min(end[k]));
+        let end: [i32; D] = std::array::from_fn(|k| {
+            let begins_at_the_end = self.lattice.corner(high)[k] >= bounds.max[k] && high[k] > low[k];
+            (high[k] + i32::from(!begins_at_the_end)).min(end[k])
+        });
         (0..D).all(|k| first[k] < end[k]).then(|| self.grid_of(first, end))
     }
 
