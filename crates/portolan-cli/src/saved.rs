@@ -2,7 +2,6 @@
 
 use anyhow::{anyhow, bail};
 use clap::ValueEnum;
-use portolan::geom::Aabb;
 use portolan::scan::Body;
 use serde_json::{Map, Value};
 
@@ -40,13 +39,6 @@ impl Saved<'_> {
 
     pub(crate) fn flag(&self, key: &str) -> Option<bool> {
         self.0?.get(key)?.as_bool()
-    }
-
-    /// The box that a saved map was kept to.
-    pub(crate) fn bounds<const D: usize>(&self) -> Option<Aabb<D>> {
-        let numbers: Vec<f64> = self.0?.get("bounds")?.as_array()?.iter().filter_map(Value::as_f64).collect();
-        let corner = |at: usize| numbers.get(at..at + D)?.try_into().ok();
-        Some(Aabb::new(corner(0)?, corner(D)?))
     }
 }
 

@@ -221,14 +221,14 @@ fn a_folder_keeps_what_is_not_of_an_earlier_run() {
 }
 
 #[test]
-fn appending_keeps_bounds_and_distances_and_names_what_differs() {
+fn appending_keeps_settings_and_names_what_differs() {
     let (folder, log) = lidar_log();
     let out = folder.path().join("out");
-    map(&log, &out, &["--bounds", "-2,-2,0,4,4,2", "--max-distance", "0.5", "--hold-out", "3"]);
+    map(&log, &out, &["--max-distance", "0.5", "--hold-out", "3"]);
     let before = summary(&out);
     succeed(["map", arg(&log), "--out", arg(&out), "--append"]);
     let after = summary(&out);
-    for key in ["bounds", "max_distance", "hold_out"] {
+    for key in ["max_distance", "hold_out", "carve_weight"] {
         assert_eq!(before["settings"][key], after["settings"][key], "{key}");
     }
     for (option, value, word) in [
@@ -282,11 +282,11 @@ fn the_box_that_would_fit_fits() {
     bytes.extend(far);
     std::fs::write(&scan, bytes).unwrap();
     let out = folder.path().join("out");
-    let text = map(&log, &out, &["--maps", "esdf"]);
+    let text = map(&log, &out, &["--maps", "esdf", "--sweep", "exact"]);
     assert!(!out.join("esdf.bin").exists(), "{text}");
     let start = text.find("--dense ").unwrap() + "--dense ".len();
     let fitting = text[start..].split(' ').next().unwrap();
-    map(&log, &out, &["--maps", "esdf", "--dense", fitting]);
+    map(&log, &out, &["--maps", "esdf", "--sweep", "exact", "--dense", fitting]);
     let size = out.join("esdf.bin").metadata().unwrap().len();
     assert!(size <= 256 << 20 && size > 200 << 20, "{size}");
 }

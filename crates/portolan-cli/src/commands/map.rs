@@ -116,7 +116,7 @@ pub(crate) struct Args {
     /// Leave every N-th scan out of fusion, for `eval --scans`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..), allow_negative_numbers = true)]
     hold_out: Option<u64>,
-    /// Go on with the map in DIR; settings not given are the map's
+    /// Go on with the map in DIR; settings not given are the map's, but for --bounds, which are those of this run
     #[arg(long)]
     append: bool,
     /// Threads; default: one per core. The result does not depend on it

@@ -25,6 +25,8 @@ pub(crate) struct Fusion {
     pub(crate) seconds: BTreeMap<&'static str, f64>,
     /// Cell observations per map.
     pub(crate) observations: BTreeMap<&'static str, u64>,
+    /// Points that the last map could not use, since no row and column of their scan was theirs.
+    pub(crate) without_pixel: u64,
     /// Poses of the frames that were fused, in order.
     pub(crate) poses: Vec<Pose<3>>,
     /// Frames that could not be read or fused, and why the first could not.
@@ -93,6 +95,8 @@ fn fuse_all(
         match read {
             Ok((frame, counts)) => match maps.integrate(log.pose(i), &frame, memory, report) {
                 Ok(mut stats) => {
+                    // Points that fell beside the rows and columns found for their scan.
+                    report.without_pixel += stats.beams.dropped.saturating_sub(counts.dropped);
                     // Nothing but the filter knows what it left out.
                     stats.beams = counts;
                     if stats.scans > 0 {

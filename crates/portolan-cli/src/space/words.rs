@@ -51,6 +51,13 @@ impl Summary<'_> {
                 r.too_near
             ));
         }
+        let lost = self.fusion.without_pixel;
+        if 100 * lost > stats.beams.hit {
+            warnings.push(format!(
+                "{lost} points fell beside the rows and columns found in the scans and are not in the distances; \
+                 --sweep exact uses all"
+            ));
+        }
         if stats.hits_outside > 0 {
             warnings.push(format!("{} hits lie outside of --bounds", stats.hits_outside));
         }
@@ -110,6 +117,7 @@ impl Summary<'_> {
             },
             "beams": stats["beams"],
             "refused_beams": stats["refused_beams"],
+            "points_without_pixel": self.fusion.without_pixel,
             "observations": self.fusion.observations,
             "extent": json::aabb(&self.extent()),
             "mesh": mesh,

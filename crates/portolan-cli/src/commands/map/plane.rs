@@ -163,7 +163,7 @@ impl Args {
             limits,
             every: self.every.or(saved.number("every").map(|n| n as u64)),
             hold_out: self.hold_out.or(saved.number("hold_out").map(|n| n as u64)),
-            bounds: bounds.or(saved.bounds()),
+            bounds,
             maps,
         }
     }

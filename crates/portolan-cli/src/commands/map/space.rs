@@ -212,7 +212,7 @@ impl Args {
             },
             every: self.every.or(saved.number("every").map(|n| n as u64)),
             hold_out: self.hold_out.or(saved.number("hold_out").map(|n| n as u64)),
-            bounds: bounds.or(saved.bounds()),
+            bounds,
             max_distance: self.max_distance.or(saved.number("max_distance")).unwrap_or(1.0),
             maps,
         })
