@@ -49,7 +49,40 @@ impl LogWriter {
         })?;
         let pose = matrix_rows(world_from_camera).map(|r| r.join(" ")).join(" ");
         self.text("poses.txt").push_str(&(pose + "\n"));
-        self.text("times.txt").push_str(&format!("{seconds:.6e}\n"));
+        // As many digits as tell it apart: of an epoch stamp the seven of KITTI's own files leave minutes.
+        self.text("times.txt").push_str(&format!("{seconds:e}\n"));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{LogLayout, LogWriter};
+    use super::*;
+    use crate::space_log::{SpaceLog, SpaceLogKind, SpaceLogOptions};
+    use portolan::scan::{PointScan, RefusedBeams};
+
+    #[test]
+    fn stamps_since_the_epoch_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let camera_from_lidar = Pose::from_quaternion([0.1, -0.2, 0.3], [0.5, -0.5, 0.5, 0.5]).unwrap();
+        let mut writer = LogWriter::create(folder.path(), LogLayout::Kitti { camera_from_lidar }).unwrap();
+        let scan = PointScan {
+            origin: Origin::Common([0.0; 3]),
+            points: vec![[1.0, 2.0, 3.0]],
+            free_ends: vec![],
+            times: vec![],
+            colors: vec![],
+            image: None,
+            refused: RefusedBeams::default(),
+        };
+        let frame = Frame::Points(scan);
+        let times = [0.0, 0.1037875, 1_630_577_758.569_49, 1_630_577_758.669_501];
+        let pose = Pose::from_quaternion([1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8]).unwrap();
+        times.iter().for_each(|t| writer.push(&pose, *t, &frame).unwrap());
+        assert_eq!(writer.finish().unwrap(), 4);
+        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        assert_eq!(log.kind(), SpaceLogKind::Kitti);
+        assert_eq!([0, 1, 2, 3].map(|i| log.time(i).unwrap()), times);
     }
 }

@@ -28,7 +28,8 @@ pub enum LogLayout {
         /// The identity, if there is no camera.
         camera_from_lidar: Pose<3>,
     },
-    /// TUM RGB-D. The layout has no place for the numbers of the camera; they are put beside it, `fx fy cx cy`.
+    /// TUM RGB-D. TUM's own logs have no place for the numbers of the camera; they are written as `calibration.txt`
+    /// (`fx fy cx cy`), as ETH3D does it, where [`SpaceLog`](crate::space_log::SpaceLog) finds them.
     TumRgbd,
     /// 7-Scenes, with the numbers of the camera beside the frames.
     SevenScenes,

@@ -25,12 +25,14 @@ const ELEMENTS: u32 = 34963;
 /// exact origin stands in the node's `extras.origin`. glTF has y up: the node's rotation, -90 degrees about x, turns
 /// the map's z up.
 ///
+/// A mesh without triangles is a scene of nothing; its vertices, which no viewer would show, are not written.
+///
 /// # Errors
 /// As [`write_ply_mesh`](super::write_ply_mesh), and where the file would be longer than the 4 GiB that the format holds.
 pub fn write_glb(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
     let path = path.as_ref();
     check(path, mesh)?;
-    let layout = Layout::of(mesh);
+    let layout = if mesh.triangles.is_empty() { Layout::EMPTY } else { Layout::of(mesh) };
     let mut text = document(mesh, &layout).to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     let total = 12 + 8 + text.len() as u64 + if layout.end > 0 { 8 + layout.end } else { 0 };
@@ -50,6 +52,9 @@ struct Layout {
 }
 
 impl Layout {
+    /// Without binary chunk.
+    const EMPTY: Self = Self { normals: 0, colors: 0, indices: 0, end: 0 };
+
     fn of(mesh: &Mesh) -> Self {
         let normals = 12 * mesh.vertices.len() as u64;
         let colors = normals + 12 * mesh.normals.len() as u64;
@@ -62,8 +67,8 @@ impl Layout {
 fn document(mesh: &Mesh, layout: &Layout) -> Value {
     let asset = json!({ "version": "2.0", "generator": "portolan" });
     if mesh.triangles.is_empty() {
-        // An accessor of no elements is not allowed.
-        return json!({ "asset": asset, "scene": 0, "scenes": [{ "nodes": [] }] });
+        // Accessors of no elements are not allowed, nor are lists of no nodes or meshes.
+        return json!({ "asset": asset, "scene": 0, "scenes": [{}] });
     }
     let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for v in &mesh.vertices {
@@ -127,6 +132,7 @@ fn write_to(w: &mut impl Write, mesh: &Mesh, layout: &Layout, text: &[u8], total
     w.write_all(&(text.len() as u32).to_le_bytes())?;
     w.write_all(b"JSON")?;
     w.write_all(text)?;
+    // A chunk that no buffer names is not allowed.
     if layout.end == 0 {
         return Ok(());
     }
@@ -206,7 +212,19 @@ mod tests {
         let primitive = &document["meshes"][0]["primitives"][0];
         assert_eq!((&primitive["attributes"], &primitive["indices"]), (&json!({ "POSITION": 0 }), &json!(1)));
         assert_eq!(binary.len(), 4 * 12 + 4 * 12);
-        let (document, binary) = written(&Mesh::default());
-        assert!(document["meshes"].is_null() && binary.is_empty());
+    }
+
+    /// By the schema of glTF 2.0: arrays have one element at least, `scene` is an index of `scenes`, a chunk needs a buffer.
+    #[test]
+    fn a_mesh_of_nothing_is_a_valid_scene() {
+        let loose = Mesh { triangles: vec![], ..tetrahedron([500_000.0, 4_000_000.0, 7.0]) };
+        for mesh in [Mesh::default(), loose] {
+            let (document, binary) = written(&mesh);
+            assert!(binary.is_empty());
+            assert_eq!(
+                document,
+                json!({ "asset": { "version": "2.0", "generator": "portolan" }, "scene": 0, "scenes": [{}] })
+            );
+        }
     }
 }

@@ -61,7 +61,7 @@ impl PoseConvention {
             return Err(PoseFault::NotFinite);
         }
         let m = if self == Self::ColumnMajor { transposed(m) } else { *m };
-        if (0..3).any(|k| m[3][k].abs() > 1e-4) || (m[3][3] - 1.0).abs() > 1e-4 {
+        if (0..3).any(|k| m[3][k].abs() > 1e-4) || (m[3][3] - 1.0).abs() > CORNER_OFF {
             return Err(PoseFault::LastRow(m[3]));
         }
         let translation: [f64; 3] = std::array::from_fn(|k| m[k][3]);
@@ -83,6 +83,9 @@ impl PoseConvention {
 
 /// A translation beyond this is no place on Earth (metres).
 const FARTHEST: f64 = 1e9;
+
+/// How far the last element may be from 1: it was written with few digits.
+pub(super) const CORNER_OFF: f64 = 1e-4;
 
 fn transposed(m: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
     std::array::from_fn(|i| std::array::from_fn(|k| m[k][i]))

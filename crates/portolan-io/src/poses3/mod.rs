@@ -13,8 +13,8 @@
 //! empty lines are skipped.
 //!
 //! Traps, each of which was met in a published data set:
-//! - Element `[3][3]` holds a time stamp instead of 1. Where it differs from 1 in any matrix of a file, it is taken as the
-//!   stamp of all of them.
+//! - Element `[3][3]` holds a time stamp instead of 1. It is taken for one only where it differs between the matrices of a
+//!   file (at least two) and never descends from one to the next; any other value than 1 is a [`PoseFault::LastRow`].
 //! - Rotations are orthonormal only to the digits of the text, or to what a tracker let slip: see [`RawPose::resolve`].
 //! - A matrix of NaN or infinity stands for "tracking was lost": that pose is refused, not the file.
 //! - The same twelve numbers mean different poses: see [`PoseConvention`].

@@ -59,7 +59,7 @@ pub enum PoseFault {
     NotFinite,
     /// The rotation is off by so much, more than 1e-2; 2 for a mirror.
     NotRigid(f64),
-    /// The last row is not `0 0 0 1`.
+    /// The last row is not `0 0 0 1`, and the last element no time stamp (see [`crate::poses3`]).
     LastRow([f64; 4]),
     /// The translation has an entry of so many metres.
     TooFar(f64),
@@ -81,6 +81,10 @@ impl fmt::Display for PoseFault {
             Self::NotRigid(off) => {
                 write!(f, "the pose is not rigid: its rotation is off by {off:.2e} (1e-2 is tolerated)")
             }
+            Self::LastRow([0.0, 0.0, 0.0, d]) => write!(
+                f,
+                "the last row of the pose is 0 0 0 {d}, not 0 0 0 1 (time stamps there ascend from pose to pose)"
+            ),
             Self::LastRow([a, b, c, d]) => write!(
                 f,
                 "the last row of the pose is {a} {b} {c} {d}, not 0 0 0 1 (a matrix that is stored column by column needs \

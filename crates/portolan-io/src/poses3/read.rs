@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::RawPose;
+use super::convention::CORNER_OFF;
 use crate::IoError;
 use crate::bytes::{Input, Lines, open, parse_f64};
 use crate::error::shown;
@@ -236,9 +237,14 @@ impl Reading {
     }
 }
 
-/// Where `[3][3]` is not 1 throughout, it holds time stamps.
+/// Where `[3][3]` ascends from pose to pose, it holds time stamps. Anything else that is not 1 (another scale of the matrix,
+/// one number in all of them, noise) stays there, and such poses are refused when they are resolved.
 fn stamps_out_of_corners(poses: &mut [RawPose]) {
-    if poses.iter().any(|p| p.matrix[3][3].is_finite() && p.matrix[3][3] != 1.0) {
+    let corners: Vec<f64> = poses.iter().map(|p| p.matrix[3][3]).filter(|v| v.is_finite()).collect();
+    let ascends = corners.windows(2).all(|w| w[0] <= w[1]) && corners.first() < corners.last();
+    // A 1 that was rounded.
+    let all_one = corners.iter().all(|v| (v - 1.0).abs() <= CORNER_OFF);
+    if ascends && !all_one {
         for pose in poses.iter_mut().filter(|p| p.matrix[3][3].is_finite()) {
             pose.time = Some(pose.matrix[3][3]);
             pose.matrix[3][3] = 1.0;
@@ -296,13 +302,35 @@ mod tests {
     #[test]
     fn corners_that_are_not_one_are_stamps() {
         let block = |stamp: &str| format!("1,0,0,1,\n0,1,0,2,\n0,0,1,3,\n0,0,0,{stamp},\n");
-        let file = parse(block("1630577758.569490") + &block("1") + &block("0.5")).unwrap();
+        let file = parse(block("0.5") + &block("1") + &block("1") + &block("1630577758.569490")).unwrap();
         let times: Vec<_> = file.poses.iter().map(|p| p.time.unwrap()).collect();
-        assert_eq!(times, [1_630_577_758.569_49, 1.0, 0.5]);
+        assert_eq!(times, [0.5, 1.0, 1.0, 1_630_577_758.569_49]);
         assert!(file.poses.iter().all(|p| p.resolve(PoseConvention::WorldFromSensor).is_ok()));
         assert_eq!(parse(block("1") + &block("1.000000")).unwrap().poses[1].time, None);
-        let lost = parse(block("5") + &block("nan")).unwrap();
+        let lost = parse(block("5") + &block("nan") + &block("6")).unwrap();
         assert_eq!(lost.poses[1].resolve(PoseConvention::default()), Err(PoseFault::NotFinite));
+        assert_eq!((lost.poses[0].time, lost.poses[2].time), (Some(5.0), Some(6.0)));
+    }
+
+    #[test]
+    fn corners_that_are_no_times_are_faults() {
+        let block = |corner: &str| format!("1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 {corner}\n");
+        let faults = |corners: &[&str]| {
+            let file = parse(corners.iter().map(|c| block(c)).collect::<String>()).unwrap();
+            assert!(file.poses.iter().all(|p| p.time.is_none()), "{corners:?}");
+            let resolved = file.poses.iter().map(|p| p.resolve(PoseConvention::default()).err());
+            resolved.collect::<Vec<_>>()
+        };
+        let fault = |corner: f64| Some(PoseFault::LastRow([0.0, 0.0, 0.0, corner]));
+        // One number in all of them is a scale, not a time; one pose says nothing of time; times do not descend.
+        assert_eq!(faults(&["2", "2", "2"]), [fault(2.0); 3]);
+        assert_eq!(faults(&["1630577758.5"]), [fault(1_630_577_758.5)]);
+        assert_eq!(faults(&["5", "7", "6"]), [fault(5.0), fault(7.0), fault(6.0)]);
+        assert_eq!(faults(&["1", "0.5"]), [None, fault(0.5)]);
+        assert_eq!(faults(&["7", "nan"]), [fault(7.0), Some(PoseFault::NotFinite)]);
+        assert_eq!(faults(&["0.99999", "1.00001"]), [None; 2]);
+        let text = fault(2.0).unwrap().to_string();
+        assert!(text.contains("0 0 0 2, not 0 0 0 1 (time stamps there ascend"), "{text}");
     }
 
     #[test]

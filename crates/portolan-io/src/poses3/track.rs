@@ -3,9 +3,10 @@
 use portolan::geom::Pose;
 use portolan::geom::vector::{add, scale, unit};
 
-/// Between two poses that are further apart than this nothing is interpolated (seconds): a hand turns by tens of degrees
-/// meanwhile.
-const LONGEST_GAP: f64 = 0.1;
+/// Between two poses that are further apart than this nothing is interpolated (seconds). Trajectories of lidars come at 10 Hz,
+/// some at 5 Hz, with times that jitter, so that 0.1 s would refuse every other pair of them; across what is longer poses were
+/// lost, and a straight line says nothing of where a hand went in that time.
+const LONGEST_GAP: f64 = 0.25;
 
 /// A pose of a trajectory: refused ones keep their place.
 #[derive(Clone, Debug)]
@@ -40,7 +41,7 @@ impl TimedPoses {
     }
 
     /// The pose at a time; `None` where no pose lies within `tolerance` (seconds) of it. Between two poses that are at most
-    /// 0.1 s apart the position moves on the straight line and the rotation on the arc between them; elsewhere the nearest
+    /// 0.25 s apart the position moves on the straight line and the rotation on the arc between them; elsewhere the nearest
     /// pose is taken as it is.
     pub(crate) fn at(&self, time: f64, tolerance: f64) -> Option<Pose<3>> {
         let after = self.0.partition_point(|(t, _)| *t < time);
@@ -142,6 +143,23 @@ mod tests {
         near(9.02, 0.021, 5.0, -2.0);
         assert_eq!(poses.at(f64::NAN, 1.0), None);
         assert!(TimedPoses::new(&track(&[(0.0, Some(Pose::IDENTITY)); 3])).is_none(), "zero is no time");
+    }
+
+    #[test]
+    fn ten_and_five_poses_a_second_are_interpolated_and_lost_ones_are_not() {
+        for period in [0.1, 0.2] {
+            // Not all of these times are exactly a period apart.
+            let poses: Vec<_> = (0..50).map(|k| (period * f64::from(k), f64::from(k))).collect();
+            let poses: Vec<_> = poses.iter().map(|(t, x)| (*t, Some(about_z(*x, 0.0)))).collect();
+            let poses = TimedPoses::new(&track(&poses)).unwrap();
+            for k in 0..49 {
+                let found = poses.at(period * (f64::from(k) + 0.25), 0.06).unwrap();
+                assert!((found.translation[0] - f64::from(k) - 0.25).abs() < 1e-9, "{period} {k}");
+            }
+        }
+        let gap = track(&[(0.0, Some(about_z(0.0, 0.0))), (0.3, Some(about_z(3.0, 0.0)))]);
+        let nearest = TimedPoses::new(&gap).unwrap().at(0.05, 0.06).unwrap();
+        assert_eq!(nearest.translation[0], 0.0);
     }
 
     #[test]

@@ -5,7 +5,8 @@
 //! `calib.txt` leads from the lidar to the camera: `world_from_lidar = world_from_camera * Tr`. The benchmark keeps poses
 //! apart, as `poses/00.txt` beside `sequences/00`: they are looked for there too. Times are seconds since the first scan.
 //!
-//! A `--pose-convention` says that poses are the lidar's own: then `Tr` is not applied.
+//! Poses that the caller names (`--poses`) are the lidar's own, as those of SLAM and odometry are, and so are all poses
+//! where the caller says what they mean (`--pose-convention`): then `Tr` is not applied, whether `calib.txt` is there or not.
 
 use std::path::{Path, PathBuf};
 
@@ -80,15 +81,12 @@ fn pose_file(path: &Path) -> Option<PathBuf> {
 
 /// `Tr`; `None` where poses are the lidar's own.
 fn camera_from_lidar(path: &Path, options: &SpaceLogOptions) -> Result<Option<Pose<3>>, IoError> {
-    if options.pose_convention.is_some() {
+    if options.pose_convention.is_some() || options.poses.is_some() {
         return Ok(None);
     }
     let file = path.join("calib.txt");
     if !file.is_file() {
-        // Poses of the caller are taken as they are; KITTI's are a camera's, which does not look where the lidar does.
-        if options.poses.is_some() {
-            return Ok(None);
-        }
+        // A camera does not look where the lidar does.
         let advice = "put calib.txt (with a line Tr) there, or say --pose-convention world-from-sensor where poses are the lidar's own";
         return Err(IoError::layout(path, "calib.txt", "missing", advice));
     }

@@ -91,6 +91,13 @@ fn kitti_poses_are_the_cameras_and_lead_to_the_lidar() {
         SpaceLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
     let log = SpaceLog::open(&root, &own).unwrap();
     assert!(distance(world(&log, 2)[0], cameras[2].transform_point([1.0, 2.0, 3.0])) < 1e-9);
+    // So are poses that the caller names: `Tr` is there, and is not for them.
+    let named = folder.path().join("odometry.txt");
+    fs::write(&named, &rows).unwrap();
+    let named = SpaceLogOptions { poses: Some(named), ..Default::default() };
+    let log = SpaceLog::open(&root, &named).unwrap();
+    assert!(distance(log.pose(2).translation, cameras[2].translation) < 1e-9);
+    assert!(distance(world(&log, 2)[1], cameras[2].transform_point([4.0, -5.0, 0.5])) < 1e-9);
     // A missing scan in the middle keeps the others' poses.
     fs::remove_file(root.join("velodyne/000001.bin")).unwrap();
     let log = open(&root);

@@ -11,6 +11,9 @@
 //! | [`Redwood`](SpaceLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
 //! | [`BigBird`](SpaceLogKind::BigBird) | `masked_depth/frameF_camC.png` | `pose/poses.txt` |
 //!
+//! Poses that the caller names ([`SpaceLogOptions::poses`]) are those of the sensor itself: KITTI's `Tr` is not applied to
+//! them.
+//!
 //! [`SpaceLog::open`] finds the files, reads the poses and says in [`SpaceLogStats`] what does not fit together; the scans
 //! themselves are read when they are asked for, by index and from any thread.
 //!

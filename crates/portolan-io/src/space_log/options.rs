@@ -10,7 +10,9 @@ use crate::poses3::PoseConvention;
 pub struct SpaceLogOptions {
     /// The kind of log; default: recognised.
     pub format: Option<SpaceLogKind>,
-    /// A pose file instead of what the layout has; its layout is told by the number of columns.
+    /// A pose file instead of what the layout has; its layout is told by the number of columns. Its poses are those of the
+    /// sensor itself: where a layout poses another body (KITTI: a camera beside the lidar, with `Tr` between them), that is
+    /// not applied to them.
     pub poses: Option<PathBuf>,
     /// What the numbers of the poses mean; default: what the format says, and world from sensor for `poses`.
     pub pose_convention: Option<PoseConvention>,
