@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::bytes::open;
+use crate::mesh::{MeshFormat, mesh_format};
 use crate::space_log::SpaceLogKind;
 use crate::{IoError, container, esdf_bin};
 
@@ -35,6 +36,8 @@ pub enum FileKind {
     OctomapOt,
     /// Scans of space with poses: [`crate::space_log::SpaceLog`].
     SpaceLog(SpaceLogKind),
+    /// A mesh of triangles: [`crate::mesh_counts`], and [`crate::read_ply_mesh`] for PLY.
+    Mesh(MeshFormat),
     /// None of these; the text says what was seen and what would be known.
     Unknown(String),
 }
@@ -57,11 +60,11 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
     }
     let head = open(path)?.read_up_to(HEAD)?;
     let as_log = || SpaceLogKind::recognise(path).map(FileKind::SpaceLog);
-    let kind = by_content(&head).or_else(as_log).or_else(|| by_name(path, &head));
+    let kind = by_content(path, &head).or_else(as_log).or_else(|| by_name(path, &head));
     Ok(kind.unwrap_or_else(|| unknown(&head)))
 }
 
-fn by_content(head: &[u8]) -> Option<FileKind> {
+fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {
     if head.starts_with(container::MAGIC) {
         return Some(FileKind::Portolan);
     }
@@ -78,6 +81,9 @@ fn by_content(head: &[u8]) -> Option<FileKind> {
     }
     if head.starts_with(b"# Octomap OcTree file") {
         return Some(FileKind::OctomapOt);
+    }
+    if let Some(format) = mesh_format(path, head) {
+        return Some(FileKind::Mesh(format));
     }
     let text = String::from_utf8_lossy(head);
     let start = text.trim_start_matches('\u{feff}').trim_start();
@@ -135,6 +141,8 @@ fn by_name(path: &Path, head: &[u8]) -> Option<FileKind> {
         "portolan" => Some(FileKind::Portolan),
         "bt" => Some(FileKind::OctomapBt),
         "ot" => Some(FileKind::OctomapOt),
+        "glb" => Some(FileKind::Mesh(MeshFormat::Glb)),
+        "obj" if text => Some(FileKind::Mesh(MeshFormat::Obj)),
         _ => None,
     }
 }
@@ -145,7 +153,8 @@ fn unknown(head: &[u8]) -> FileKind {
         [0x89, b'P', b'N', b'G', ..] => "it is a PNG picture (convert it to PGM)".to_owned(),
         _ => format!("it starts with {}", crate::error::shown(&head[..head.len().min(16)])),
     };
-    let known = "known are CARMEN logs, map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON, OctoMap";
+    let known = "known are CARMEN logs, logs of space (depth images or lidar scans with poses), clouds (PCD, PLY, KITTI .bin, \
+                 xyz), map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON, OctoMap (.bt, .ot, .graph), meshes (PLY, GLB, OBJ)";
     FileKind::Unknown(format!("{seen}; {known}"))
 }
 
@@ -190,6 +199,45 @@ mod tests {
     }
 
     #[test]
+    fn meshes_are_told_from_clouds() {
+        use crate::{write_glb, write_obj, write_ply_cloud, write_ply_mesh};
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = portolan::surface::Mesh {
+            vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+            ..Default::default()
+        };
+        for mesh in [mesh, Default::default()] {
+            // Under names that say nothing, and under those of clouds.
+            for name in ["mesh", "mesh.xyz"] {
+                let path = folder.path().join(name);
+                write_ply_mesh(&path, &mesh).unwrap();
+                assert_eq!(detect(&path).unwrap(), FileKind::Mesh(MeshFormat::Ply));
+                write_glb(&path, &mesh).unwrap();
+                assert_eq!(detect(&path).unwrap(), FileKind::Mesh(MeshFormat::Glb));
+                write_obj(&path, &mesh).unwrap();
+                let empty = mesh.vertices.is_empty();
+                assert!(empty || detect(&path).unwrap() == FileKind::Mesh(MeshFormat::Obj));
+            }
+            let path = folder.path().join("mesh.obj");
+            write_obj(&path, &mesh).unwrap();
+            assert_eq!(detect(&path).unwrap(), FileKind::Mesh(MeshFormat::Obj));
+        }
+        let cloud = crate::PointCloudFile { points: vec![[1.0; 3]], ..Default::default() };
+        let path = folder.path().join("cloud.ply");
+        write_ply_cloud(&path, &cloud).unwrap();
+        assert_eq!(detect(&path).unwrap(), FileKind::SpaceLog(SpaceLogKind::Clouds));
+        // MeshLab's clouds have an element of no faces.
+        let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                    element face 0\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n";
+        assert_eq!(kind_of("a.ply", text.as_bytes()), FileKind::SpaceLog(SpaceLogKind::Clouds));
+        assert_eq!(kind_of("a.xyz", b"1 2 3\n4 5 6\n"), FileKind::SpaceLog(SpaceLogKind::Clouds));
+        assert!(
+            matches!(kind_of("a.txt", b"v for vendetta\n"), FileKind::Unknown(text) if text.contains("meshes (PLY"))
+        );
+    }
+
+    #[test]
     fn folders_are_maps_where_they_hold_one() {
         let folder = tempfile::tempdir().unwrap();
         assert!(matches!(detect(folder.path()).unwrap(), FileKind::Unknown(_)));
@@ -201,7 +249,7 @@ mod tests {
     #[test]
     fn no_bytes_make_it_panic() {
         for bytes in bad_bytes(b"P5 {\"type\":\"Feature\"} # Octomap\nFLASER", 21, 500) {
-            let _ = by_content(&bytes).unwrap_or_else(|| unknown(&bytes));
+            let _ = by_content(Path::new("a"), &bytes).unwrap_or_else(|| unknown(&bytes));
         }
     }
 
@@ -214,6 +262,7 @@ mod tests {
             ("maps_2d/depot.yaml", MapServerYaml),
             ("maps_2d/willow-full.pgm", Pgm),
             ("maps_octomap/geb079.bt", OctomapBt),
+            ("rangescan_stanford_bunny/reconstruction/bun_zipper.ply", Mesh(MeshFormat::Ply)),
             ("rgbd_redkitchen", SpaceLog(SpaceLogKind::SevenScenes)),
         ] {
             let Some(path) = real_data(name) else { continue };

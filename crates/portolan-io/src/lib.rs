@@ -5,22 +5,20 @@
 //! | CARMEN log (plain, gzip, bzip2) | [`CarmenLog`], [`detect_no_return`] | |
 //! | pose files (`x y theta`, `t x y theta`, TUM) | [`read_poses_2d`] | |
 //! | PCD (text, binary, packed) | [`read_pcd`] | [`write_pcd`] |
-//! | PLY (text, binary) | [`read_ply_cloud`], [`read_ply_mesh`] | [`write_ply_cloud`] |
+//! | PLY clouds (text, binary) | [`read_ply_cloud`] | [`write_ply_cloud`] |
 //! | KITTI velodyne `.bin` | [`read_kitti_bin`] | [`write_kitti_bin`] |
 //! | XYZ, CSV, PTS | [`read_xyz`] | |
 //! | OctoMap scan graph | [`read_scan_graph`] | |
 //! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
-//! | logs of scans of space with poses | [`space_log::SpaceLog`] | |
+//! | logs of scans of space with poses | [`space_log::SpaceLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
 //! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
-//! | the same as KITTI, TUM RGB-D, 7-Scenes | | [`LogWriter`] |
-//! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | OctoMap `.bt`, `.ot` | [`OctomapTree`] | [`write_octomap_bt`], [`write_octomap_ot`] |
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
 //! | SVG contours | | [`write_svg`] |
-//! | PLY meshes (binary) | | [`write_ply_mesh`] |
+//! | PLY meshes (written binary) | [`read_ply_mesh`], [`mesh_counts`] | [`write_ply_mesh`] |
 //! | GLB meshes (glTF 2.0) | | [`write_glb`] |
 //! | OBJ meshes | | [`write_obj`] |
 //! | query points, answers (CSV) | [`QueryPoints`] | [`write_answer`] |
@@ -76,7 +74,7 @@ pub use map_file::{
     sweep_word, weights_of, weights_word,
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
-pub use mesh::{write_glb, write_obj, write_ply_mesh};
+pub use mesh::{MeshCounts, MeshFormat, mesh_counts, write_glb, write_obj, write_ply_mesh};
 pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
 pub use pcd::{read_pcd, write_pcd};
 pub use pgm::Pgm;

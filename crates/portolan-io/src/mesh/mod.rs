@@ -1,9 +1,12 @@
-//! Triangle meshes, written.
+//! Triangle meshes, written, and told from other files.
 
+mod format;
 mod glb;
 mod obj;
 mod ply;
 
+pub(crate) use format::mesh_format;
+pub use format::{MeshCounts, MeshFormat, mesh_counts};
 pub use glb::write_glb;
 pub use obj::write_obj;
 pub use ply::write_ply_mesh;

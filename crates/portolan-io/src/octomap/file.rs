@@ -33,8 +33,8 @@ impl OctomapTree {
     /// stamps are not in the file) and `ColorOcTree` (whose colours are passed over) are read.
     ///
     /// # Errors
-    /// [`IoError`] where a field is wrong, a log odds is not finite, the nodes are not as many as the header says, or
-    /// bytes are missing or left over.
+    /// [`IoError`] where a field is wrong, a log odds is not finite, the nodes are not as many as the header says, they
+    /// would take more than 4 GiB (a file that is not packed: 16 GiB), or bytes are missing or left over.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let input = crate::open(&path)?;
         let packed = input.compression();

@@ -8,16 +8,26 @@ use portolan::store::{Slot, Tree, TreeRecords};
 
 use super::header::{Header, Kind};
 use super::stored::Stored;
-use super::{DEPTH, HALF, OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree};
+use super::{
+    DEPTH, HALF, MOST_MEMORY_PACKED, MOST_MEMORY_PLAIN, NODE_MEMORY, OCTOMAP_FREE, OCTOMAP_OCCUPIED,
+    OctomapTree, STORED_MEMORY,
+};
 use crate::bytes::read_failed;
 use crate::error::shown;
 use crate::{Compression, IoError};
 
 /// Reads a file of either kind.
-pub(super) fn read(
+pub(super) fn read(reader: impl BufRead, packed: Compression, path: &Path) -> Result<OctomapTree, IoError> {
+    let memory = if packed == Compression::Plain { MOST_MEMORY_PLAIN } else { MOST_MEMORY_PACKED };
+    read_within(reader, packed, path, memory)
+}
+
+/// [`read`] within so much memory (bytes).
+pub(super) fn read_within(
     mut reader: impl BufRead,
     packed: Compression,
     path: &Path,
+    memory: u64,
 ) -> Result<OctomapTree, IoError> {
     let header = Header::read(&mut reader, packed, path)?;
     let color = header.kind == Kind::Ot && header.class == "ColorOcTree";
@@ -35,6 +45,7 @@ pub(super) fn read(
         inner: 0,
         leaves: [0; 2],
         color,
+        memory,
         records: TreeRecords::new(),
         stored: Stored::default(),
     };
@@ -76,6 +87,8 @@ struct Nodes<'a, R> {
     /// Free and occupied leaves so far.
     leaves: [u64; 2],
     color: bool,
+    /// What the nodes may take (bytes).
+    memory: u64,
     records: TreeRecords<LogOdds32>,
     stored: Stored,
 }
@@ -119,6 +132,23 @@ impl<R: BufRead> Nodes<'_, R> {
         Ok(())
     }
 
+    /// The number of a new inner node and its record. What it takes is charged first.
+    fn inner(&mut self, offset: u64) -> Result<(u32, usize), IoError> {
+        let beside = (self.stored.open.len() + self.stored.values.len()) as u64;
+        let taken = (self.records.masks.len() as u64 + 1) * NODE_MEMORY + beside * STORED_MEMORY;
+        if taken > self.memory {
+            let value = format!("more than {} MiB", self.memory >> 20);
+            let advice = match self.packed {
+                Compression::Plain => "that is the limit; split the tree, or make it coarser",
+                _ => "that is the limit of a packed file; unpack it first (a plain one may take 16 GiB)",
+            };
+            return self.bad(offset, "the memory of the nodes", value, advice);
+        }
+        let number = self.inner;
+        self.inner += 1;
+        Ok((number, self.records.begin::<3>()))
+    }
+
     fn leaf(&mut self, value: f32) -> Slot<LogOdds32> {
         self.leaves[usize::from(value >= 0.0)] += 1;
         Slot::Leaf(LogOdds32(value))
@@ -135,9 +165,7 @@ impl<R: BufRead> Nodes<'_, R> {
         if word == 0 {
             return self.bad(offset, "the children of an inner node", "none", "the file is damaged");
         }
-        let number = self.inner;
-        self.inner += 1;
-        let record = self.records.begin::<3>();
+        let (number, record) = self.inner(offset)?;
         let mut merged = 0;
         for c in 0..8 {
             let kind = word >> (2 * c) & 3;
@@ -182,9 +210,7 @@ impl<R: BufRead> Nodes<'_, R> {
         if height == 0 {
             return self.too_deep(offset);
         }
-        let number = self.inner;
-        self.inner += 1;
-        let record = self.records.begin::<3>();
+        let (number, record) = self.inner(offset)?;
         let (mut merged, mut above) = (0, LogOdds32::UNOBSERVED);
         for c in (0..8).filter(|c| children >> c & 1 != 0) {
             let (slot, below, inner) = self.ot(height - 1)?;

@@ -5,6 +5,7 @@ use portolan::geom::{BlockKey, Lattice};
 use portolan::store::{Bricks, Slot, Store, Tree, TreeRecords};
 
 use super::*;
+use crate::Compression;
 use crate::testing::{Random, bad_bytes, real_data};
 
 /// The bytes that a writer makes.
@@ -260,6 +261,32 @@ fn damaged_files_are_refused_in_one_line() {
         let text = error(&bytes);
         assert!(text.contains(part), "{text}");
     }
+}
+
+#[test]
+fn nodes_are_charged_before_memory_is_taken() {
+    let mut words = spine();
+    words.push(1);
+    let bytes = bt(17, &words);
+    // Sixteen inner nodes are held at once.
+    let within = |memory: u64, packed| {
+        let read = read::read_within(&bytes[..], packed, Path::new("t.bt"), memory);
+        read.map(|file| file.inner_nodes()).map_err(|e| e.to_string())
+    };
+    assert_eq!(within(16 * NODE_MEMORY, Compression::Gzip), Ok(16));
+    let error = within(16 * NODE_MEMORY - 1, Compression::Gzip).unwrap_err();
+    let part =
+        "t.bt: byte 167: the memory of the nodes is more than 0 MiB; that is the limit of a packed file";
+    assert!(error.contains(part), "{error}");
+    assert!(within(NODE_MEMORY, Compression::Plain).unwrap_err().contains("split the tree"));
+    // Nodes that are merged at once are not held: an inner node of eight with eight equal leaves each.
+    let mut words = vec![0xffff];
+    words.extend([0x5555; 8]);
+    let merged = bt(73, &words);
+    let file =
+        read::read_within(&merged[..], Compression::Bzip2, Path::new("t.bt"), 2 * NODE_MEMORY).unwrap();
+    assert_eq!((file.inner_nodes(), file.tree().inner_nodes()), (9, 0));
+    assert_eq!(written(|p| file.write_bt(p)), merged);
 }
 
 #[test]

@@ -28,26 +28,36 @@ pub(super) struct CloudFrames {
 }
 
 impl CloudFrames {
-    /// `format`: of all files; `None`: each file's own. The first file is looked at where files may hold points far from
-    /// their zero: all frames are about its offset, which [`CloudFrames::files_from_frames`] tells.
+    /// `format`: of all files; `None`: each file's own. The first file with points is looked at where files may hold points
+    /// far from their zero: all frames are about its offset, which [`CloudFrames::files_from_frames`] tells.
     pub(super) fn new(files: Vec<PathBuf>, format: Option<PointFormat>, rays: Rays) -> Result<Self, IoError> {
-        let base = match (files.first(), format) {
-            // These are never far: they hold nothing but floats.
-            (_, Some(PointFormat::KittiBin)) | (None, _) => [0.0; 3],
-            (Some(first), _) => read_points_as(first, format)?.offset,
-        };
+        // These are never far: they hold nothing but floats.
+        let looked_at = if format == Some(PointFormat::KittiBin) { &[][..] } else { &files };
+        let mut base = [0.0; 3];
+        for file in looked_at {
+            let cloud = read_points_as(file, format)?;
+            if !cloud.points.is_empty() {
+                base = cloud.offset;
+                break;
+            }
+        }
         Ok(Self { files, format, rays, base })
     }
 
     /// What leads from the frames' points to the files': the offset. `None` where they are the same.
     pub(super) fn files_from_frames(&self) -> Option<Pose<3>> {
-        (self.base != [0.0; 3]).then_some(Pose { translation: self.base, ..Pose::IDENTITY })
+        file_from_frames(self.base)
     }
+}
+
+/// What leads from points about `base` to those of the file. `None` where they are the same.
+pub(super) fn file_from_frames(base: [f64; 3]) -> Option<Pose<3>> {
+    (base != [0.0; 3]).then_some(Pose { translation: base, ..Pose::IDENTITY })
 }
 
 impl FrameSource for CloudFrames {
     fn frame(&self, i: usize) -> Result<Frame, IoError> {
-        let cloud = about(read_points_as(&self.files[i], self.format)?, self.base);
+        let cloud = about(read_points_as(&self.files[i], self.format)?, self.base, &self.files[i])?;
         Ok(Frame::Points(match &self.rays {
             Rays::From(origins) => scan_from(cloud, origins[i]),
             Rays::Parallel => range_scan(cloud, &self.files[i])?,
@@ -62,9 +72,27 @@ impl FrameSource for CloudFrames {
     }
 }
 
+/// How far the offset of a scan may be from that of the first (metres): beyond, an `f32` is coarser than 4 mm.
+const FARTHEST_APART: f64 = 65_536.0;
+
 /// The cloud with another offset.
-pub(super) fn about(mut cloud: PointCloudFile, base: [f64; 3]) -> PointCloudFile {
+///
+/// # Errors
+/// [`IoError::Layout`] for a cloud so far from there that its shape would be lost.
+pub(super) fn about(
+    mut cloud: PointCloudFile,
+    base: [f64; 3],
+    path: &Path,
+) -> Result<PointCloudFile, IoError> {
     if cloud.offset != base {
+        let apart = (0..3).any(|k| (cloud.offset[k] - base[k]).abs() > FARTHEST_APART);
+        if apart && !cloud.points.is_empty() {
+            let (value, advice) = (
+                format!("about {:?} m", cloud.offset),
+                format!("the first scan's are about {base:?} m; give scans of one place, within 65 km"),
+            );
+            return Err(IoError::layout(path, "the place of the points", value, advice));
+        }
         let moved = (0..cloud.points.len()).map(|i| {
             let p = cloud.position(i);
             std::array::from_fn(|k| (p[k] - base[k]) as f32)
@@ -72,7 +100,7 @@ pub(super) fn about(mut cloud: PointCloudFile, base: [f64; 3]) -> PointCloudFile
         cloud.points = moved.collect();
         cloud.offset = base;
     }
-    cloud
+    Ok(cloud)
 }
 
 /// A scan of rays from one point (in the file's frame), with an image about that point where the cloud has rows and columns

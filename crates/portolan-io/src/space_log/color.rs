@@ -91,7 +91,7 @@ fn check_size(path: &Path, found: [usize; 2], expected: [usize; 2]) -> Result<()
         return Ok(());
     }
     let advice = format!(
-        "the depth image is {} x {}; register the colours to it, or map without colours",
+        "the depth image is {} x {}; register the colours to it, or map with --no-color",
         expected[0], expected[1]
     );
     Err(IoError::layout(path, "the size of the picture", format!("{} x {}", found[0], found[1]), advice))

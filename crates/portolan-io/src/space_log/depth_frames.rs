@@ -1,13 +1,18 @@
 //! The scans of a depth camera: a depth image each, perhaps with a colour picture.
+//!
+//! Depth does not depend on colours: where a picture is damaged or has another size, the frame has its depth and no colours,
+//! and the picture is counted.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
 
 use super::color::{color_size, read_color};
 use super::depth_png::{depth_image_size, read_depth};
 use super::parts::FrameSource;
-use super::{Camera, SpaceLogOptions, SpaceLogStats};
+use super::{Camera, SpaceLogOptions, SpaceLogStats, UnreadColors};
 use crate::IoError;
 
 /// A depth image that was found.
@@ -23,12 +28,17 @@ pub(super) struct DepthFrame {
 pub(super) struct DepthFrames {
     frames: Vec<DepthFrame>,
     units_per_metre: f64,
+    /// Why colours of frames that were read could not be, by frame: the same after any order of reading.
+    unread_colors: Mutex<BTreeMap<usize, String>>,
 }
+
+/// So many colour pictures are tried at the opening of a log.
+const COLORS_LOOKED_AT: usize = 16;
 
 impl DepthFrames {
     /// `units_per_metre` is the format's, which the caller may overrule. The first pictures are looked at: a camera of
     /// another size, or depth of another kind, fails here and not in the middle of the log; colours of another size than
-    /// the depth are left out, and said so in `stats`.
+    /// the depth, or of which none of the first can be read, are left out, and said so in `stats`.
     pub(super) fn new(
         mut frames: Vec<DepthFrame>,
         camera: &Camera,
@@ -53,17 +63,27 @@ impl DepthFrames {
         } else if frames.iter().any(|f| f.color.is_some()) {
             stats.scans_without_color = frames.iter().filter(|f| f.color.is_none()).count() as u64;
         }
-        Ok(Self { frames, units_per_metre })
+        Ok(Self { frames, units_per_metre, unread_colors: Mutex::default() })
     }
 }
 
-/// Why the colours that are there are not used.
+/// Why the colours that are there are not used: what the first that can be read tells.
 fn why_no_colors(frames: &[DepthFrame]) -> Result<Option<String>, IoError> {
-    let Some((depth, color)) = frames.iter().find_map(|f| Some((&f.depth, f.color.as_ref()?))) else {
-        return Ok(None);
-    };
-    let [[w, h], [x, y]] = [depth_image_size(depth)?, color_size(color)?];
-    Ok(([w, h] != [x, y]).then(|| format!("they are {x} x {y} while the depth images are {w} x {h}")))
+    let mut why = None;
+    let pictures = frames.iter().filter_map(|f| Some((&f.depth, f.color.as_ref()?)));
+    for (depth, color) in pictures.take(COLORS_LOOKED_AT) {
+        match color_size(color) {
+            Ok([x, y]) => {
+                let [w, h] = depth_image_size(depth)?;
+                let other = [w, h] != [x, y];
+                return Ok(other.then(|| format!("they are {x} x {y} while the depth images are {w} x {h}")));
+            }
+            Err(error) => {
+                why.get_or_insert_with(|| format!("none of the first can be read: {error}"));
+            }
+        }
+    }
+    Ok(why)
 }
 
 /// The colour picture of a name in a folder, whatever it is packed with.
@@ -77,7 +97,14 @@ impl FrameSource for DepthFrames {
         let frame = &self.frames[i];
         let depth = read_depth(&frame.depth, self.units_per_metre)?;
         let colors = match &frame.color {
-            Some(path) => read_color(path, [depth.columns, depth.rows])?,
+            Some(path) => match read_color(path, [depth.columns, depth.rows]) {
+                Ok(colors) => colors,
+                Err(error) => {
+                    let mut unread = self.unread_colors.lock().unwrap_or_else(PoisonError::into_inner);
+                    unread.insert(i, error.to_string());
+                    Vec::new()
+                }
+            },
             None => Vec::new(),
         };
         Ok(Frame::Image(RangeImage {
@@ -88,5 +115,11 @@ impl FrameSource for DepthFrames {
             colors,
             refused: RefusedBeams::default(),
         }))
+    }
+
+    fn unread_colors(&self) -> Option<UnreadColors> {
+        let unread = self.unread_colors.lock().unwrap_or_else(PoisonError::into_inner);
+        let (_, first) = unread.first_key_value()?;
+        Some(UnreadColors { pictures: unread.len() as u64, first: first.clone() })
     }
 }

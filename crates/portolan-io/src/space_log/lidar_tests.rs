@@ -180,6 +180,77 @@ fn clouds_far_away_keep_their_millimetres() {
     assert!(distance(log.sensor_position(0), [-500_000.0, -4_000_000.0, 0.0]) < 1e-6);
 }
 
+/// The bytes of a scan graph: a pose (position and quaternion x, y, z, w) and points each.
+fn graph_of(scans: &[([f64; 7], &[[f64; 3]])]) -> Vec<u8> {
+    let mut bytes = (scans.len() as u32).to_le_bytes().to_vec();
+    let vector = |bytes: &mut Vec<u8>, v: &[f64]| {
+        bytes.extend((v.len() as u32).to_le_bytes());
+        v.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    };
+    for (id, ([x, y, z, a, b, c, d], points)) in scans.iter().enumerate() {
+        bytes.extend((points.len() as u32).to_le_bytes());
+        points.iter().for_each(|p| vector(&mut bytes, p));
+        vector(&mut bytes, &[*x, *y, *z]);
+        vector(&mut bytes, &[*d, *a, *b, *c]);
+        bytes.extend((id as u32).to_le_bytes());
+    }
+    bytes.extend(0u32.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn scan_graphs_far_away_keep_their_millimetres() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("utm.graph");
+    let far = [[500_000.001, 4_000_000.002, 12.003], [500_003.5, 4_000_001.25, 12.0]];
+    let none = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    // Half a turn about z.
+    let turned = [-1.0, 2.0, 0.5, 0.0, 0.0, 1.0, 0.0];
+    fs::write(&path, graph_of(&[(none, &[]), (none, &far), (turned, &far[1..])])).unwrap();
+    let log = open(&path);
+    assert_eq!((log.kind(), log.len()), (SpaceLogKind::ScanGraph, 3));
+    for (p, expected) in world(&log, 1).iter().zip(far) {
+        assert!(distance(*p, expected) < 1e-6, "{p:?}");
+    }
+    assert!(distance(world(&log, 2)[0], [-500_004.5, -3_999_999.25, 12.5]) < 1e-6);
+    assert!(distance(log.sensor_position(1), [0.0; 3]) < 1e-6);
+    assert!(distance(log.sensor_position(2), [-1.0, 2.0, 0.5]) < 1e-6);
+    assert!(points(&log, 0).points.is_empty());
+    // Named poses lead to the file's points, too.
+    let poses = folder.path().join("poses.txt");
+    fs::write(&poses, "-500000 -4000000 0 0 0 0 1\n".repeat(3)).unwrap();
+    let log = SpaceLog::open(&path, &SpaceLogOptions { poses: Some(poses), ..Default::default() }).unwrap();
+    assert!(distance(world(&log, 1)[1], [3.5, 1.25, 12.0]) < 1e-6);
+}
+
+#[test]
+fn an_empty_first_cloud_and_one_elsewhere_do_not_cost_the_others_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |i: u32, text: &str| fs::write(folder.path().join(format!("{i}.pcd")), text).unwrap();
+    let pcd = |rows: &[&str]| {
+        let n = rows.len();
+        format!(
+            "VERSION .7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {n}\nHEIGHT 1\nPOINTS {n}\nDATA ascii\n{}",
+            rows.join("\n") + "\n"
+        )
+    };
+    write(0, &pcd(&["nan nan nan"]));
+    write(1, &pcd(&["500000.001 4000000.002 12.003"]));
+    write(2, &pcd(&["500900.001 4002000.002 12.003"]));
+    write(3, &pcd(&["1 2 3"]));
+    fs::write(folder.path().join("poses.txt"), "0 0 0 0 0 0 1\n".repeat(4)).unwrap();
+    let log = open(folder.path());
+    assert!(points(&log, 0).points.is_empty());
+    assert!(distance(world(&log, 1)[0], [500_000.001, 4_000_000.002, 12.003]) < 1e-6);
+    // Two kilometres on: half of an f32's last digit.
+    assert!(distance(world(&log, 2)[0], [500_900.001, 4_002_000.002, 12.003]) < 1e-4);
+    let error = log.frame(3).unwrap_err().to_string();
+    assert!(
+        error.contains("3.pcd: the place of the points is about [0.0, 0.0, 0.0] m; the first scan's"),
+        "{error}"
+    );
+}
+
 #[test]
 fn organised_clouds_keep_the_rows_and_columns_of_their_sensor() {
     let folder = tempfile::tempdir().unwrap();

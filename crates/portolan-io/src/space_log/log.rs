@@ -9,7 +9,7 @@ use portolan::scan::Frame;
 
 use super::matching::{Match, match_poses};
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
-use super::{Camera, RefusedPose, SpaceLogKind, SpaceLogOptions, SpaceLogStats};
+use super::{Camera, RefusedPose, SpaceLogKind, SpaceLogOptions, SpaceLogStats, UnreadColors};
 use crate::IoError;
 use crate::poses3::{MENDED_FROM, PoseConvention, RawPose, TrackPose, read_poses_3d};
 
@@ -137,9 +137,16 @@ impl SpaceLog {
     /// Reads scan `i`. Panics where there is no such scan.
     ///
     /// # Errors
-    /// [`IoError`] where its file cannot be read or is damaged.
+    /// [`IoError`] where its file cannot be read or is damaged. A colour picture beside a depth image is no reason: the frame
+    /// is without colours then, and [`SpaceLog::unread_colors`] says so.
     pub fn frame(&self, i: usize) -> Result<Frame, IoError> {
         self.source.frame(self.entries[i].place)
+    }
+
+    /// The colour pictures that could not be read, among the frames that were read so far: they are found only then, so that
+    /// this is to be asked after the last. `None` where all could.
+    pub fn unread_colors(&self) -> Option<UnreadColors> {
+        self.source.unread_colors()
     }
 
     /// What was found, and what was left out.

@@ -51,4 +51,4 @@ pub use intrinsics::{Camera, CameraFrom, Intrinsics};
 pub use kind::SpaceLogKind;
 pub use log::SpaceLog;
 pub use options::SpaceLogOptions;
-pub use stats::{RefusedPose, SpaceLogStats};
+pub use stats::{RefusedPose, SpaceLogStats, UnreadColors};

@@ -7,7 +7,7 @@ use portolan::geom::Pose;
 use portolan::scan::Frame;
 
 use super::files::names_in;
-use super::{Camera, SpaceLogStats};
+use super::{Camera, SpaceLogStats, UnreadColors};
 use crate::IoError;
 use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
 
@@ -19,6 +19,11 @@ pub(crate) trait FrameSource: Send + Sync {
     /// Where the sensor stood in the frame of scan `i` (metres): not in its zero where clouds are in the world's frame.
     fn origin(&self, _i: usize) -> [f64; 3] {
         [0.0; 3]
+    }
+
+    /// Colour pictures that could not be read so far.
+    fn unread_colors(&self) -> Option<UnreadColors> {
+        None
     }
 }
 

@@ -166,14 +166,51 @@ mod tests {
         let why = log.stats().colors_left_out.as_deref().unwrap();
         assert_eq!(why, "they are 8 x 8 while the depth images are 8 x 6");
         assert!(image(&log, 1).colors.is_empty());
-        // Where only a later picture differs, reading it fails.
-        write_color(&folder.path().join("frame-000000.color.png"), [1, 2, 3]);
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-        let error = log.frame(1).unwrap_err().to_string();
+    }
+
+    #[test]
+    fn depth_stays_where_colors_cannot_be_read() {
+        let folder = folder_of(4);
+        let color = |i: usize| folder.path().join(format!("frame-{:06}.color.png", 3 * i));
+        [1, 3].into_iter().for_each(|i| write_color(&color(i), [1, 2, 3]));
+        // No picture, one of another size, one cut off; the first that can be read tells the size.
+        let whole = std::fs::read(color(3)).unwrap();
+        write(&color(0), "no picture");
+        write(&color(2).with_extension("jpg"), bytes_of(RED_JPEG));
+        write(&color(3), &whole[..whole.len() - 20]);
+        let open = || SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        let log = open();
+        assert_eq!((&log.stats().colors_left_out, log.unread_colors()), (&None, None));
+        // In any order, and again: each picture counts once, the first is that of the log.
+        for i in [3, 2, 1, 0, 2] {
+            assert_is_picture(&log, i, i);
+            assert_eq!(image(&log, i).colors.len(), if i == 1 { 48 } else { 0 }, "{i}");
+        }
+        let unread = log.unread_colors().unwrap();
+        assert_eq!(unread.pictures, 3);
+        let part =
+            "frame-000000.color.png: the start of the colour picture is \"no pictu\"; give JPEG or PNG";
+        assert!(unread.first.contains(part), "{}", unread.first);
+        // The one of another size alone.
+        write_color(&color(0), [1, 2, 3]);
+        write_color(&color(3), [1, 2, 3]);
+        let log = open();
+        (0..4).for_each(|i| assert_is_picture(&log, i, i));
+        let unread = log.unread_colors().unwrap();
         assert!(
-            error.contains("000003.color.jpg: the size of the picture is 8 x 8; the depth image is"),
-            "{error}"
+            unread.pictures == 1
+                && unread.first.contains("000006.color.jpg: the size of the picture is 8 x 8; the depth")
         );
+        // None that can be read.
+        std::fs::remove_file(color(2).with_extension("jpg")).unwrap();
+        (0..4).for_each(|i| write(&color(i), "no picture"));
+        let log = open();
+        let why = log.stats().colors_left_out.as_deref().unwrap();
+        assert!(
+            why.starts_with("none of the first can be read: ") && why.contains("frame-000000.color.png"),
+            "{why}"
+        );
+        assert_is_picture(&log, 2, 2);
     }
 
     #[test]

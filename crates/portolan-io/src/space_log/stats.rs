@@ -22,6 +22,15 @@ impl fmt::Display for RefusedPose {
     }
 }
 
+/// Colour pictures of frames that were read without them, as these could not be read or have another size than the depth.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnreadColors {
+    /// How many, each counted once.
+    pub pictures: u64,
+    /// What is wrong with the first of them, in the log's order.
+    pub first: String,
+}
+
 /// Counts of a log of scans of space. Scans that are left out are those without pose, those at an unmatched time and those
 /// whose pose is refused.
 #[derive(Clone, Debug, Default, PartialEq)]
