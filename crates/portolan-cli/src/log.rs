@@ -41,8 +41,8 @@ fn pose_convention(word: &str) -> Result<PoseConvention, String> {
 /// Which log, with which poses.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct LogArgs {
-    /// Poses of the sensor, instead of the log's own. Planar: one per scan, x y theta, t x y theta, or TUM. In space:
-    /// KITTI rows, TUM lines, 4x4 matrices or a Redwood trajectory
+    /// Poses of the sensor itself, instead of the log's own. Planar: one per scan, x y theta, t x y theta, or TUM. In
+    /// space: KITTI rows, TUM lines, 4x4 matrices or a Redwood trajectory; with KITTI the lidar's, Tr is not applied
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
     /// Kind of LOG, where it is not recognised: carmen; in space seven-scenes, tum, redwood, bigbird, kitti, stanford,
@@ -165,6 +165,7 @@ pub(crate) fn describe(kind: &FileKind) -> String {
     match kind {
         FileKind::CarmenLog => "a CARMEN log".into(),
         FileKind::SpaceLog(kind) => kind.label().into(),
+        FileKind::Mesh(format) => format.label().into(),
         FileKind::Portolan => "a portolan map".into(),
         FileKind::PortolanFolder => "a folder with a portolan map".into(),
         FileKind::EsdfBin => "a distance field (esdf.bin)".into(),

@@ -31,6 +31,9 @@ impl Summary<'_> {
     /// What the user should know before he trusts the map.
     fn warnings(&self) -> Vec<String> {
         let mut warnings = log_warnings(self.log.stats());
+        if let Some(lost) = self.log.unread_colors() {
+            warnings.push(format!("{} colour pictures could not be read (first: {})", lost.pictures, lost.first));
+        }
         let stats = &self.fusion.stats;
         if stats.refused_poses > 0 {
             warnings.push(format!(
