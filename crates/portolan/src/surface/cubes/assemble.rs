@@ -2,7 +2,6 @@
 
 use super::parallel::for_each;
 use super::piece::{Attributes, EdgeCode, Part, Piece, WORDS, bits};
-use crate::geom::BlockKey;
 use crate::surface::Mesh;
 
 /// Where nodes sit: node `i` at `origin + (i + offset) * resolution`.
@@ -95,29 +94,10 @@ impl Joint<'_> {
         for i in place.pieces.clone() {
             let (part, piece) = self.pieces[i];
             self.number(i, numbers);
-            let (own, foreign) = (piece.own as usize, piece.foreign as usize);
-            let base = [0, 1, 2].map(|k| {
-                8.0 * (f64::from(piece.key.0[k]) - f64::from(self.first[k])) + self.placement.offset
-            });
-            let scale = self.placement.resolution;
-            let from = piece.first_vertex as usize;
-            for j in 0..own + piece.centres as usize {
-                let number = numbers[if j < own { j } else { j + foreign }];
-                if number == NONE {
-                    continue;
-                }
-                let to = (number - vertex_0) as usize;
-                let p = part.vertices[from + j];
-                let out = &mut place.vertices[to];
-                for k in 0..3 {
-                    out[k] = ((base[k] + f64::from(p[k])) * scale) as f32;
-                }
-                if self.want.normals {
-                    place.normals[to] = super::normals::unit(part.gradients[from + j]);
-                }
-                if self.want.colors {
-                    place.colors[to] = part.colors[from + j];
-                }
+            if self.kept[i].is_none() {
+                self.fill_all(i, (self.starts[i].0 - vertex_0) as usize, place);
+            } else {
+                self.fill_kept(i, vertex_0, numbers, place);
             }
             let from = piece.first_triangle as usize;
             let triangles = &part.triangles[from..from + piece.triangles as usize];
@@ -126,6 +106,54 @@ impl Joint<'_> {
                 *out = t.map(|v| numbers[usize::from(v)]);
             }
         }
+    }
+
+    /// The vertices of a piece of which all are the mesh's: they follow each other there too, from `to` on.
+    fn fill_all(&self, i: usize, to: usize, place: &mut Place) {
+        let (part, piece) = self.pieces[i];
+        let (from, count) = (piece.first_vertex as usize, (piece.own + piece.centres) as usize);
+        let put = self.position(piece);
+        for (out, p) in place.vertices[to..to + count].iter_mut().zip(&part.vertices[from..]) {
+            *out = put(p);
+        }
+        if self.want.normals {
+            for (out, g) in place.normals[to..to + count].iter_mut().zip(&part.gradients[from..]) {
+                *out = super::normals::unit(*g);
+            }
+        }
+        if self.want.colors {
+            place.colors[to..to + count].copy_from_slice(&part.colors[from..from + count]);
+        }
+    }
+
+    /// The vertices of a piece that some cube uses.
+    fn fill_kept(&self, i: usize, vertex_0: u32, numbers: &[u32], place: &mut Place) {
+        let (part, piece) = self.pieces[i];
+        let (own, foreign, from) = (piece.own as usize, piece.foreign as usize, piece.first_vertex as usize);
+        let put = self.position(piece);
+        for j in 0..own + piece.centres as usize {
+            let number = numbers[if j < own { j } else { j + foreign }];
+            if number == NONE {
+                continue;
+            }
+            let to = (number - vertex_0) as usize;
+            place.vertices[to] = put(&part.vertices[from + j]);
+            if self.want.normals {
+                place.normals[to] = super::normals::unit(part.gradients[from + j]);
+            }
+            if self.want.colors {
+                place.colors[to] = part.colors[from + j];
+            }
+        }
+    }
+
+    /// From cells of a brick to metres from the mesh's origin.
+    #[inline(always)]
+    fn position(&self, piece: &Piece) -> impl Fn(&[f32; 3]) -> [f32; 3] {
+        let base = [0, 1, 2]
+            .map(|k| 8.0 * (f64::from(piece.key.0[k]) - f64::from(self.first[k])) + self.placement.offset);
+        let scale = self.placement.resolution;
+        move |p| [0, 1, 2].map(|k| ((base[k] + f64::from(p[k])) * scale) as f32)
     }
 
     /// The mesh's numbers of a piece's vertices.
@@ -170,22 +198,36 @@ fn place_of(code: EdgeCode) -> (usize, u32) {
     (usize::from(code >> 6 & 31), u32::from(code & 63))
 }
 
-/// The upper neighbours of every piece. Keys ascend, so that one walk per octant finds them all.
+/// The upper neighbours of every piece. Keys ascend, so that one walk per octant finds those of many pieces.
 fn owners(pieces: &[(&Part, &Piece)]) -> Vec<[u32; 8]> {
+    let order = |key: [i32; 3]| (key[2], key[1], key[0]);
     let mut owners = vec![[NONE; 8]; pieces.len()];
-    for octant in 1..8 {
-        let mut at = 0;
-        for (i, (_, piece)) in pieces.iter().enumerate() {
-            let key = BlockKey(std::array::from_fn(|k| piece.key.0[k] + (octant >> k & 1)));
-            let order = |key: BlockKey<3>| (key.0[2], key.0[1], key.0[0]);
-            while at < pieces.len() && order(pieces[at].1.key) < order(key) {
-                at += 1;
+    let mut chunks: Vec<_> = owners.chunks_mut(8 * TOGETHER).enumerate().collect();
+    for_each(
+        &mut chunks,
+        || (),
+        |(), (chunk, owners)| {
+            let first = *chunk * 8 * TOGETHER;
+            let pairs = pieces[first..].iter().zip(owners.iter_mut());
+            let mut at = [first; 8];
+            for (n, ((_, piece), owners)) in pairs.enumerate() {
+                for octant in 1..8 {
+                    let key: [i32; 3] = std::array::from_fn(|k| piece.key.0[k] + (octant >> k & 1));
+                    let (octant, wanted) = (octant as usize, order(key));
+                    let at = &mut at[octant];
+                    if n == 0 {
+                        *at = pieces.partition_point(|(_, p)| order(p.key.0) < wanted);
+                    }
+                    while *at < pieces.len() && order(pieces[*at].1.key.0) < wanted {
+                        *at += 1;
+                    }
+                    if *at < pieces.len() && pieces[*at].1.key.0 == key {
+                        owners[octant] = *at as u32;
+                    }
+                }
             }
-            if at < pieces.len() && pieces[at].1.key == key {
-                owners[i][octant as usize] = at as u32;
-            }
-        }
-    }
+        },
+    );
     owners
 }
 

@@ -21,24 +21,15 @@ pub fn isosurface(samples: &[f32], shape: [usize; 3], level: f32, normals: bool)
     assert_eq!(product, Some(samples.len()), "one sample per node");
     assert!(shape.iter().all(|&n| n <= 1 << 30), "an index of a node is an i32");
     let want = Attributes { normals, colors: false };
-    let [nx, ny, nz] = shape.map(|n| n.div_ceil(8));
-    // Rows of bricks along x.
-    let signs = map(ny * nz, || (), |(), row| signs_of_row(samples, shape, level, [row % ny, row / ny], nx));
-    let sign = |x: usize, y: usize, z: usize| {
-        if x < nx && y < ny && z < nz { &signs[y + ny * z][x] } else { &Signs::NOTHING }
-    };
-    let parts = map(ny * nz, Numbers::new, |numbers, row| {
-        let mut part = Part::default();
-        let (y, z) = (row % ny, row / ny);
-        for x in 0..nx {
-            let octant = |o: usize| sign(x + (o & 1), y + (o >> 1 & 1), z + (o >> 2));
-            let layers = Layers::new(std::array::from_fn(octant));
-            if layers.any_crossing() {
-                let samples = DenseSamples { samples, shape, level, first: [8 * x, 8 * y, 8 * z] };
-                let key = BlockKey([x, y, z].map(|k| k as i32));
-                part.add(key, &layers, &samples, want, numbers);
-            }
-        }
+    let tiles = Tiles::new(shape);
+    let scratch = || (Vec::new(), Numbers::new(), [0; 4]);
+    let parts = map(tiles.count(), scratch, |(signs, numbers, sizes), i| {
+        let tile = tiles.tile(i);
+        tile.read(samples, shape, level, signs);
+        // As much as the tile before: arrays seldom grow.
+        let mut part = Part::like(sizes);
+        tile.mesh(&DenseSamples { samples, shape, level, first: [0; 3] }, want, signs, numbers, &mut part);
+        *sizes = part.sizes();
         part
     });
     let pieces: Vec<_> = parts.iter().flat_map(|part| part.pieces.iter().map(move |p| (part, p))).collect();
@@ -46,33 +37,102 @@ pub fn isosurface(samples: &[f32], shape: [usize; 3], level: f32, normals: bool)
     assemble(&pieces, &placement, want)
 }
 
-/// Signs of a row of bricks.
-fn signs_of_row(
-    samples: &[f32],
-    shape: [usize; 3],
-    level: f32,
-    [by, bz]: [usize; 2],
+/// Samples of a tile, of which signs are read first and values where there is surface: few enough to stay in the
+/// second level of cache in between.
+const TILE: usize = 1 << 17;
+
+/// The bricks of an array in tiles: whole rows of bricks along x, some beside each other along y. In ascending order of
+/// keys.
+struct Tiles {
+    bricks: [usize; 3],
+    /// Rows of bricks of a tile.
+    rows: usize,
+    /// Tiles along y.
+    along: usize,
+}
+
+/// Some rows of bricks.
+struct Tile {
     nx: usize,
-) -> Vec<Signs> {
-    let mut signs = vec![Signs::NOTHING; nx];
-    for (y, z) in (0..64).map(|i| (8 * by + i % 8, 8 * bz + i / 8)) {
-        if y >= shape[1] || z >= shape[2] {
-            continue;
-        }
-        let row = &samples[(y + shape[1] * z) * shape[0]..][..shape[0]];
-        let (whole, rest) = row.as_chunks::<8>();
-        let shift = 8 * (y & 7);
-        for (signs, values) in signs.iter_mut().zip(whole) {
-            let values = values.map(|v| v - level);
-            signs.inside[z & 7] |= u64::from(byte(&values, |v| v < 0.0)) << shift;
-            signs.observed[z & 7] |= u64::from(byte(&values, f32::is_finite)) << shift;
-        }
-        for (k, v) in rest.iter().map(|v| v - level).enumerate() {
-            signs[nx - 1].inside[z & 7] |= u64::from(v < 0.0 && v.is_finite()) << (shift + k);
-            signs[nx - 1].observed[z & 7] |= u64::from(v.is_finite()) << (shift + k);
+    y: std::ops::Range<usize>,
+    z: usize,
+}
+
+impl Tiles {
+    fn new(shape: [usize; 3]) -> Self {
+        let bricks = shape.map(|n| n.div_ceil(8));
+        let rows = (TILE / (bricks[0] * 512).max(1)).clamp(1, bricks[1].max(1));
+        Self { bricks, rows, along: bricks[1].div_ceil(rows) }
+    }
+
+    fn count(&self) -> usize {
+        self.along * self.bricks[2]
+    }
+
+    fn tile(&self, i: usize) -> Tile {
+        let first = i % self.along * self.rows;
+        let y = first..(first + self.rows).min(self.bricks[1]);
+        Tile { nx: self.bricks[0], y, z: i / self.along }
+    }
+}
+
+impl Tile {
+    /// Place of a brick's signs: those of the tile, and of its upper neighbours along y and z.
+    fn place(&self, x: usize, y: usize, z: usize) -> usize {
+        x + self.nx * (y - self.y.start + (self.y.len() + 1) * (z - self.z))
+    }
+
+    /// Signs of the tile's nodes, and of the nearest ones of its upper neighbours.
+    fn read(&self, samples: &[f32], shape: [usize; 3], level: f32, signs: &mut Vec<Signs>) {
+        signs.clear();
+        signs.resize(2 * self.nx * (self.y.len() + 1), Signs::NOTHING);
+        for z in 8 * self.z..(8 * self.z + 9).min(shape[2]) {
+            for y in 8 * self.y.start..(8 * self.y.end + 1).min(shape[1]) {
+                let row = &samples[(y + shape[1] * z) * shape[0]..][..shape[0]];
+                let first = self.place(0, y >> 3, z >> 3);
+                read_row(row, level, &mut signs[first..first + self.nx], [y & 7, z & 7]);
+            }
         }
     }
-    signs
+
+    /// The pieces of the tile's bricks.
+    fn mesh(
+        &self,
+        samples: &DenseSamples,
+        want: Attributes,
+        signs: &[Signs],
+        numbers: &mut Numbers,
+        part: &mut Part,
+    ) {
+        for y in self.y.clone() {
+            for x in 0..self.nx {
+                let layers = Layers::new(std::array::from_fn(|o| {
+                    let at = self.place(x, y + (o >> 1 & 1), self.z + (o >> 2));
+                    if x + (o & 1) < self.nx { &signs[at + (o & 1)] } else { &Signs::NOTHING }
+                }));
+                if layers.any_crossing() {
+                    let samples = DenseSamples { first: [8 * x, 8 * y, 8 * self.z], ..*samples };
+                    let key = BlockKey([x, y, self.z].map(|k| k as i32));
+                    part.add(key, &layers, &samples, want, numbers);
+                }
+            }
+        }
+    }
+}
+
+/// Signs of one row of nodes along x.
+fn read_row(row: &[f32], level: f32, signs: &mut [Signs], [y, z]: [usize; 2]) {
+    let (whole, rest) = row.as_chunks::<8>();
+    let shift = 8 * y;
+    for (signs, values) in signs.iter_mut().zip(whole) {
+        let values = values.map(|v| v - level);
+        signs.inside[z] |= u64::from(byte(&values, |v| v < 0.0)) << shift;
+        signs.observed[z] |= u64::from(byte(&values, f32::is_finite)) << shift;
+    }
+    for (k, v) in rest.iter().map(|v| v - level).enumerate() {
+        signs[whole.len()].inside[z] |= u64::from(v < 0.0 && v.is_finite()) << (shift + k);
+        signs[whole.len()].observed[z] |= u64::from(v.is_finite()) << (shift + k);
+    }
 }
 
 #[cfg(test)]
@@ -243,6 +303,31 @@ mod tests {
         let mut vertices: Vec<_> = mesh.vertices.iter().map(|v| v.map(f32::to_bits)).collect();
         vertices.sort_unstable();
         (mesh.edge_counts(), mesh.triangles.len(), mesh.components().1, vertices)
+    }
+
+    #[test]
+    fn tiles_leave_no_trace() {
+        // Rows so long that not all of them are in one tile.
+        let shape = [600, 45, 20];
+        assert!(Tiles::new(shape).along > 1);
+        let mut random = Random(3);
+        let mut hole = Random(4);
+        let mut value = || if hole.next().is_multiple_of(50) { f64::NAN } else { random.value().into() };
+        let samples = field(shape, |_| value());
+        let index = |c: [i32; 3]| (0..3).rev().fold(0, |i, k| i * shape[k] + c[k] as usize);
+        let store = bricks(crate::geom::Lattice::new([0.0; 3], 1.0), [0; 3], shape, |c| samples[index(c)]);
+        let dense = || isosurface(&samples, shape, 0.0, true);
+        let (mesh, sparse) = (dense(), marching_cubes(&store, None, &MeshSettings::default()));
+        assert!(mesh.triangles.len() > 500_000 && mesh.triangles == sparse.triangles);
+        for (i, v) in mesh.vertices.iter().enumerate() {
+            let other = sparse.vertex_world(i);
+            assert!((0..3).all(|k| (f64::from(v[k]) + 0.5 - other[k]).abs() < 1e-4));
+        }
+        #[cfg(feature = "parallel")]
+        for threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(pool.install(dense) == mesh);
+        }
     }
 
     proptest! {

@@ -2,7 +2,7 @@
 
 use super::samples::Samples;
 use super::signs::{LAST_COLUMN, LAST_ROW, Layers, next_column};
-use super::table::{ASK, TABLE, Table, local};
+use super::table::{ASK, MOST, Plain, TABLE, Table, local};
 use crate::geom::BlockKey;
 
 /// What vertices carry beside their position.
@@ -104,22 +104,38 @@ fn color(samples: &impl Samples, node: [i32; 3], end: [i32; 3], t: f32) -> [u8; 
     if total > 0.0 { sum.map(|s| (s / total / 257.0 + 0.5) as u8) } else { NO_COLOR }
 }
 
-/// Vertex numbers by place of the edge ([`local`]), reused from brick to brick.
-pub(super) struct Numbers(Box<[u16; 4096]>);
+/// Vertex numbers by place of the edge ([`local`]), and the triangles of one layer; reused from brick to brick.
+pub(super) struct Numbers {
+    edges: Box<[u16; 4096]>,
+    triangles: Box<[[u16; 3]; 64 * MOST]>,
+}
 
 impl Numbers {
     pub(super) fn new() -> Self {
-        Self(Box::new([0; 4096]))
+        Self { edges: Box::new([0; 4096]), triangles: Box::new([[0; 3]; 64 * MOST]) }
     }
 
     #[inline(always)]
     fn at(&mut self, axis: usize, node: usize) -> &mut u16 {
-        &mut self.0[(axis << 10 | node) & 4095]
+        &mut self.edges[(axis << 10 | node) & 4095]
     }
 
     #[inline(always)]
     fn get(&self, node: usize, edge: u16) -> u16 {
-        self.0[(node + usize::from(edge)) & 4095]
+        self.edges[(node + usize::from(edge)) & 4095]
+    }
+
+    /// Triangles of a cube from place `at` on. Always [`MOST`] of them: what is too many the next cube overwrites, and
+    /// no branch depends on how many there are.
+    #[inline(always)]
+    fn put(&mut self, at: usize, node: usize, plain: &Plain) {
+        if let Some(out) = self.triangles.get_mut(at..at + MOST) {
+            for k in 0..MOST {
+                for v in 0..3 {
+                    out[k][v] = self.edges[(node + usize::from(plain.corners[k][v])) & 4095];
+                }
+            }
+        }
     }
 }
 
@@ -134,6 +150,23 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
 }
 
 impl Part {
+    /// An empty part with room for as much as another one holds, and a little more.
+    pub(super) fn like(other: &[usize; 4]) -> Self {
+        let [pieces, vertices, foreign, triangles] = other.map(|n| n + n / 8);
+        Self {
+            pieces: Vec::with_capacity(pieces),
+            vertices: Vec::with_capacity(vertices),
+            foreign: Vec::with_capacity(foreign),
+            triangles: Vec::with_capacity(triangles),
+            ..Self::default()
+        }
+    }
+
+    /// How many pieces, vertices, edges of neighbours and triangles it holds.
+    pub(super) fn sizes(&self) -> [usize; 4] {
+        [self.pieces.len(), self.vertices.len(), self.foreign.len(), self.triangles.len()]
+    }
+
     /// Adds the piece of a brick, where there is surface.
     pub(super) fn add(
         &mut self,
@@ -179,6 +212,8 @@ impl Part {
         let table = &*TABLE;
         for z in 0..8 {
             let (low, high) = (&inside[z], &inside[z + 1]);
+            // Triangles of the layer that are not yet in the part.
+            let mut count = 0;
             for i in bits(active[z]) {
                 let bit = |word: u64, k: usize| (word >> i & 1) << k;
                 let case = bit(low.at, 0) | bit(low.x, 1) | bit(low.y, 2) | bit(low.xy, 3);
@@ -186,14 +221,16 @@ impl Part {
                 let node = (i & 7) + 9 * (i >> 3) + 81 * z;
                 let plain = &table.plain[case as usize & 255];
                 if plain.triangles == ASK {
+                    self.triangles.extend_from_slice(&numbers.triangles[..count]);
+                    count = 0;
                     let at = [(i & 7) as i32, (i >> 3) as i32, z as i32];
                     self.asked(&mut piece, case as u8, at, table, samples, want, numbers);
                     continue;
                 }
-                for t in plain.corners.as_chunks::<3>().0.iter().take(usize::from(plain.triangles)) {
-                    self.triangles.push(t.map(|edge| numbers.get(node, edge)));
-                }
+                numbers.put(count, node, plain);
+                count += usize::from(plain.triangles);
             }
+            self.triangles.extend_from_slice(&numbers.triangles[..count]);
         }
         piece.triangles = self.triangles.len() as u32 - piece.first_triangle;
         self.pieces.push(piece);
@@ -225,6 +262,8 @@ impl Part {
         want: Attributes,
         numbers: &mut Numbers,
     ) {
+        let count: u32 = piece.crossing.iter().map(|word| word.count_ones()).sum();
+        self.vertices.resize(self.vertices.len() + count as usize, [0.0; 3]);
         for z in 0..8 {
             self.own_crossings_along::<0>(piece, z, samples, want, numbers);
             self.own_crossings_along::<1>(piece, z, samples, want, numbers);
@@ -244,11 +283,19 @@ impl Part {
     ) {
         let mut count = piece.own as u16;
         piece.rank[3 * z + AXIS] = count;
-        for i in bits(piece.crossing[3 * z + AXIS]) {
+        let vertices = &mut self.vertices[(piece.first_vertex + piece.own) as usize..];
+        for (position, i) in vertices.iter_mut().zip(bits(piece.crossing[3 * z + AXIS])) {
             let (x, y) = (i & 7, i >> 3);
             *numbers.at(AXIS, x + 9 * y + 81 * z) = count;
             count += 1;
-            self.push(&crossing(samples, [x as i32, y as i32, z as i32], AXIS, want), want);
+            let vertex = crossing(samples, [x as i32, y as i32, z as i32], AXIS, want);
+            *position = vertex.position;
+            if want.normals {
+                self.gradients.push(vertex.gradient);
+            }
+            if want.colors {
+                self.colors.push(vertex.color);
+            }
         }
         piece.own = u32::from(count);
     }

@@ -12,10 +12,13 @@ use super::patch::Patch;
 use super::tunnel::connected;
 use std::sync::LazyLock;
 
-/// A cube whose signs tell all: up to five triangles, as places in the [`local`] numbering, and their number.
+/// Triangles of a cube whose signs tell all: four at most.
+pub(super) const MOST: usize = 4;
+
+/// A cube whose signs tell all: its triangles, as places in the [`local`] numbering, and their number.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Plain {
-    pub(super) corners: [u16; 15],
+    pub(super) corners: [[u16; 3]; MOST],
     pub(super) triangles: u16,
 }
 
@@ -72,9 +75,10 @@ impl Table {
             }
             let last = &table.decided[table.decided.len() - 1];
             let plain = &mut table.plain[usize::from(case)];
-            if faces == 0 && last.tunnels.is_empty() && last.discs.centres.is_empty() {
-                for (k, &v) in last.discs.triangles.iter().flatten().enumerate() {
-                    plain.corners[k] = local(v);
+            let few = last.discs.triangles.len() <= MOST;
+            if faces == 0 && last.tunnels.is_empty() && last.discs.centres.is_empty() && few {
+                for (corners, t) in plain.corners.iter_mut().zip(&last.discs.triangles) {
+                    *corners = t.map(local);
                 }
                 plain.triangles = last.discs.triangles.len() as u16;
             } else {
