@@ -26,6 +26,7 @@ pub(crate) fn stats(stats: &ScanStats) -> Value {
         },
         "refused_beams": {
             "total": r.total(), "not_finite": r.not_finite, "negative": r.negative, "too_near": r.too_near,
+            "too_far": r.too_far,
         },
     })
 }

@@ -46,11 +46,12 @@ impl Summary<'_> {
         if stats.refused.total() > 0 {
             let r = &stats.refused;
             warnings.push(format!(
-                "{} readings could not be used ({} not finite, {} negative, {} too near)",
+                "{} readings could not be used ({} not finite, {} negative, {} too near, {} too far)",
                 r.total(),
                 r.not_finite,
                 r.negative,
-                r.too_near
+                r.too_near,
+                r.too_far
             ));
         }
         if stats.hits_outside > 0 {

@@ -11,7 +11,7 @@
 //! | `OBRICKS`, `TBRICKS`, `CBRICKS` | `keys` | in space: i32 x, y, z of each brick of 8 x 8 x 8 cells: index of its first cell, divided by 8; ascending, z first |
 //! | `OBRICKS` | `occupancy` | in the order of the keys, 512 cells each, x fastest: i8 log odds, -128 never observed |
 //! | `TBRICKS` | `distance`, `weight` | in the order of the keys: f32 each; weight 0: never observed |
-//! | `CBRICKS` | `color` | in the order of the keys: u16 red, green, blue, weight (in 1/256) of each cell; weight 0: never observed |
+//! | `CBRICKS` | `color` | in the order of the keys: u16 red, green, blue, weight of each cell; weight 0: never observed, else `w`: 2^(w / 2048 - 24) * (1 + w % 2048 / 2048) |
 //! | `POSES` | `sensor` | per scan that was fused: f64 rows of the rotation, then the translation (`world_from_sensor`) |
 //!
 //! Long planes go on in chunks of the same name with `.1`, `.2`, .. behind it; each part of a plane of bricks holds

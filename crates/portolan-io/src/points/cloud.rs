@@ -92,7 +92,8 @@ impl PointCloudFile {
             colors: self.colors,
             image: None,
             refused: RefusedBeams {
-                not_finite: self.refused.not_finite + self.refused.too_far,
+                not_finite: self.refused.not_finite,
+                too_far: self.refused.too_far,
                 ..RefusedBeams::default()
             },
         };

@@ -9,14 +9,32 @@ use std::sync::Arc;
 pub struct Color {
     /// Red, green, blue; 65535 is full.
     pub rgb: [u16; 3],
-    /// Accumulated weight in units of 1/256, up to the rule's limit. Positive.
+    /// Accumulated weight as a floating-point number of 16 bits without sign: 5 of the exponent, 11 of the mantissa,
+    /// `2^(weight / 2048 - 24) * (1 + weight % 2048 / 2048)` (whole divisions), from 2^-24 up to the rule's limit. Positive.
+    ///
+    /// So that weights of any size add up: at a thousandth each, too, four thousand observations are a mean.
     pub weight: u16,
 }
+
+/// From the exponent of an `f32` to that of a weight's word, in the latter's bits.
+const BIAS: u32 = (127 - 24) << 11;
 
 impl Color {
     /// The colour in bytes, rounded.
     pub fn rgb8(self) -> [u8; 3] {
         self.rgb.map(|v| ((u32::from(v) + 128) / 257) as u8)
+    }
+
+    /// The accumulated weight.
+    #[inline]
+    pub fn weight(self) -> f32 {
+        f32::from_bits((u32::from(self.weight) + BIAS) << 12)
+    }
+
+    /// The word of a positive weight, rounded to nearest; never the word of what was not observed.
+    #[inline]
+    fn word(weight: f32) -> u16 {
+        (((weight.to_bits() + 0x800) >> 12).saturating_sub(BIAS)).clamp(1, u32::from(u16::MAX)) as u16
     }
 }
 
@@ -125,15 +143,14 @@ impl Cell for Color {
     /// of 16 bits, rounded to nearest.
     #[inline]
     fn fuse(cell: Option<Self>, o: ColorObservation, rule: &ColorRule) -> (Self, ()) {
-        let (before, weight) = cell.map_or(([0; 3], 0.0), |c| (c.rgb, f32::from(c.weight) / 256.0));
+        let (before, weight) = cell.map_or(([0; 3], 0.0), |c| (c.rgb, c.weight()));
         let total = weight + o.weight;
         let gain = o.weight / total;
         let rgb = std::array::from_fn(|k| {
             let (prior, seen) = (f32::from(before[k]), f32::from(o.rgb[k]) * 257.0);
             (prior + gain * (seen - prior)).round() as u16
         });
-        let kept = total.min(rule.w_max).min(255.0) * 256.0;
-        (Self { rgb, weight: (kept.round() as u16).max(1) }, ())
+        (Self { rgb, weight: Self::word(total.min(rule.w_max).min(255.0)) }, ())
     }
 
     fn fuse_run(
@@ -181,5 +198,38 @@ mod tests {
         let rule = ColorRule { w_max: 64.0 };
         let (first, ()) = Color::fuse(None, ColorObservation { rgb: [50; 3], weight: 1e-4 }, &rule);
         assert!(first.weight > 0 && first.rgb8() == [50; 3]);
+    }
+    #[test]
+    fn words_hold_weights() {
+        let word = |w: f32| Color { rgb: [0; 3], weight: Color::word(w) };
+        for w in [0.25, 1.0, 3.0, 64.0, 255.0] {
+            assert_eq!(word(w).weight(), w);
+        }
+        for w in [1e-6, 3.3e-4, 0.1, 17.77] {
+            assert!((word(w).weight() / w - 1.0).abs() <= 1.0 / 4096.0);
+        }
+        let ends = (word(1e-30).weight, word(f32::MIN_POSITIVE).weight, word(1e30).weight);
+        assert_eq!(ends, (1, 1, u16::MAX));
+        assert!((1..u16::MAX).all(|w| {
+            let of = |weight| Color { rgb: [0; 3], weight };
+            of(w).weight() < of(w + 1).weight() && Color::word(of(w).weight()) == w
+        }));
+    }
+
+    #[test]
+    fn a_thousand_small_weights_are_a_mean() {
+        let rule = ColorRule { w_max: 64.0 };
+        for weight in [1e-4f32, 1e-3, 1.0 / 512.0, 0.01] {
+            let (mut cell, mut mean) = (None, [0.0f64; 3]);
+            for i in 0..1000u32 {
+                let rgb = if i < 500 { [200, 10, 0] } else { [100, 10, 255] };
+                mean = std::array::from_fn(|k| mean[k] + f64::from(rgb[k]) / 1000.0);
+                cell = Some(Color::fuse(cell, ColorObservation { rgb, weight }, &rule).0);
+            }
+            let cell = cell.unwrap();
+            // Half a word lost a step, and half of the last of 12 bits of the weight.
+            assert!((0..3).all(|k| (f64::from(cell.rgb8()[k]) - mean[k]).abs() <= 3.0), "{weight} {cell:?}");
+            assert!((cell.weight() / (1000.0 * weight) - 1.0).abs() < 0.05, "{weight} {}", cell.weight());
+        }
     }
 }

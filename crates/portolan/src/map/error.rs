@@ -49,12 +49,38 @@ pub enum MapError {
     /// Bricks would need more memory than they may have.
     #[error(transparent)]
     Full(#[from] BricksFull),
+    /// One scan reaches further than can be searched, whatever memory there is.
+    #[error(
+        "one scan reaches into more than {bricks} bricks of 8 x 8 x 8 cells: limit the range that is used, or make cells larger"
+    )]
+    TooFar {
+        /// Bricks that a scan may touch.
+        bricks: usize,
+    },
     /// The occupancy model is not valid.
     #[error(transparent)]
     Model(#[from] OccupancyModelError),
     /// The fusion filter's settings are not valid.
     #[error(transparent)]
     Rule(#[from] TsdfRuleError),
+}
+
+/// Bricks that one scan may touch at most.
+const MOST_BRICKS: usize = 1 << 26;
+
+/// Bricks that one scan may touch where a store may hold `limit` bytes and a touched one costs `bytes`: many may turn out
+/// to be silent, and the first few are free, but the search ends before it alone takes the memory.
+pub(super) fn most_bricks(limit: usize, bytes: usize) -> usize {
+    (limit / bytes).saturating_add(4096).min(MOST_BRICKS)
+}
+
+/// What a scan gets that touches more than [`most_bricks`] of them.
+pub(super) fn too_many(most: usize, full: BricksFull) -> MapError {
+    if most == MOST_BRICKS || full.limit == usize::MAX {
+        MapError::TooFar { bricks: most }
+    } else {
+        MapError::Full(full)
+    }
 }
 
 /// Dense maps stop here: 2^31 cells are 16 GiB of distances and weights. Callers with less memory check the

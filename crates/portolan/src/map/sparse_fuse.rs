@@ -31,9 +31,11 @@ pub(super) fn union(marked: &[BlockKey<3>], seen: &[(BlockKey<3>, bool)]) -> (Ve
     (keys, parts)
 }
 
-/// The box around a sensor in which pixels without a surface say that space is free, as its diagonal.
-pub(super) fn free_reach(world_from_image: &Pose<3>, image: &RangeImage) -> Vec<Ray> {
-    let farthest = image.values.iter().copied().fold(0.0f32, f32::min);
+/// The box around a sensor in which pixels without a surface say that space is free, as its diagonal. Not those of more than
+/// `longest` metres, which are refused.
+pub(super) fn free_reach(world_from_image: &Pose<3>, image: &RangeImage, longest: f64) -> Vec<Ray> {
+    let used = |v: &f32| f64::from(-v) <= longest;
+    let farthest = image.values.iter().copied().filter(used).fold(0.0f32, f32::min);
     if farthest == 0.0 || matches!(image.projection, Projection::Orthographic { .. }) {
         return Vec::new();
     }
@@ -75,7 +77,10 @@ pub(super) fn fuse<V: LogOddsValue>(
 
 pub(super) fn stats(hits: usize, count: usize, tally: Tally, cells: u64) -> ScanStats {
     let mut stats = ScanStats { scans: 1, cells, hits_outside: tally.hits_outside, ..Default::default() };
-    stats.beams = BeamCounts { hit: hits as u64, max_range: (count - hits) as u64, ..Default::default() };
-    stats.refused.not_finite = tally.unusable;
+    let dropped = tally.refused.total();
+    let hit = (hits as u64).saturating_sub(tally.refused_hits);
+    let max_range = (count as u64).saturating_sub(hit + dropped);
+    stats.beams = BeamCounts { hit, max_range, dropped, ..Default::default() };
+    stats.refused = tally.refused;
     stats
 }

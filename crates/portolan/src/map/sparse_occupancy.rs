@@ -1,13 +1,14 @@
 //! Occupancy of space in bricks: memory only where something was seen.
 
+use super::error::{most_bricks, too_many};
 use super::sparse_fuse::{free_reach, fuse, stats, union};
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
 use crate::cell::{LogOdds8, LogOddsValue, OccupancyModel, Planes};
-use crate::geom::{Aabb, Lattice, Pose};
+use crate::geom::{Aabb, Lattice, Pose, block_cells};
 use crate::scan::{Frame, Origin, PointScan, RangeImage, Scan, ScanStats, SphericalLayout};
-use crate::store::{Bricks, Store};
-use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, Projective, Ray};
+use crate::store::{Bricks, BricksFull, Store};
+use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, LONGEST_RAY, Projective, Ray};
 use std::borrow::Cow;
 
 /// Boxes of more bricks than this are not searched for free space: single readings from far away are cheaper as rays.
@@ -108,17 +109,23 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         self.layout = Some(layout);
     }
 
-    /// Fuses what a sensor delivered at a known pose. A pose that is not rigid is refused and counted.
+    /// Fuses what a sensor delivered at a known pose. A pose that is not rigid is refused and counted, and so is a ray that
+    /// is not finite or longer than 2^20 cells (within the bounds, if there are any).
     ///
     /// # Errors
-    /// [`MapError::Full`] where the limit of memory leaves no room; part of the scan is then fused.
+    /// [`MapError::Full`] where the limit of memory leaves no room; part of the scan is then fused. Also where its rays pass
+    /// more bricks than the limit can ever hold (and 4096 more): nothing is fused then. [`MapError::TooFar`] where they pass
+    /// more than 2^26, whatever the limit. [`MapError::Image`] where an image that is used contradicts itself.
     pub fn integrate(&mut self, world_from_sensor: &Pose<3>, frame: &Frame) -> Result<ScanStats, MapError> {
         if !self.has_place(world_from_sensor) {
             return Ok(ScanStats { refused_poses: 1, ..Default::default() });
         }
         let stats = match frame {
             Frame::Points(scan) => self.points(world_from_sensor, scan)?,
-            Frame::Image(image) => self.image(world_from_sensor, image)?,
+            Frame::Image(image) => {
+                image.check().map_err(MapError::Image)?;
+                self.image(world_from_sensor, image)?
+            }
         };
         Ok(ScanStats { refused: stats.refused + frame.refused(), ..stats })
     }
@@ -149,7 +156,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
         let (common, image) = match &scan.origin {
-            Origin::Common(o) => (world_from_sensor.transform_point(*o), self.organised(scan, *o)),
+            Origin::Common(o) => (world_from_sensor.transform_point(*o), self.organised(scan, *o)?),
             Origin::PerPoint(_) => (world_from_sensor.translation, None),
         };
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
@@ -162,7 +169,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
             None => {
                 let origin = match &scan.origin {
                     Origin::Common(_) => common,
-                    Origin::PerPoint(all) => to_world(all[i]),
+                    Origin::PerPoint(all) => all.get(i).map_or([f64::NAN; 3], |o| to_world(*o)),
                 };
                 Ray { origin, end: to_world(scan.points[i]), hit: true, passes }
             }
@@ -170,20 +177,25 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
     }
 
     /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them.
-    fn organised<'a>(&mut self, scan: &'a PointScan, origin: [f64; 3]) -> Option<Cow<'a, RangeImage>> {
+    fn organised<'a>(
+        &mut self,
+        scan: &'a PointScan,
+        origin: [f64; 3],
+    ) -> Result<Option<Cow<'a, RangeImage>>, MapError> {
         if self.sweep == OccupancySweep::Exact {
-            return None;
+            return Ok(None);
         }
         if let Some(image) = &scan.image {
-            return Some(Cow::Borrowed(image));
+            image.check().map_err(MapError::Image)?;
+            return Ok(Some(Cow::Borrowed(image)));
         }
         if self.layout.is_none() && (self.failed_layouts < 3 || self.sweep == OccupancySweep::Projective) {
             self.layout = SphericalLayout::of(&scan.points, origin);
             self.failed_layouts += u32::from(self.layout.is_none());
         }
-        let image = self.layout.as_ref()?.image(&scan.points, origin);
+        let image = self.layout.as_ref().map(|layout| layout.image(&scan.points, origin));
         // A layout that most points do not fit is that of another sensor.
-        (2 * image.hits() >= scan.points.len()).then_some(Cow::Owned(image))
+        Ok(image.filter(|image| 2 * image.hits() >= scan.points.len()).map(Cow::Owned))
     }
 
     fn image(&mut self, world_from_sensor: &Pose<3>, image: &RangeImage) -> Result<ScanStats, MapError> {
@@ -212,12 +224,19 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
     ) -> Result<ScanStats, MapError> {
         let bounds = self.bounds.as_ref().map(|b| &b.0);
         let passes_by_view = view.is_some();
-        let further = view.map(|(pose, image)| free_reach(pose, image)).unwrap_or_default();
         let lattice = self.store.lattice();
-        let mut tally = self.exact.plan(lattice, bounds, count, &ray, &further);
+        let longest = LONGEST_RAY * lattice.resolution;
+        let further = view.map(|(pose, image)| free_reach(pose, image, longest)).unwrap_or_default();
+        let limit = self.store.limit();
+        let most = most_bricks(limit, size_of::<V>() * block_cells::<3>());
+        let full = BricksFull { limit, bricks: self.store.len(), bytes: self.store.memory_bytes() };
+        let planned = self.exact.plan(lattice, bounds, count, &ray, &further, most);
+        let mut tally = planned.map_err(|_| too_many(most, full))?;
         let view = view.filter(|_| self.exact.reach_bricks() <= PROJECTIVE_BRICKS);
         if view.is_none() && passes_by_view {
-            tally = self.exact.plan(lattice, bounds, count, |i| Ray { passes: true, ..ray(i) }, &[]);
+            let planned =
+                self.exact.plan(lattice, bounds, count, |i| Ray { passes: true, ..ray(i) }, &[], most);
+            tally = planned.map_err(|_| too_many(most, full))?;
         }
         let guard = std::mem::take(&mut self.guard);
         let view = view.map(|(pose, image)| Projective::new(image, pose, self.store.lattice(), guard));
@@ -319,10 +338,17 @@ impl<V: LogOddsValue> MapRepr<3> for SparseOccupancy<V> {
                 Ray { origin, end, hit: b.is_hit(), passes: true }
             })
             .collect();
-        let fused = self
-            .rays(0, rays.len(), None, |i| rays[i])
-            .unwrap_or(ScanStats { scans: 1, ..Default::default() });
-        ScanStats { beams: scan.counts(), refused: scan.refused(), ..fused }
+        let hits = rays.iter().filter(|r| r.hit).count();
+        let mut beams = scan.counts();
+        match self.rays(hits, rays.len(), None, |i| rays[i]) {
+            Ok(fused) => {
+                let refused_hits = (hits as u64).saturating_sub(fused.beams.hit);
+                beams.hit -= refused_hits.min(beams.hit);
+                beams.dropped += refused_hits;
+                ScanStats { beams, refused: scan.refused() + fused.refused, ..fused }
+            }
+            Err(_) => ScanStats { scans: 1, beams, refused: scan.refused(), ..Default::default() },
+        }
     }
 
     fn occupancy(&self, p_world: [f64; 3]) -> Option<f64> {
@@ -501,6 +527,68 @@ mod tests {
         small.set_limit(60_000);
         assert!(matches!(small.integrate(&Pose::IDENTITY, &frame), Err(MapError::Full(_))));
         assert!(small.memory_bytes() <= 70_000 && small.observed_cells() > 0);
+    }
+
+    #[test]
+    fn what_contradicts_itself_is_refused() {
+        for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
+            for (image, why) in crate::scan::broken_images() {
+                let mut map =
+                    Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default(), sweep).unwrap();
+                let mut scan = PointScan::new([[0.0, 0.0, 1.0]], [0.0; 3]);
+                scan.image = Some(image.clone());
+                let got = map.integrate(&Pose::IDENTITY, &Frame::Image(image));
+                assert!(matches!(got, Err(MapError::Image(_))), "{why}");
+                let got = map.integrate(&Pose::IDENTITY, &Frame::Points(scan));
+                // Exact rays do not look at it.
+                assert_eq!(got.is_ok(), sweep == OccupancySweep::Exact, "{why}");
+            }
+        }
+        let mut map = map([0.0; 3]);
+        let mut scan = PointScan::new([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]);
+        scan.origin = Origin::PerPoint(vec![[0.0; 3]]);
+        let stats = map.integrate(&Pose::IDENTITY, &Frame::Points(scan)).unwrap();
+        assert_eq!((stats.refused.not_finite, stats.beams.hit, stats.beams.dropped), (2, 1, 2));
+    }
+
+    #[test]
+    fn readings_that_are_too_far_cost_nothing_and_are_counted() {
+        for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
+            let mut map = Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default(), sweep).unwrap();
+            let mut points = shell(3000);
+            points.extend([[1e6, 0.0, 0.0], [1e7, 1e7, 1e7], [1e20, 0.0, 0.0]]);
+            let mut scan = PointScan::new(points, [0.0; 3]);
+            scan.free_ends = vec![[-1e6, 0.0, 0.0], [0.0, 2.0, 0.0]];
+            let stats = map.integrate(&Pose::IDENTITY, &Frame::Points(scan)).unwrap();
+            assert_eq!((stats.refused.too_far, stats.refused.total()), (4, 4));
+            assert_eq!((stats.beams.hit, stats.beams.max_range, stats.beams.dropped), (3000, 1, 4));
+            assert!(map.store().len() < 1000, "{}", map.store().len());
+            let values = vec![2.0, -1e6, 1e6, 2.0];
+            let image = RangeImage {
+                projection: Projection::Pinhole(Pinhole { fx: 2.0, fy: 2.0, cx: 0.5, cy: 0.5 }),
+                columns: 2,
+                rows: 2,
+                values,
+                colors: Vec::new(),
+                refused: RefusedBeams::default(),
+            };
+            let stats = map.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap();
+            assert_eq!((stats.refused.too_far, stats.beams.hit, stats.beams.dropped), (2, 2, 2));
+        }
+    }
+
+    #[test]
+    fn rays_that_pass_more_than_the_limit_holds_end_early() {
+        let ends = (0..20).map(|i| {
+            let a = f64::from(i);
+            [5000.0 * a.cos(), 5000.0 * a.sin(), 0.0]
+        });
+        let ends: Vec<[f64; 3]> = ends.collect();
+        let mut small = map([0.0; 3]);
+        small.set_limit(60_000);
+        let full = small.integrate_points(&ends, [0.0; 3]);
+        assert!(matches!(full, Err(MapError::Full(_))));
+        assert!(small.store().is_empty() && small.exact.keys().is_empty());
     }
 
     #[test]

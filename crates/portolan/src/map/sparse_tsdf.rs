@@ -1,6 +1,6 @@
 //! Truncated signed distance fields of space in bricks.
 
-use super::error::check_lattice;
+use super::error::{check_lattice, most_bricks, too_many};
 use super::sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
 use super::{Abilities, MapError};
 use crate::answer::Answer;
@@ -134,8 +134,9 @@ impl SparseTsdf {
     /// threads. A pose that is not rigid or has no cell refuses the scan, which is counted.
     ///
     /// # Errors
-    /// [`MapError::Full`] where a brick would pass the limit: what was fused before it stays. [`MapError::Image`] where an
-    /// image contradicts itself.
+    /// [`MapError::Full`] where a brick would pass the limit: what was fused before it stays. Also where the search for bricks
+    /// alone would take more: nothing is fused then. [`MapError::TooFar`] where it would never end. [`MapError::Image`] where
+    /// an image contradicts itself.
     pub fn integrate(&mut self, world_from_sensor: &Pose<3>, frame: &Frame) -> Result<ScanStats, MapError> {
         self.events.clear();
         if !world_from_sensor.is_rigid() || self.lattice().cell_of(world_from_sensor.translation).is_none() {
@@ -227,10 +228,12 @@ impl SparseTsdf {
         world_from_image: &Pose<3>,
         image: &RangeImage,
     ) -> Result<ScanStats, MapError> {
-        let (lattice, how) = (*self.lattice(), self.how());
+        // A key, its octants, and what the search keeps of them.
+        let most = most_bricks(self.limit, 1024);
+        let (lattice, how) = (*self.lattice(), (self.config.color, most));
         let sweep = &mut self.sweeps.projective;
         let counted = sweep.plan(image, world_from_image, &lattice, self.bounds.as_ref(), how);
-        let (beams, cleaned) = counted.map_err(|e| self.plan_error(e))?;
+        let (beams, cleaned) = counted.map_err(|e| self.plan_error(e, most))?;
         let mut stats = self.fuse(|sweeps| Planned::Image(&sweeps.projective), beams)?;
         stats.refused = image.refused;
         stats.refused += cleaned;
@@ -242,10 +245,11 @@ impl SparseTsdf {
     }
 
     fn integrate_rays(&mut self, world_from_scan: &Pose<3>, scan: &PointScan) -> Result<ScanStats, MapError> {
-        let (lattice, how) = (*self.lattice(), self.how());
+        let most = most_bricks(self.limit, PointRays::BLOCK_BYTES);
+        let (lattice, how) = (*self.lattice(), (self.config.color, most));
         let sweep = &mut self.sweeps.rays;
         let counted = sweep.plan(scan, world_from_scan, &lattice, self.bounds.as_ref(), how);
-        let (beams, cleaned) = counted.map_err(|e| self.plan_error(e))?;
+        let (beams, cleaned) = counted.map_err(|e| self.plan_error(e, most))?;
         let mut stats = self.fuse(|sweeps| Planned::Rays(&sweeps.rays), beams)?;
         stats.refused = scan.refused;
         stats.refused += cleaned;
@@ -256,15 +260,10 @@ impl SparseTsdf {
         Ok(stats)
     }
 
-    /// Whether colours are wanted, and how many blocks a scan may see at most.
-    fn how(&self) -> (bool, usize) {
-        (self.config.color, most_blocks(self.limit))
-    }
-
-    fn plan_error(&self, error: PlanError) -> MapError {
+    fn plan_error(&self, error: PlanError, most: usize) -> MapError {
         match error {
             PlanError::BadImage(why) => MapError::Image(why),
-            PlanError::TooManyBlocks => MapError::Full(self.full()),
+            PlanError::TooManyBlocks => too_many(most, self.full()),
         }
     }
 
@@ -431,12 +430,6 @@ impl SparseTsdf {
     }
 }
 
-/// Blocks that one scan may see, of which many may turn out to be silent: the search for them ends before their list alone
-/// takes the memory.
-fn most_blocks(limit: usize) -> usize {
-    (limit / 1024).saturating_add(4096).min(1 << 26)
-}
-
 /// What the planned scan will do to the watched cells.
 fn look(
     sweep: &Planned<'_>,
@@ -456,4 +449,42 @@ fn look(
         }
     }
     events
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::{Pinhole, Projection, RefusedBeams};
+
+    #[test]
+    fn a_scan_without_end_is_told_in_its_own_words() {
+        // Pixels that look almost aside: what they see is a metre deep and a hundred thousand kilometres wide.
+        let image = RangeImage {
+            projection: Projection::Pinhole(Pinhole { fx: 1e-8, fy: 1e-8, cx: 0.5, cy: 0.5 }),
+            columns: 2,
+            rows: 2,
+            values: vec![1.0; 4],
+            colors: Vec::new(),
+            refused: RefusedBeams::default(),
+        };
+        let mut map = SparseTsdf::new(SparseTsdfConfig::default()).unwrap();
+        let error = map.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap_err();
+        assert!(matches!(error, MapError::TooFar { .. }), "{error}");
+        assert!(map.store().is_empty());
+    }
+
+    #[test]
+    fn rays_take_no_more_memory_than_the_limit_allows_for() {
+        let config = SparseTsdfConfig { max_range: 2000.0, sweep: PointSweep::Rays, ..Default::default() };
+        let points = (0..20).map(|i| {
+            let a = 0.7 * i as f32;
+            [1900.0 * a.cos(), 1900.0 * a.sin(), 0.0]
+        });
+        let frame = Frame::Points(PointScan::new(points, [0.0; 3]));
+        let mut map = SparseTsdf::new(config).unwrap();
+        map.set_limit(1 << 20);
+        let error = map.integrate(&Pose::IDENTITY, &frame).unwrap_err();
+        assert!(matches!(error, MapError::Full(_)), "{error}");
+        assert!(map.sweeps.rays.blocks().len() <= (1 << 20) / 8192 + 4097);
+    }
 }

@@ -1,6 +1,6 @@
 //! What of a frame is used: limits of range, and the robot's own body.
 
-use super::{BeamCounts, Frame, Origin, PointScan, Projection, RangeImage};
+use super::{BeamCounts, Frame, Origin, PointScan, RangeImage};
 use crate::geom::Aabb;
 use crate::geom::vector::{along, distance, norm, sub};
 
@@ -29,6 +29,9 @@ impl Body {
 }
 
 /// Which readings of a frame are used. The default uses all.
+///
+/// Ranges are measured from a ray's own origin. Parallel rays have none that says anything: the limits of range do not
+/// apply to them (to an image of parallel rays, and to the points beside one), only the body does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameFilter {
     /// Readings up to this range are refused (metres).
@@ -49,6 +52,7 @@ impl Default for FrameFilter {
 #[derive(Clone, Copy, PartialEq)]
 enum Use {
     Keep,
+    NotFinite,
     TooNear,
     /// Free up to the limit, and what is behind it is not used.
     Cut,
@@ -58,7 +62,10 @@ enum Use {
 impl FrameFilter {
     /// The frame with what is used, and what its readings were: the self hits are those that were left out.
     ///
-    /// Refused readings are counted in the frame itself. Times and colours stay with their points.
+    /// Refused readings are counted in the frame itself. Times and colours stay with their points; the image beside points
+    /// is filtered by the same rules. Bodies are compared with points relative to a common origin, else with the points
+    /// themselves. A point beyond the largest range that has an origin of its own is dropped: there is no place for its free
+    /// end. An image that contradicts itself ([`RangeImage::check`]) stays as it is, and is not counted: maps refuse it.
     pub fn apply(&self, frame: Frame) -> (Frame, BeamCounts) {
         let mut counts = BeamCounts::default();
         let frame = match frame {
@@ -72,12 +79,15 @@ impl FrameFilter {
         self.min_range <= 0.0 && self.max_range == f64::INFINITY && self.body.is_empty()
     }
 
-    fn decide(&self, range: f64, p_sensor: [f64; 3]) -> Use {
-        if range <= self.min_range {
+    /// `range` is `None` where no limit applies.
+    fn decide(&self, range: Option<f64>, p_sensor: [f64; 3]) -> Use {
+        if !(range.unwrap_or(0.0).is_finite() && p_sensor.iter().all(|v| v.is_finite())) {
+            Use::NotFinite
+        } else if range.is_some_and(|r| r <= self.min_range) {
             Use::TooNear
         } else if self.body.iter().any(|b| b.contains(p_sensor)) {
             Use::Body
-        } else if range > self.max_range {
+        } else if range.is_some_and(|r| r > self.max_range) {
             Use::Cut
         } else {
             Use::Keep
@@ -85,36 +95,43 @@ impl FrameFilter {
     }
 
     fn image(&self, mut image: RangeImage, counts: &mut BeamCounts) -> RangeImage {
-        let orthographic = matches!(image.projection, Projection::Orthographic { .. });
+        if image.check().is_err() {
+            return image;
+        }
+        let parallel = image.has_parallel_rays();
         for i in 0..image.values.len() {
             let value = image.values[i];
-            if value > 0.0 && !self.uses_all() {
-                let p = image.point(i % image.columns, i / image.columns, f64::from(value));
-                // Parallel rays have no origin to be far from: their values count.
-                let range = if orthographic { f64::from(value) } else { norm(p) };
-                image.values[i] = match self.decide(range, p) {
-                    Use::Keep => value,
-                    Use::TooNear => {
-                        image.refused.too_near += 1;
-                        0.0
-                    }
-                    Use::Body => {
-                        counts.self_hit += 1;
-                        0.0
-                    }
-                    Use::Cut => -(f64::from(value) * self.max_range / range) as f32,
-                };
-                if image.values[i] == 0.0 {
-                    continue;
+            let p = image.point(i % image.columns, i / image.columns, f64::from(value));
+            let range = norm(p);
+            let what = match value {
+                v if v > 0.0 && !self.uses_all() => self.decide((!parallel).then_some(range), p),
+                v if v.is_finite() => Use::Keep,
+                _ => Use::NotFinite,
+            };
+            image.values[i] = match what {
+                Use::Keep => value,
+                Use::Cut => -(f64::from(value) * self.max_range / range) as f32,
+                // What is not finite stays where all is used, for the map to refuse.
+                Use::NotFinite if self.uses_all() => value,
+                Use::NotFinite | Use::TooNear | Use::Body => 0.0,
+            };
+            match what {
+                Use::NotFinite => {
+                    image.refused.not_finite += u64::from(!self.uses_all());
+                    counts.dropped += 1;
                 }
-            }
-            match image.values[i] {
-                v if v > 0.0 => counts.hit += 1,
-                v if v < 0.0 => counts.max_range += 1,
-                _ => counts.dropped += 1,
+                Use::TooNear => {
+                    image.refused.too_near += 1;
+                    counts.dropped += 1;
+                }
+                Use::Body => counts.self_hit += 1,
+                Use::Cut => counts.max_range += 1,
+                Use::Keep if value > 0.0 => counts.hit += 1,
+                Use::Keep if value < 0.0 => counts.max_range += 1,
+                // What was refused before is among these.
+                Use::Keep => counts.dropped += 1,
             }
         }
-        counts.dropped += image.refused.too_near;
         image
     }
 
@@ -122,41 +139,62 @@ impl FrameFilter {
         counts.max_range += scan.free_ends.len() as u64;
         counts.dropped += scan.refused.total();
         if self.uses_all() {
-            counts.hit += scan.points.len() as u64;
+            let origins = match &scan.origin {
+                Origin::Common(_) => scan.points.len(),
+                Origin::PerPoint(all) => all.len().min(scan.points.len()),
+            };
+            counts.hit += origins as u64;
+            counts.dropped += (scan.points.len() - origins) as u64;
             return scan;
         }
-        // Rows and columns are of all readings: they are made anew from those that are used.
-        scan.image = None;
+        let parallel = scan.image.as_ref().is_some_and(RangeImage::has_parallel_rays);
+        scan.image = scan.image.map(|image| {
+            // The same readings as the points, which are counted.
+            let refused = image.refused;
+            RangeImage { refused, ..self.image(image, &mut BeamCounts::default()) }
+        });
         let mut kept = vec![false; scan.points.len()];
         for (i, keep) in kept.iter_mut().enumerate() {
-            let (p, origin) = (scan.points[i].map(f64::from), scan.origin_of(i));
+            let p = scan.points[i].map(f64::from);
+            let common = matches!(scan.origin, Origin::Common(_));
+            let origin = scan.origin_of(i).unwrap_or([f64::NAN; 3]);
             let offset = sub(p, origin);
             let range = norm(offset);
-            match self.decide(range, offset) {
+            let what = if range.is_finite() {
+                self.decide((!parallel).then_some(range), if common { offset } else { p })
+            } else {
+                Use::NotFinite
+            };
+            match what {
                 Use::Keep => {
                     *keep = true;
                     counts.hit += 1;
+                }
+                Use::NotFinite => {
+                    scan.refused.not_finite += 1;
+                    counts.dropped += 1;
                 }
                 Use::TooNear => {
                     scan.refused.too_near += 1;
                     counts.dropped += 1;
                 }
                 Use::Body => counts.self_hit += 1,
-                Use::Cut => {
+                // Only rays of the common origin can be told as free ends.
+                Use::Cut if common => {
                     counts.max_range += 1;
-                    // Only rays of the common origin can be told as free ends.
-                    if matches!(scan.origin, Origin::Common(_)) {
-                        let end = along(origin, offset, self.max_range / range);
-                        scan.free_ends.push(end.map(|v| v as f32));
-                    }
+                    let end = along(origin, offset, self.max_range / range);
+                    scan.free_ends.push(end.map(|v| v as f32));
                 }
+                Use::Cut => counts.dropped += 1,
             }
         }
         retain(&mut scan.points, &kept);
         retain(&mut scan.times, &kept);
         retain(&mut scan.colors, &kept);
         if let Origin::PerPoint(origins) = &mut scan.origin {
-            retain(origins, &kept);
+            // Points without an origin were at the end, and are gone.
+            let mut marks = kept.iter();
+            origins.retain(|_| marks.next().copied().unwrap_or(false));
         }
         scan
     }
@@ -173,7 +211,7 @@ fn retain<T>(list: &mut Vec<T>, kept: &[bool]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::{Pinhole, RefusedBeams};
+    use crate::scan::{Orthographic, Pinhole, Projection, RefusedBeams};
 
     fn filter() -> FrameFilter {
         let body = vec![
@@ -208,7 +246,8 @@ mod tests {
             rows: 1,
             values: vec![1.0, 2.0, 0.0, 3.0, -1.5],
             colors: Vec::new(),
-            refused: RefusedBeams::default(),
+            // The pixel without a value was refused before.
+            refused: RefusedBeams { too_near: 1, ..Default::default() },
         };
         // Pixel 1 is (2, 0, 2), range 2.83; pixel 3 (9, 0, 3), range 9.49.
         let near = FrameFilter { min_range: 1.5, max_range: 4.0, body: Vec::new() };
@@ -218,7 +257,86 @@ mod tests {
         assert_eq!((image.values[0], image.values[1], image.values[4]), (0.0, 2.0, -1.5));
         let cut = -f64::from(image.values[3]);
         assert!((norm([3.0 * cut, 0.0, cut]) - 4.0).abs() < 1e-6);
-        assert_eq!(image.refused.too_near, 1);
+        assert_eq!(image.refused.too_near, 2);
         assert_eq!(counts, BeamCounts { hit: 1, max_range: 2, no_return: 0, dropped: 2, self_hit: 0 });
+    }
+    fn ground(values: Vec<f32>) -> RangeImage {
+        RangeImage {
+            projection: Projection::Orthographic {
+                rays: Orthographic { first: [0.0; 2], step: [0.5; 2] },
+                top: 10.0,
+            },
+            columns: values.len(),
+            rows: 1,
+            values,
+            colors: Vec::new(),
+            refused: RefusedBeams::default(),
+        }
+    }
+
+    #[test]
+    fn the_image_beside_points_is_filtered_with_them() {
+        let image = RangeImage {
+            projection: Projection::Pinhole(Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 }),
+            ..ground(vec![1.0, 0.25, 3.0, 0.0])
+        };
+        let origin = [5.0, 0.0, 0.0];
+        let points: Vec<_> =
+            image.points().map(|(_, p)| [p[0] + 5.0, p[1], p[2]].map(|v| v as f32)).collect();
+        let mut scan = PointScan::new(points, origin);
+        scan.image = Some(image);
+        // Points at 1, 0.35 and 6.7 m.
+        let (Frame::Points(scan), counts) = filter().apply(Frame::Points(scan)) else { panic!("points") };
+        let image = scan.image.unwrap();
+        assert_eq!((&image.values[..2], image.values[3]), (&[1.0, 0.0][..], 0.0));
+        assert!((norm([2.0, 0.0, 1.0]) * f64::from(-image.values[2]) - 4.0).abs() < 1e-6);
+        assert_eq!((scan.points.len(), scan.free_ends.len()), (1, 1));
+        assert_eq!((scan.refused.too_near, image.refused.total()), (1, 0));
+        assert_eq!(counts, BeamCounts { hit: 1, max_range: 1, dropped: 1, ..Default::default() });
+    }
+
+    #[test]
+    fn parallel_rays_have_no_limits_of_range_but_a_body() {
+        // At x = 0 and 1 m, z = 9.7 m and 1 m; the second of three in the body.
+        let image = ground(vec![0.3, 9.0, 9.0]);
+        let body = vec![Body::Box(Aabb::new([0.4, -0.1, 0.9], [0.6, 0.1, 1.1]))];
+        let filter = FrameFilter { min_range: 0.5, max_range: 4.0, body };
+        let want = BeamCounts { hit: 2, self_hit: 1, ..Default::default() };
+        let (Frame::Image(kept), counts) = filter.apply(Frame::Image(image.clone())) else { panic!("image") };
+        assert_eq!((kept.values, counts), (vec![0.3, 0.0, 9.0], want));
+        let ends = image.points().map(|(_, p)| p.map(|v| v as f32));
+        let mut scan = PointScan::new(ends, [0.0, 0.0, 100.0]);
+        scan.origin = Origin::PerPoint(image.readings().map(|(o, ..)| o.map(|v| v as f32)).collect());
+        scan.image = Some(image);
+        let (Frame::Points(kept), counts) = filter.apply(Frame::Points(scan)) else { panic!("points") };
+        assert_eq!((kept.image.unwrap().values, counts), (vec![0.3, 0.0, 9.0], want));
+        assert_eq!(kept.origin, Origin::PerPoint(vec![[0.0, 0.0, 10.0], [1.0, 0.0, 10.0]]));
+    }
+
+    #[test]
+    fn origins_of_their_own_cut_nothing_free_and_may_be_missing() {
+        let mut scan =
+            PointScan::new([[0.0, 0.0, 1.0], [0.0, 9.0, 0.0], [0.5, 0.0, 1.0], [3.0, 0.0, 0.0]], [0.0; 3]);
+        scan.origin = Origin::PerPoint(vec![[0.0; 3], [0.0, 1.0, 0.0], [0.5, 0.0, 3.0]]);
+        let (all, counts) = FrameFilter::default().apply(Frame::Points(scan.clone()));
+        assert_eq!((all, counts.hit, counts.dropped), (Frame::Points(scan.clone()), 3, 1));
+        let (Frame::Points(kept), counts) = filter().apply(Frame::Points(scan)) else { panic!("points") };
+        assert_eq!((kept.points, kept.origin), (vec![[0.0, 0.0, 1.0]], Origin::PerPoint(vec![[0.0; 3]])));
+        assert_eq!((kept.refused.not_finite, kept.free_ends.len()), (1, 0));
+        assert_eq!(counts, BeamCounts { hit: 1, dropped: 2, self_hit: 1, ..Default::default() });
+    }
+
+    #[test]
+    fn images_that_contradict_themselves_pass_untouched() {
+        for (image, why) in crate::scan::broken_images() {
+            let (frame, counts) = filter().apply(Frame::Image(image.clone()));
+            // Values that are NaN are not equal to themselves.
+            let words = |f: &Frame| format!("{f:?}");
+            assert_eq!((words(&frame), counts.total()), (words(&Frame::Image(image.clone())), 0), "{why}");
+            let mut scan = PointScan::new([[0.0, 0.0, 1.0]], [0.0; 3]);
+            scan.image = Some(image);
+            let (after, counts) = filter().apply(Frame::Points(scan.clone()));
+            assert_eq!((words(&after), counts.hit), (words(&Frame::Points(scan)), 1), "{why}");
+        }
     }
 }

@@ -130,7 +130,7 @@ mod tests {
                 (Dropped, 0.0)
             ]
         );
-        assert_eq!(scan.refused(), RefusedBeams { not_finite: 1, negative: 1, too_near: 2 });
+        assert_eq!(scan.refused(), RefusedBeams { not_finite: 1, negative: 1, too_near: 2, too_far: 0 });
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub(crate) use incidence::{MAX_OPENING, MAX_SLOPE, connected};
 pub use laser::RangeLimits;
 pub use organised::OrganisedPoints;
 pub use point_scan::{Frame, Origin, PointScan};
+#[cfg(test)]
+pub(crate) use range_image::testing::broken as broken_images;
 pub use range_image::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
 pub use range_surface::orthographic_image;
 pub use record::{BeamOrder, Scan};

@@ -7,7 +7,8 @@ use super::{RangeImage, RefusedBeams};
 pub enum Origin {
     /// All in one point (metres).
     Common([f64; 3]),
-    /// Each in its own point (metres): a sensor that moved while it scanned, or parallel rays.
+    /// Each in its own point (metres): a sensor that moved while it scanned, or parallel rays. Points beyond the end of
+    /// this list have no origin: maps refuse and count them as not finite.
     PerPoint(Vec<[f32; 3]>),
 }
 
@@ -59,12 +60,12 @@ impl PointScan {
         }
     }
 
-    /// The origin of point `i`.
+    /// The origin of point `i`; `None` where the scan gives it none.
     #[inline(always)]
-    pub fn origin_of(&self, i: usize) -> [f64; 3] {
+    pub fn origin_of(&self, i: usize) -> Option<[f64; 3]> {
         match &self.origin {
-            Origin::Common(o) => *o,
-            Origin::PerPoint(all) => all[i].map(f64::from),
+            Origin::Common(o) => Some(*o),
+            Origin::PerPoint(all) => all.get(i).map(|o| o.map(f64::from)),
         }
     }
 }

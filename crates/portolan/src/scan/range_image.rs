@@ -73,6 +73,54 @@ pub struct RangeImage {
 }
 
 impl RangeImage {
+    /// Whether rows, columns, values and rays fit together, so that every pixel has a ray. Says why not. O(rows).
+    ///
+    /// What maps are given is checked: an image that fails is refused, and nothing of it is used. Its values may be
+    /// anything.
+    ///
+    /// # Errors
+    /// What contradicts the rest, in words.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let cells = self.columns.checked_mul(self.rows).unwrap_or(usize::MAX);
+        let fits = |holds: bool, why: &'static str| if holds { Ok(()) } else { Err(why) };
+        fits(cells > 0, "it has no pixels")?;
+        let largest = self.columns.max(self.rows);
+        fits(
+            largest <= 1 << 20 && cells <= 1 << 28,
+            "it has more than 2^20 rows or columns, or 2^28 pixels",
+        )?;
+        fits(self.values.len() == cells, "its values are not one per pixel")?;
+        fits(self.colors.is_empty() || self.colors.len() == cells, "its colours are not one per pixel")?;
+        match &self.projection {
+            Projection::Pinhole(c) => {
+                fits(c.fx.is_normal() && c.fy.is_normal(), "a focal length is 0 or not finite")?;
+                fits(c.cx.is_finite() && c.cy.is_finite(), "its principal point is not finite")
+            }
+            Projection::Spherical(s) => {
+                fits(
+                    s.elevations.len() == self.rows && self.rows <= usize::from(u16::MAX),
+                    "its elevations are not one per row",
+                )?;
+                fits(
+                    s.elevations.iter().all(|e| e.abs() < 1.58),
+                    "an elevation is no angle up to 90 degrees",
+                )?;
+                fits(s.elevations.windows(2).all(|w| w[0] > w[1]), "its elevations do not descend")?;
+                fits(
+                    s.first_azimuth.is_finite() && s.azimuth_step.is_normal(),
+                    "its azimuths are not finite, or do not differ",
+                )?;
+                // Half a column for rounding.
+                let turn = std::f64::consts::TAU * 1.0005 + 0.5 * s.azimuth_step.abs();
+                fits(self.columns as f64 * s.azimuth_step.abs() < turn, "its columns go round more than once")
+            }
+            Projection::Orthographic { rays, top } => {
+                fits(rays.step.iter().all(|s| s.is_normal()), "a step between its rays is 0 or not finite")?;
+                fits(rays.first.iter().chain([top]).all(|v| v.is_finite()), "its rays are not finite")
+            }
+        }
+    }
+
     /// The unit of a pixel's value in the sensor's frame: a surface of value `v` lies at `ray * v` (pinhole, spherical).
     /// Pixel coordinates may lie between pixels. For parallel rays use [`RangeImage::point`].
     #[inline]
@@ -133,9 +181,76 @@ impl RangeImage {
     }
 }
 
+/// Images that contradict themselves, one way each.
+#[cfg(test)]
+pub(crate) mod testing {
+    use super::*;
+
+    /// One that does not.
+    pub(crate) fn whole() -> RangeImage {
+        RangeImage {
+            projection: Projection::Pinhole(Pinhole { fx: 4.0, fy: 4.0, cx: 1.0, cy: 0.5 }),
+            columns: 3,
+            rows: 2,
+            values: vec![1.0, 2.0, -1.0, 0.0, 1.5, f32::NAN],
+            colors: vec![[9; 3]; 6],
+            refused: RefusedBeams::default(),
+        }
+    }
+
+    pub(crate) fn broken() -> Vec<(RangeImage, &'static str)> {
+        let mut all = Vec::new();
+        let mut add = |why, change: &dyn Fn(&mut RangeImage)| {
+            let mut image = whole();
+            change(&mut image);
+            all.push((image, why));
+        };
+        add("0x0", &|i| (i.columns, i.rows, i.values, i.colors) = (0, 0, Vec::new(), Vec::new()));
+        add("no columns", &|i| i.columns = 0);
+        add("too few values", &|i| i.values.truncate(5));
+        add("too many values", &|i| i.values.push(1.0));
+        add("columns times rows overflows", &|i| (i.columns, i.rows) = (usize::MAX, 2));
+        add("colours", &|i| i.colors.truncate(4));
+        for (fx, cx) in [(0.0, 1.0), (f64::NAN, 1.0), (f64::INFINITY, 1.0), (4.0, f64::NAN)] {
+            add("pinhole", &|i| i.projection = Projection::Pinhole(Pinhole { fx, fy: 4.0, cx, cy: 0.5 }));
+        }
+        for (elevations, azimuth_step) in [
+            (vec![], 0.1),
+            (vec![0.1], 0.1),
+            (vec![0.1, 0.1], 0.1),
+            (vec![0.1, f32::NAN], 0.1),
+            (vec![0.1, 0.0], 0.0),
+            (vec![0.1, 0.0], f64::NAN),
+            (vec![0.1, 0.0], 4.0),
+        ] {
+            add("spherical", &|i| {
+                let elevations = elevations.clone();
+                i.projection =
+                    Projection::Spherical(Spherical { elevations, first_azimuth: 0.0, azimuth_step });
+            });
+        }
+        for (step, top) in [(0.0, 1.0), (f64::INFINITY, 1.0), (0.1, f64::NAN)] {
+            add("orthographic", &|i| {
+                let rays = Orthographic { first: [0.0; 2], step: [step, 0.1] };
+                i.projection = Projection::Orthographic { rays, top };
+            });
+        }
+        all
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::testing::{broken, whole};
     use super::*;
+
+    #[test]
+    fn images_that_contradict_themselves_are_told() {
+        for (image, why) in broken() {
+            assert!(image.check().is_err(), "{why}");
+        }
+        assert_eq!(whole().check(), Ok(()));
+    }
 
     #[test]
     fn pixels_look_where_the_projection_says() {

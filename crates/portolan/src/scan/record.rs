@@ -193,7 +193,7 @@ mod tests {
             beam(-1.0, 1.0),
             beam(1.0, f64::NAN),
         ]);
-        assert_eq!(scan.refused(), RefusedBeams { not_finite: 3, negative: 1, too_near: 0 });
+        assert_eq!(scan.refused(), RefusedBeams { not_finite: 3, negative: 1, ..Default::default() });
         assert_eq!(scan.counts(), BeamCounts { hit: 1, dropped: 4, ..Default::default() });
         assert_eq!(scan.beam(0).direction, [1.0, 0.0, 0.0]);
         assert_eq!(scan.reach(), 1.0);

@@ -55,12 +55,14 @@ pub struct RefusedBeams {
     pub negative: u64,
     /// Nearer than the caller's minimum range (zero readings among them).
     pub too_near: u64,
+    /// Further than a map can follow: no cell has such an index, or the ray passes too many cells.
+    pub too_far: u64,
 }
 
 impl RefusedBeams {
     /// All refused readings.
     pub fn total(&self) -> u64 {
-        self.not_finite + self.negative + self.too_near
+        self.not_finite + self.negative + self.too_near + self.too_far
     }
 }
 
@@ -77,6 +79,7 @@ impl std::ops::AddAssign for RefusedBeams {
         self.not_finite += o.not_finite;
         self.negative += o.negative;
         self.too_near += o.too_near;
+        self.too_far += o.too_far;
     }
 }
 
@@ -105,5 +108,16 @@ impl std::ops::AddAssign for ScanStats {
         self.refused += o.refused;
         self.cells += o.cells;
         self.hits_outside += o.hits_outside;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cause_is_in_the_sum() {
+        let one = RefusedBeams { not_finite: 1, negative: 2, too_near: 4, too_far: 8 };
+        assert_eq!((one.total(), (one + one).total()), (15, 30));
     }
 }

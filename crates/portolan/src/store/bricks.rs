@@ -60,6 +60,11 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
         self.limit = bytes;
     }
 
+    /// Bytes allowed; `usize::MAX`: as many as there are.
+    pub fn limit(&self) -> usize {
+        self.limit
+    }
+
     /// Number of bricks.
     pub fn len(&self) -> usize {
         self.bricks.len()

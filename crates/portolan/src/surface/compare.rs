@@ -61,13 +61,16 @@ pub struct SurfaceComparison {
     pub f_scores: Vec<f64>,
     /// Points of the reference that were left out.
     pub cropped: usize,
+    /// Triangles and points of both that were not looked at, since they have a coordinate that is not finite.
+    pub unusable: usize,
 }
 
 /// Compares the surface of a map with a reference: distances between evenly spread points of the one and the nearest
 /// triangle (or point) of the other, both ways. Only points of the reference that `keep` wants are measured, so that
 /// what a sensor could not see need not count.
 ///
-/// `None` where a surface has no area or point, or nothing of the reference is kept. Deterministic.
+/// What is not finite is skipped and counted. `None` where a surface has no area or point, or nothing of the reference
+/// is kept. Deterministic.
 /// O((samples + elements) log elements).
 pub fn compare_surfaces(
     map: &Mesh,
@@ -81,6 +84,11 @@ pub fn compare_surfaces(
             (NearestSurface::of_points(origin, points), thinned(origin, points, settings.samples))
         }
     };
+    let unusable = unusable_triangles(map)
+        + match reference {
+            Reference::Mesh(mesh) => unusable_triangles(mesh),
+            Reference::Points { points, .. } => points.iter().filter(|p| !is_finite(p)).count(),
+        };
     let accuracy = distances(&area_samples(map, settings.samples), &index, settings)?;
     let all = points.len();
     points.retain(|p| keep(*p));
@@ -89,19 +97,29 @@ pub fn compare_surfaces(
         if precision + recall > 0.0 { 2.0 * precision * recall / (precision + recall) } else { 0.0 }
     });
     let f_scores = f_scores.collect();
-    Some(SurfaceComparison { accuracy, completeness, f_scores, cropped: all - points.len() })
+    Some(SurfaceComparison { accuracy, completeness, f_scores, cropped: all - points.len(), unusable })
+}
+
+fn is_finite(p: &[f32; 3]) -> bool {
+    p.iter().all(|v| v.is_finite())
+}
+
+fn unusable_triangles(mesh: &Mesh) -> usize {
+    let usable = |t: &[u32; 3]| t.iter().all(|&v| is_finite(&mesh.vertices[v as usize]));
+    mesh.triangles.iter().filter(|t| !usable(t)).count()
 }
 
 /// `count` points of a mesh (world), as many on each piece of surface as its area asks for: one per equal share of the
-/// area in the order of the triangles, placed inside its triangle by a low-discrepancy sequence. None where the mesh
-/// has no area.
+/// area in the order of the triangles, placed inside its triangle by a low-discrepancy sequence. Triangles with a corner
+/// that is not finite have no area. None where the mesh has none.
 pub fn area_samples(mesh: &Mesh, count: usize) -> Vec<[f64; 3]> {
     let areas: Vec<f64> = mesh
         .triangles
         .iter()
         .map(|&t| {
             let [a, b, c] = mesh.corners_world(t);
-            0.5 * norm(cross3(sub(b, a), sub(c, a)))
+            let area = 0.5 * norm(cross3(sub(b, a), sub(c, a)));
+            if area.is_finite() { area } else { 0.0 }
         })
         .collect();
     let total: f64 = areas.iter().sum();
@@ -125,11 +143,12 @@ pub fn area_samples(mesh: &Mesh, count: usize) -> Vec<[f64; 3]> {
     samples
 }
 
-/// At most `count` of the points (world), evenly taken.
+/// At most `count` of the finite points (world), evenly taken.
 fn thinned(origin: [f64; 3], points: &[[f32; 3]], count: usize) -> Vec<[f64; 3]> {
-    let taken = count.min(points.len());
+    let finite: Vec<&[f32; 3]> = points.iter().filter(|p| is_finite(p)).collect();
+    let taken = count.min(finite.len());
     let world = |i: usize| -> [f64; 3] {
-        let p = points[(i as u128 * points.len() as u128 / taken as u128) as usize];
+        let p = finite[(i as u128 * finite.len() as u128 / taken as u128) as usize];
         std::array::from_fn(|k| origin[k] + f64::from(p[k]))
     };
     (0..taken).map(world).collect()
@@ -249,6 +268,36 @@ mod tests {
         assert_eq!(seen.cropped + seen.completeness.samples, 40_000);
         assert!(compare_surfaces(&map, Reference::Mesh(&truth), &settings, |_| false).is_none());
         assert!(compare_surfaces(&Mesh::default(), Reference::Mesh(&truth), &settings, |_| true).is_none());
+    }
+
+    #[test]
+    fn what_is_not_finite_is_skipped_and_counted() {
+        let settings = CompareSettings { samples: 5000, ..Default::default() };
+        let (map, truth) = (plane(0.015, 1.0), plane(0.0, 2.0));
+        let want = compare_surfaces(&map, Reference::Mesh(&truth), &settings, |_| true).unwrap();
+        assert_eq!(want.unusable, 0);
+        let torn = |mesh: &Mesh| {
+            let mut mesh = mesh.clone();
+            mesh.vertices.push([0.0, f32::NAN, 0.0]);
+            // First, last and in between: the samples must not shift.
+            mesh.triangles.insert(0, [0, 1, 4]);
+            mesh.triangles.insert(2, [4, 4, 4]);
+            mesh.triangles.push([0, 4, 3]);
+            mesh
+        };
+        let got = compare_surfaces(&torn(&map), Reference::Mesh(&torn(&truth)), &settings, |_| true).unwrap();
+        assert_eq!(got, SurfaceComparison { unusable: 6, ..want });
+
+        let cloud = |points| {
+            compare_surfaces(&map, Reference::Points { origin: [0.0; 3], points }, &settings, |_| true)
+        };
+        let points: Vec<[f32; 3]> = (0..400).map(|i| [i % 20, i / 20, 0].map(|v| v as f32 * 0.1)).collect();
+        let want = cloud(&points).unwrap();
+        let mut with = points.clone();
+        with.insert(7, [f32::NAN, 0.0, 0.0]);
+        with.push([0.0, f32::INFINITY, 0.0]);
+        assert_eq!(cloud(&with).unwrap(), SurfaceComparison { unusable: 2, ..want });
+        assert!(cloud(&[[f32::NAN; 3]]).is_none());
     }
 
     #[test]

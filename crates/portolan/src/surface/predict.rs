@@ -74,7 +74,9 @@ pub struct PredictionScore {
 
 impl RangePredictions {
     /// Casts a ray for each surface that a frame saw, or for `at_most` of them, evenly taken, and adds what the map
-    /// predicts. Rays are shared out to all cores with the feature `parallel`; their order is kept.
+    /// predicts. Rays are shared out to all cores with the feature `parallel`; their order is kept. Of an image that
+    /// contradicts itself ([`RangeImage::check`](crate::scan::RangeImage::check)) nothing is cast, and no point without
+    /// an origin.
     pub fn add(
         &mut self,
         rays: &RayCaster<'_, 3>,
@@ -136,10 +138,11 @@ impl RangePredictions {
 /// Origin and end of every ray of a frame that met a surface, in the sensor's frame.
 fn seen(frame: &Frame) -> Vec<([f64; 3], [f64; 3])> {
     match frame {
+        Frame::Image(image) if image.check().is_err() => Vec::new(),
         Frame::Image(image) => image.readings().filter(|r| r.2).map(|r| (r.0, r.1)).collect(),
         Frame::Points(scan) => {
             let ends = scan.points.iter().enumerate();
-            ends.map(|(i, p)| (scan.origin_of(i), p.map(f64::from))).collect()
+            ends.filter_map(|(i, p)| Some((scan.origin_of(i)?, p.map(f64::from)))).collect()
         }
     }
 }
@@ -206,6 +209,21 @@ mod tests {
         some.add(&rays, &pose, &frame, 4);
         assert_eq!(some.rays(), 4);
         assert_eq!(RangePredictions::default().score(0.1, &noise), None);
+    }
+
+    #[test]
+    fn frames_that_contradict_themselves_are_not_cast() {
+        let store = wall();
+        let rays = RayCaster::new(&store, RayCastSettings::default());
+        let mut predictions = RangePredictions::default();
+        for (image, _) in crate::scan::broken_images() {
+            predictions.add(&rays, &Pose::IDENTITY, &Frame::Image(image), usize::MAX);
+        }
+        assert_eq!(predictions, RangePredictions::default());
+        let mut scan = PointScan::new([[0.5, 0.4, 0.4]; 3], [0.0; 3]);
+        scan.origin = crate::scan::Origin::PerPoint(vec![[0.2, 0.4, 0.4]]);
+        predictions.add(&rays, &Pose::IDENTITY, &Frame::Points(scan), usize::MAX);
+        assert_eq!(predictions.rays(), 1);
     }
 
     #[test]

@@ -27,6 +27,9 @@ pub(super) struct NearestBeam {
     pub ray: Box<[u32]>,
 }
 
+/// Bytes of a touched cell: distance, weight, how far aside, and which ray.
+pub(super) const CELL_BYTES: usize = 3 * size_of::<f32>() + size_of::<u32>();
+
 impl Evidence for NearestBeam {
     type One = DistanceObservation;
 
@@ -126,14 +129,15 @@ impl<const D: usize> NearestRay<D> {
                         evidence.aside_sq[i] = aside_sq;
                         evidence.ray[i] = number as u32;
                     }
+                    // Here, since one ray alone may be long enough.
+                    if self.touched.keys().len() > most {
+                        return false;
+                    }
                 }
                 if near + walk.exit() >= far {
                     break;
                 }
                 walk.advance();
-            }
-            if self.touched.keys().len() > most {
-                return false;
             }
         }
         self.touched.sort();
@@ -151,5 +155,22 @@ impl<const D: usize> NearestRay<D> {
     /// Evidence with the number of the ray that each cell's comes from.
     pub(super) fn nearest(&self, i: usize) -> &NearestBeam {
         self.touched.evidence(i)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_ray_cannot_touch_more_than_it_may() {
+        let ray = Ray { origin: [0.05; 3], direction: [1.0, 0.0, 0.0], range: 1e4, hit: true, weight: 1.0 };
+        let (lattice, all) = (Lattice::new([0.0; 3], 0.1), Aabb::new([-1e9; 3], [1e9; 3]));
+        let mut rays = NearestRay::<3>::new();
+        assert!(!rays.plan_rays([ray].into_iter(), (&lattice, &all), (0.3, 1.0), 10));
+        assert_eq!(rays.blocks().len(), 11);
+        let short = Ray { range: 7.0, ..ray };
+        assert!(rays.plan_rays([short].into_iter(), (&lattice, &all), (0.3, 1.0), 10));
+        assert_eq!(rays.blocks().len(), 10);
     }
 }

@@ -21,6 +21,9 @@ pub struct PointRays {
 }
 
 impl PointRays {
+    /// Bytes that a touched block takes.
+    pub(crate) const BLOCK_BYTES: usize = super::nearest_ray::CELL_BYTES * crate::geom::block_cells::<3>();
+
     /// A sweep with these settings, which has seen nothing yet.
     pub fn new(settings: ProjectiveSettings) -> Self {
         Self { settings, rays: NearestRay::new(), bounds: None, colors: Vec::new() }

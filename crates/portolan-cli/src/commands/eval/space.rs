@@ -203,6 +203,7 @@ fn comparison_json(c: &SurfaceComparison, how: &CompareSettings, path: &Path, ki
         "completeness": way(&c.completeness),
         "f_scores": c.f_scores,
         "cropped": c.cropped,
+        "unusable": c.unusable,
     })
 }
 
@@ -232,6 +233,9 @@ fn comparison_text(c: &SurfaceComparison, how: &CompareSettings) -> String {
     if c.cropped > 0 {
         text +=
             &format!("{} points of the reference lie where the map observed nothing: left out\n", c.cropped);
+    }
+    if c.unusable > 0 {
+        text += &format!("{} triangles or points are not finite: left out\n", c.unusable);
     }
     text
 }

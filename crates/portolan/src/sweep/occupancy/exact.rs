@@ -3,9 +3,14 @@
 use super::Bits;
 use super::masks::BrickMasks;
 use super::trace::{trace, walk};
-use crate::geom::vector::{along, distance, scale, sub};
+use crate::geom::vector::{along, distance, dot, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, RayWalk};
+use crate::scan::RefusedBeams;
 use crate::sweep::clip;
+
+/// A ray is refused where it is longer than this many cells, within the bounds: one reading of 10^8 m must not cost what
+/// a million others do. At 5 cm, 52 km.
+pub(crate) const LONGEST_RAY: f64 = (1u32 << 20) as f64;
 
 /// One beam in the world's frame (metres).
 #[derive(Clone, Copy, Debug)]
@@ -23,9 +28,15 @@ pub(crate) struct Ray {
 pub(crate) struct Tally {
     /// Hits whose end lies outside of the bounds.
     pub(crate) hits_outside: u64,
-    /// Rays whose origin or end is not finite or has no cell index.
-    pub(crate) unusable: u64,
+    /// Rays that were not used: an end is not finite; or has no cell index, or the ray is too long.
+    pub(crate) refused: RefusedBeams,
+    /// Those among them with a surface.
+    pub(crate) refused_hits: u64,
 }
+
+/// The rays touch more bricks than they may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TooManyBricks;
 
 /// Walks every beam through the cells (Amanatides & Woo 1987): each cell that beams pass gets one miss a scan, each in
 /// which one ends one hit, and a hit overrules misses (Hornung et al. 2013, as in OctoMap's `computeUpdate`). The cell in
@@ -45,6 +56,9 @@ const RAYS_A_PART: usize = 2048;
 
 impl ExactRays {
     /// Marks `count` rays; `further` only count for [`ExactRays::reach`]. Cells outside of `bounds` may be marked, too: see `CellBox::mask`.
+    ///
+    /// Stops where more than `most` bricks are touched, whatever the number of threads, and forgets them. Each thread holds
+    /// up to `most` bricks of its own until then.
     pub(crate) fn plan(
         &mut self,
         lattice: &Lattice<3>,
@@ -52,12 +66,15 @@ impl ExactRays {
         count: usize,
         ray: impl Fn(usize) -> Ray + Sync,
         further: &[Ray],
-    ) -> Tally {
+        most: usize,
+    ) -> Result<Tally, TooManyBricks> {
         let parts = parts(count);
         self.parts.resize_with(parts.max(self.parts.len()), BrickMasks::default);
         let range = |part: usize| part * count / parts..(part + 1) * count / parts;
         let mut boxes = vec![Aabb::EMPTY; parts];
-        in_parallel(boxes.iter_mut().enumerate(), |(i, b)| *b = extent(lattice, range(i).map(&ray)));
+        in_parallel(boxes.iter_mut().enumerate(), |(i, b)| {
+            *b = extent(lattice, range(i).map(&ray).filter(|r| bounds.is_some() || !is_long(lattice, r)))
+        });
         let all = boxes.into_iter().fold(extent(lattice, further.iter().copied()), Aabb::union);
         let (first, last) = reach(lattice, bounds, all);
         self.reach = Some((first, last));
@@ -66,15 +83,33 @@ impl ExactRays {
             self.parts[..parts].iter_mut().zip(&mut tallies).enumerate().map(|(i, (m, t))| (range(i), m, t));
         in_parallel(jobs, |(range, masks, tally)| {
             masks.begin(first, last);
-            range.for_each(|i| mark(masks, lattice, bounds, ray(i), tally));
+            for i in range {
+                mark(masks, lattice, bounds, ray(i), tally);
+                if masks.len() > most {
+                    break;
+                }
+            }
         });
         let (whole, others) = self.parts[..parts].split_at_mut(1);
-        others.iter().for_each(|part| whole[0].merge(part));
+        let mut fits = whole[0].len() <= most;
+        for part in others {
+            fits = fits && part.len() <= most;
+            if fits {
+                whole[0].merge(part);
+                fits = whole[0].len() <= most;
+            }
+        }
+        if !fits {
+            // Together with the memory.
+            *self = Self::default();
+            return Err(TooManyBricks);
+        }
         (self.keys, self.slots) = whole[0].sorted().into_iter().unzip();
-        tallies.iter().fold(Tally::default(), |a, b| Tally {
+        Ok(tallies.iter().fold(Tally::default(), |a, b| Tally {
             hits_outside: a.hits_outside + b.hits_outside,
-            unusable: a.unusable + b.unusable,
-        })
+            refused: a.refused + b.refused,
+            refused_hits: a.refused_hits + b.refused_hits,
+        }))
     }
 
     /// The bricks that were touched, ascending.
@@ -100,40 +135,58 @@ impl ExactRays {
     }
 }
 
+/// Whether a ray is longer than any that is walked, or is none.
+#[inline(always)]
+fn is_long(lattice: &Lattice<3>, ray: &Ray) -> bool {
+    let offset = sub(ray.end, ray.origin);
+    let longest = LONGEST_RAY * lattice.resolution;
+    !(dot(offset, offset) <= longest * longest)
+}
+
 /// Marks one ray.
 #[inline]
 fn mark(masks: &mut BrickMasks, lattice: &Lattice<3>, bounds: Option<&Aabb<3>>, ray: Ray, tally: &mut Tally) {
     let end = match bounds {
-        _ if !ray.passes => {
-            tally.hits_outside += u64::from(ray.hit && bounds.is_some_and(|b| !b.contains(ray.end)));
-            lattice.cell_of(ray.end)
-        }
-        None => trace(masks, lattice, ray.origin, ray.end),
-        Some(bounds) => trace_inside(masks, lattice, bounds, ray, tally),
+        None if is_long(lattice, &ray) => None,
+        None if ray.passes => trace(masks, lattice, ray.origin, ray.end),
+        Some(bounds) if ray.passes => trace_inside(masks, lattice, bounds, ray),
+        _ => lattice.cell_of(ray.end),
     };
     match end {
-        Some(cell) if ray.hit && bounds.is_none_or(|b| b.contains(ray.end)) => masks.mark_hit(cell),
+        Some(cell) if ray.hit => match bounds {
+            Some(b) if !b.contains(ray.end) => tally.hits_outside += 1,
+            _ => masks.mark_hit(cell),
+        },
         Some(_) => {}
-        None => tally.unusable += 1,
+        None => {
+            let finite = ray.origin.iter().chain(&ray.end).all(|v| v.is_finite());
+            *(if finite { &mut tally.refused.too_far } else { &mut tally.refused.not_finite }) += 1;
+            tally.refused_hits += u64::from(ray.hit);
+        }
     }
 }
 
-/// As [`trace`], but only the part of a ray inside of the bounds: a far sensor costs nothing.
+/// As [`trace`], but only the part of a ray inside of the bounds: a far sensor costs nothing. `None` also where that part
+/// is too long.
 fn trace_inside(
     masks: &mut BrickMasks,
     lattice: &Lattice<3>,
     bounds: &Aabb<3>,
     ray: Ray,
-    tally: &mut Tally,
 ) -> Option<[i32; 3]> {
     let end = lattice.cell_of(ray.end)?;
-    tally.hits_outside += u64::from(ray.hit && !bounds.contains(ray.end));
     let length = distance(ray.end, ray.origin);
-    if !(length > 0.0) {
+    if length == 0.0 {
         return Some(end);
+    }
+    if !length.is_finite() {
+        return None;
     }
     let direction = scale(sub(ray.end, ray.origin), 1.0 / length);
     if let Some((near, far)) = clip(bounds, ray.origin, direction, length) {
+        if far - near > LONGEST_RAY * lattice.resolution {
+            return None;
+        }
         let start = if near > 0.0 { along(ray.origin, direction, near) } else { ray.origin };
         walk(masks, RayWalk::new(lattice, start, direction)?, end, far - near);
     }
@@ -229,7 +282,10 @@ mod tests {
     fn equals_the_oracle(lattice: &Lattice<3>, rays: &[Ray]) {
         let mut sweep = ExactRays::default();
         for _ in 0..2 {
-            assert_eq!(sweep.plan(lattice, None, rays.len(), |i| rays[i], &[]), Tally::default());
+            assert_eq!(
+                sweep.plan(lattice, None, rays.len(), |i| rays[i], &[], usize::MAX),
+                Ok(Tally::default())
+            );
         }
         assert!(sweep.keys().is_sorted());
         let (mut hits, mut misses) = (HashSet::new(), HashSet::new());
@@ -302,7 +358,9 @@ mod tests {
             passes: true,
         });
         let mut sweep = ExactRays::default();
-        assert_eq!(sweep.plan(&lattice, None, 3, |i| rays[i], &[]), Tally { hits_outside: 0, unusable: 2 });
+        let refused = RefusedBeams { not_finite: 1, too_far: 1, ..Default::default() };
+        let want = Tally { hits_outside: 0, refused, refused_hits: 2 };
+        assert_eq!(sweep.plan(&lattice, None, 3, |i| rays[i], &[], usize::MAX), Ok(want));
         assert_eq!(sweep.keys().len(), 2);
     }
 
@@ -312,8 +370,40 @@ mod tests {
         let bounds = Aabb::new([0.0; 3], [4.0; 3]);
         let ray = Ray { origin: [-1e6, 0.55, 0.55], end: [1e6, 0.55, 0.55], hit: true, passes: true };
         let mut sweep = ExactRays::default();
-        let tally = sweep.plan(&lattice, Some(&bounds), 1, |_| ray, &[]);
-        assert_eq!(tally, Tally { hits_outside: 1, unusable: 0 });
+        let tally = sweep.plan(&lattice, Some(&bounds), 1, |_| ray, &[], usize::MAX);
+        assert_eq!(tally, Ok(Tally { hits_outside: 1, ..Default::default() }));
         assert!((5..=7).contains(&sweep.keys().len()), "{:?}", sweep.keys());
+    }
+    #[test]
+    fn a_ray_that_is_too_long_costs_nothing() {
+        let lattice = Lattice::new([0.0; 3], 0.1);
+        let to = |x: f64, passes| Ray { origin: [0.05; 3], end: [x, 0.05, 0.05], hit: true, passes };
+        let mut sweep = ExactRays::default();
+        let wide = Aabb::new([-1e7; 3], [1e7; 3]);
+        for (passes, bounds) in [(true, None), (false, None), (true, Some(&wide))] {
+            let rays = [to(1.0, passes), to(1e6, passes)];
+            let tally = sweep.plan(&lattice, bounds, 2, |i| rays[i], &[], usize::MAX).unwrap();
+            let refused = RefusedBeams { too_far: 1, ..Default::default() };
+            assert_eq!((tally.refused, tally.refused_hits), (refused, 1));
+            assert!(sweep.keys().len() <= 2, "{passes} {}", sweep.keys().len());
+        }
+        assert_eq!(sweep.plan(&lattice, None, 1, |_| to(1e5, true), &[], usize::MAX), Ok(Tally::default()));
+    }
+
+    #[test]
+    fn no_more_bricks_are_touched_than_may_be() {
+        let lattice = Lattice::new([0.0; 3], 0.1);
+        let ray = |i: usize| {
+            let a = i as f64;
+            Ray { origin: [0.0; 3], end: [50.0 * a.cos(), 50.0 * a.sin(), 1.0], hit: true, passes: true }
+        };
+        let mut sweep = ExactRays::default();
+        // As many rays as are shared out to threads.
+        sweep.plan(&lattice, None, 5000, ray, &[], usize::MAX).unwrap();
+        let touched = sweep.keys().len();
+        assert_eq!(sweep.plan(&lattice, None, 5000, ray, &[], touched - 1), Err(TooManyBricks));
+        assert!(sweep.keys().is_empty());
+        assert!(sweep.plan(&lattice, None, 5000, ray, &[], touched).is_ok());
+        assert_eq!(sweep.keys().len(), touched);
     }
 }

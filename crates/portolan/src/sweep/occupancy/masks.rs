@@ -67,6 +67,12 @@ impl BrickMasks {
         }
     }
 
+    /// Number of bricks.
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.keys.len()
+    }
+
     /// The slot of a brick, made where there is none.
     #[inline(always)]
     pub(crate) fn slot(&mut self, key: BlockKey<3>) -> usize {

@@ -14,7 +14,7 @@ mod projective;
 mod trace;
 
 pub(crate) use cell_box::CellBox;
-pub(crate) use exact::{ExactRays, Ray, Tally};
+pub(crate) use exact::{ExactRays, LONGEST_RAY, Ray, Tally};
 pub(crate) use guard::Guard;
 pub(crate) use masks::Bits;
 pub(crate) use projective::Projective;
