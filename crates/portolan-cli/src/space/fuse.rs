@@ -95,8 +95,10 @@ fn fuse_all(
         match read {
             Ok((frame, counts)) => match maps.integrate(log.pose(i), &frame, memory, report) {
                 Ok(mut stats) => {
-                    // Points that fell beside the rows and columns found for their scan.
-                    report.without_pixel += stats.beams.dropped.saturating_sub(counts.dropped);
+                    // Points that share a row and column with a nearer one, or have none.
+                    if matches!(&frame, Frame::Points(scan) if scan.image.is_none()) {
+                        report.without_pixel += stats.beams.dropped.saturating_sub(counts.dropped);
+                    }
                     // Nothing but the filter knows what it left out.
                     stats.beams = counts;
                     if stats.scans > 0 {

@@ -32,7 +32,8 @@ impl Summary<'_> {
     fn warnings(&self) -> Vec<String> {
         let mut warnings = log_warnings(self.log.stats());
         if let Some(lost) = self.log.unread_colors() {
-            warnings.push(format!("{} colour pictures could not be read (first: {})", lost.pictures, lost.first));
+            warnings
+                .push(format!("{} colour pictures could not be read (first: {})", lost.pictures, lost.first));
         }
         let stats = &self.fusion.stats;
         if stats.refused_poses > 0 {
@@ -56,9 +57,10 @@ impl Summary<'_> {
             ));
         }
         let lost = self.fusion.without_pixel;
-        if 100 * lost > stats.beams.hit {
+        if 20 * lost > stats.beams.hit {
             warnings.push(format!(
-                "{lost} points fell beside the rows and columns found in the scans and are not in the distances; \
+                "{lost} points share a row and column of their scan with a nearer point, or have none, and are not in the \
+                 distances; \
                  --sweep exact uses all"
             ));
         }

@@ -29,11 +29,13 @@ pub struct RayCastSettings {
     /// Pass over unknown space this long (metres) before calling it unknown: beams see past the gaps between
     /// beams.
     pub unknown_tolerance: f64,
+    /// What is unknown up to this arc length is passed over (metres): close before a sensor no other has looked.
+    pub blind: f64,
 }
 
 impl Default for RayCastSettings {
     fn default() -> Self {
-        Self { min_weight: 0.5, max_range: 100.0, unknown_tolerance: 0.0 }
+        Self { min_weight: 0.5, max_range: 100.0, unknown_tolerance: 0.0, blind: 0.0 }
     }
 }
 
@@ -106,7 +108,8 @@ fn march(step: f64, settings: &RayCastSettings, look: impl Fn(f64) -> Seen) -> R
             (Seen::Unknown { until }, _) => {
                 let since = *unknown_since.get_or_insert(s);
                 last = None;
-                if until.max(s) - since >= settings.unknown_tolerance {
+                let end = until.max(s);
+                if end >= settings.blind && end - since.max(settings.blind) >= settings.unknown_tolerance {
                     return RayCast::Unknown(since);
                 }
                 n = n.max((until.min(settings.max_range) / step).ceil());

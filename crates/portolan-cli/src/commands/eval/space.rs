@@ -59,6 +59,9 @@ pub(super) fn run(args: &Args, file: &SpaceMapFile) -> anyhow::Result<()> {
     args.output.print(&document, text)
 }
 
+/// Close before its sensor a scan sees what no other has: unknown space up to here is passed over (metres).
+const BLIND: f64 = 0.5;
+
 /// A reference from a file.
 enum Owned {
     Mesh(Mesh),
@@ -132,6 +135,7 @@ fn predict(args: &Args, file: &SpaceMapFile, tsdf: &TsdfBricks, path: &Path) -> 
         max_range: filter.max_range.min(FURTHEST),
         // Where free space was not fused, all of it is unknown.
         unknown_tolerance: if carved { 2.0 * resolution } else { f64::INFINITY },
+        blind: BLIND,
     };
     let rays = RayCaster::new(&tsdf.store, settings);
     let mut predictions = RangePredictions::default();
