@@ -6,9 +6,9 @@ use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
 use crate::cell::{LogOdds8, LogOddsValue, OccupancyModel, Planes};
 use crate::geom::{Aabb, Lattice, Pose, block_cells};
-use crate::scan::{Frame, Origin, PointScan, RangeImage, Scan, ScanStats, SphericalLayout};
+use crate::scan::{Frame, LayoutFinder, Origin, PointScan, RangeImage, Scan, ScanStats, SphericalLayout};
 use crate::store::{Bricks, BricksFull, Store};
-use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, LONGEST_RAY, Projective, Ray};
+use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, LONGEST_RAY, Projective, Ray, join};
 use std::borrow::Cow;
 
 /// Boxes of more bricks than this are not searched for free space: single readings from far away are cheaper as rays.
@@ -23,7 +23,7 @@ pub enum OccupancySweep {
     /// Every cell that a beam passes, exactly: the map that OctoMap makes.
     Exact,
     /// Misses through a range image, hits exact: faster, frees the space between beams, and carves grazing surfaces less.
-    /// As `Auto`, but goes on looking for rows and columns where the first scans had none.
+    /// As `Auto`, said by name.
     Projective,
 }
 
@@ -54,8 +54,7 @@ pub struct SparseOccupancy<V: LogOddsValue = LogOdds8> {
     bounds: Option<(Aabb<3>, CellBox)>,
     exact: ExactRays,
     guard: Guard,
-    layout: Option<SphericalLayout>,
-    failed_layouts: u32,
+    layout: LayoutFinder,
 }
 
 impl<V: LogOddsValue> SparseOccupancy<V> {
@@ -88,8 +87,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
             bounds: None,
             exact: ExactRays::default(),
             guard: Guard::default(),
-            layout: None,
-            failed_layouts: 0,
+            layout: LayoutFinder::default(),
         })
     }
 
@@ -106,7 +104,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
 
     /// Rows and columns for scans of points that come without them; otherwise found in the first scan.
     pub fn set_layout(&mut self, layout: SphericalLayout) {
-        self.layout = Some(layout);
+        self.layout = LayoutFinder::of(layout);
     }
 
     /// Fuses what a sensor delivered at a known pose. A pose that is not rigid is refused and counted, and so is a ray that
@@ -189,13 +187,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
             image.check().map_err(MapError::Image)?;
             return Ok(Some(Cow::Borrowed(image)));
         }
-        if self.layout.is_none() && (self.failed_layouts < 3 || self.sweep == OccupancySweep::Projective) {
-            self.layout = SphericalLayout::of(&scan.points, origin);
-            self.failed_layouts += u32::from(self.layout.is_none());
-        }
-        let image = self.layout.as_ref().map(|layout| layout.image(&scan.points, origin));
-        // A layout that most points do not fit is that of another sensor.
-        Ok(image.filter(|image| 2 * image.hits() >= scan.points.len()).map(Cow::Owned))
+        Ok(self.layout.image(&scan.points, origin).map(Cow::Owned))
     }
 
     fn image(&mut self, world_from_sensor: &Pose<3>, image: &RangeImage) -> Result<ScanStats, MapError> {
@@ -230,7 +222,12 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         let limit = self.store.limit();
         let most = most_bricks(limit, size_of::<V>() * block_cells::<3>());
         let full = BricksFull { limit, bricks: self.store.len(), bytes: self.store.memory_bytes() };
-        let planned = self.exact.plan(lattice, bounds, count, &ray, &further, most);
+        let guard = std::mem::take(&mut self.guard);
+        let exact = &mut self.exact;
+        let (planned, view) = join(
+            || exact.plan(lattice, bounds, count, &ray, &further, most),
+            || view.map(|(pose, image)| Projective::new(image, pose, lattice, guard)),
+        );
         let mut tally = planned.map_err(|_| too_many(most, full))?;
         let view = view.filter(|_| self.exact.reach_bricks() <= PROJECTIVE_BRICKS);
         if view.is_none() && passes_by_view {
@@ -238,8 +235,6 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
                 self.exact.plan(lattice, bounds, count, |i| Ray { passes: true, ..ray(i) }, &[], most);
             tally = planned.map_err(|_| too_many(most, full))?;
         }
-        let guard = std::mem::take(&mut self.guard);
-        let view = view.map(|(pose, image)| Projective::new(image, pose, self.store.lattice(), guard));
         let seen = match (&view, self.exact.reach()) {
             (Some(view), Some((first, last))) => view.bricks(first, last),
             _ => Vec::new(),

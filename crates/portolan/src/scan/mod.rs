@@ -15,6 +15,7 @@ mod beam;
 mod frame_filter;
 mod incidence;
 mod laser;
+mod layout_finder;
 mod organised;
 mod point_scan;
 mod range_image;
@@ -30,6 +31,7 @@ pub use frame_filter::{Body, FrameFilter};
 pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, MAX_SLOPE, connected};
 pub use laser::RangeLimits;
+pub use layout_finder::LayoutFinder;
 pub use organised::OrganisedPoints;
 pub use point_scan::{Frame, Origin, PointScan};
 #[cfg(test)]

@@ -21,40 +21,112 @@ pub(super) fn rings(elevations: &[f32]) -> Option<Vec<f32>> {
     let mut filled: Vec<u32> = counts.iter().copied().filter(|&c| c > 0).collect();
     filled.sort_unstable();
     let sparse = (filled[filled.len() * 9 / 10] / 20).max(1);
-    // (first bin, last bin, points, sum of elevations' bins)
-    let mut runs: Vec<(usize, usize, u64, f64)> = Vec::new();
+    let mut runs: Vec<Run> = Vec::new();
     for (b, &count) in counts.iter().enumerate().filter(|(_, c)| **c > sparse) {
-        let weight = f64::from(count) * b as f64;
+        let one = Run { first: b, last: b, points: u64::from(count), weight: f64::from(count) * b as f64 };
         match runs.last_mut() {
-            Some(run) if b <= run.1 + 2 => {
-                run.1 = b;
-                run.2 += u64::from(count);
-                run.3 += weight;
-            }
-            _ => runs.push((b, b, u64::from(count), weight)),
+            Some(run) if b <= run.last + 2 => *run = run.with(&one),
+            _ => runs.push(one),
         }
     }
-    let held: u64 = runs.iter().map(|r| r.2).sum();
-    if !RINGS.contains(&runs.len()) || (held as f64) < 0.9 * elevations.len() as f64 {
+    let held: u64 = runs.iter().map(|r| r.points).sum();
+    if runs.len() < *RINGS.start() || (held as f64) < 0.9 * elevations.len() as f64 {
         return None;
     }
-    let middle = |r: &(usize, usize, u64, f64)| r.3 / r.2 as f64;
-    let mut spacing: Vec<f64> = runs.windows(2).map(|w| middle(&w[1]) - middle(&w[0])).collect();
-    spacing.sort_by(f64::total_cmp);
-    let width: f64 = runs.iter().map(|r| (r.1 - r.0 + 1) as f64 * r.2 as f64).sum::<f64>() / held as f64;
-    if width > 0.4 * spacing[spacing.len() / 2] {
+    let width: f64 =
+        runs.iter().map(|r| (r.last - r.first + 1) as f64 * r.points as f64).sum::<f64>() / held as f64;
+    let runs = whole(runs);
+    if !RINGS.contains(&runs.len()) || width > 0.4 * spacing(&runs) {
         return None;
     }
     // Exactly: the mean of each ring's own points, not of its bins.
     let mut sums = vec![(0.0f64, 0u64); runs.len()];
     for &e in elevations {
-        let after = runs.partition_point(|r| r.0 <= bin(e));
-        if after > 0 && bin(e) <= runs[after - 1].1 {
+        let after = runs.partition_point(|r| r.first <= bin(e));
+        if after > 0 && bin(e) <= runs[after - 1].last {
             sums[after - 1].0 += f64::from(e);
             sums[after - 1].1 += 1;
         }
     }
     Some(sums.iter().rev().map(|(sum, n)| (sum / *n as f64) as f32).collect())
+}
+
+/// Neighbouring bins that are well filled.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    first: usize,
+    last: usize,
+    points: u64,
+    /// Sum of the points' bins.
+    weight: f64,
+}
+
+impl Run {
+    fn with(&self, above: &Self) -> Self {
+        Self {
+            first: self.first,
+            last: above.last,
+            points: self.points + above.points,
+            weight: self.weight + above.weight,
+        }
+    }
+
+    fn middle(&self) -> f64 {
+        self.weight / self.points as f64
+    }
+
+    fn distance(&self, other: &Self) -> f64 {
+        (self.middle() - other.middle()).abs()
+    }
+}
+
+/// Median distance of neighbours (bins); 0 for fewer than two.
+fn spacing(runs: &[Run]) -> f64 {
+    let mut all: Vec<f64> = runs.windows(2).map(|w| w[0].distance(&w[1])).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// One run a ring. Taking the sensor's motion out moves parts of a turn up or down: a ring then shows as several runs.
+///
+/// Runs with a quarter of the points that rings typically have are rings; two much closer than rings are, which
+/// together have no more points than one, are the same; others are rings only where they stand alone, as those of a ring that
+/// mostly looks at the sky.
+fn whole(runs: Vec<Run>) -> Vec<Run> {
+    let held: u64 = runs.iter().map(|r| r.points).sum();
+    let mut by_points: Vec<u64> = runs.iter().map(|r| r.points).collect();
+    by_points.sort_unstable();
+    // Half of all points are in runs of at least so many.
+    let mut below = 0;
+    let typical = by_points.into_iter().find(|points| {
+        below += points;
+        2 * below >= held
+    });
+    let typical = typical.unwrap_or(0);
+    let is_strong = |r: &&Run| 4 * r.points >= typical;
+    let apart = spacing(&runs.iter().copied().filter(|r| is_strong(&r)).collect::<Vec<_>>());
+    let mut rings: Vec<Run> = Vec::new();
+    for run in runs.iter().filter(is_strong) {
+        match rings.last_mut() {
+            Some(ring)
+                if ring.distance(run) < 0.4 * apart && 4 * (ring.points + run.points) <= 5 * typical =>
+            {
+                *ring = ring.with(run);
+            }
+            _ => rings.push(*run),
+        }
+    }
+    let strong = rings.len();
+    for run in runs.iter().filter(|r| !is_strong(r)) {
+        // Rings on both sides: among the strong ones by order, among those added since at the end.
+        let at = rings[..strong].partition_point(|r| r.first < run.first);
+        let near = rings[at.saturating_sub(1)..strong.min(at + 1)].iter().chain(rings[strong..].last());
+        if near.map(|r| r.distance(run)).all(|d| d > 0.75 * apart) {
+            rings.push(*run);
+        }
+    }
+    rings.sort_unstable_by_key(|r| r.first);
+    rings
 }
 
 /// Number of columns of a full turn and the azimuth of one of them (radians), from points of known rings.

@@ -27,6 +27,8 @@ pub struct SphericalLayout {
 }
 
 const NO_ROW: u16 = u16::MAX;
+/// More than any image has: rows and columns are at most 2^14 and 2^15.
+const NO_PIXEL: u32 = u32::MAX;
 
 impl SphericalLayout {
     /// The layout of a scan of points about `origin`, both in one frame whose z is the sensor's axis of rotation. `None`
@@ -150,14 +152,34 @@ impl SphericalLayout {
     /// of several points in a pixel wins; pixels without one are 0: nothing is known. Points above the first and below
     /// the last row have no pixel. O(n).
     pub fn image(&self, points: &[[f32; 3]], origin: [f64; 3]) -> RangeImage {
-        RangeImage {
-            values: self.nearest(&Polar::of(points, origin)),
+        self.image_and_placed(points, origin).0
+    }
+
+    /// The same, and how many points have a pixel.
+    pub(super) fn image_and_placed(&self, points: &[[f32; 3]], origin: [f64; 3]) -> (RangeImage, usize) {
+        let parts = each(points, |points| {
+            let polar = Polar::of(points, origin);
+            let pixels: Vec<u32> =
+                (0..points.len()).map(|i| self.pixel(&polar, i).map_or(NO_PIXEL, |p| p as u32)).collect();
+            (pixels, polar.ranges)
+        });
+        let mut values = vec![0.0f32; self.columns * self.spherical.elevations.len()];
+        let mut placed = 0;
+        for (pixel, range) in parts.into_iter().flat_map(|(pixels, ranges)| pixels.into_iter().zip(ranges)) {
+            if let Some(value) = values.get_mut(pixel as usize) {
+                *value = if *value == 0.0 || range < *value { range } else { *value };
+                placed += 1;
+            }
+        }
+        let image = RangeImage {
+            values,
             projection: Projection::Spherical(self.spherical.clone()),
             columns: self.columns,
             rows: self.spherical.elevations.len(),
             colors: Vec::new(),
             refused: RefusedBeams::default(),
-        }
+        };
+        (image, placed)
     }
 
     /// Rows and the first column.
@@ -193,6 +215,24 @@ impl Polar {
         }
         polar
     }
+}
+
+/// Points that are worth a thread.
+#[cfg(feature = "parallel")]
+const POINTS_A_PART: usize = 4096;
+
+#[cfg(feature = "parallel")]
+fn each<R: Send>(points: &[[f32; 3]], job: impl Fn(&[[f32; 3]]) -> R + Sync + Send) -> Vec<R> {
+    use rayon::prelude::*;
+    if rayon::current_num_threads() == 1 || points.len() <= POINTS_A_PART {
+        return vec![job(points)];
+    }
+    points.par_chunks(POINTS_A_PART).map(job).collect()
+}
+
+#[cfg(not(feature = "parallel"))]
+fn each<R>(points: &[[f32; 3]], job: impl Fn(&[[f32; 3]]) -> R) -> Vec<R> {
+    vec![job(points)]
 }
 
 #[cfg(test)]

@@ -73,7 +73,8 @@ impl ExactRays {
         let range = |part: usize| part * count / parts..(part + 1) * count / parts;
         let mut boxes = vec![Aabb::EMPTY; parts];
         in_parallel(boxes.iter_mut().enumerate(), |(i, b)| {
-            *b = extent(lattice, range(i).map(&ray).filter(|r| bounds.is_some() || !is_long(lattice, r)))
+            let short = |r: &Ray| bounds.is_some() || !is_long(lattice, r);
+            *b = extent(lattice, range(i).map(|i| ray(i)).filter(short))
         });
         let all = boxes.into_iter().fold(extent(lattice, further.iter().copied()), Aabb::union);
         let (first, last) = reach(lattice, bounds, all);
@@ -194,7 +195,16 @@ fn trace_inside(
 }
 
 /// The box of all origins and ends that have a cell.
-fn extent(lattice: &Lattice<3>, rays: impl Iterator<Item = Ray>) -> Aabb<3> {
+fn extent(lattice: &Lattice<3>, rays: impl Iterator<Item = Ray> + Clone) -> Aabb<3> {
+    // Where the corners of the box of all have cells, all have.
+    let (mut all, mut is_number) = (Aabb::EMPTY, true);
+    for p in rays.clone().flat_map(|ray| [ray.origin, ray.end]) {
+        is_number &= !p.iter().any(|v| v.is_nan());
+        all.include(p);
+    }
+    if is_number && lattice.cell_of(all.min).is_some() && lattice.cell_of(all.max).is_some() {
+        return all;
+    }
     let mut all = Aabb::EMPTY;
     for p in rays.flat_map(|ray| [ray.origin, ray.end]) {
         if lattice.cell_of(p).is_some() {

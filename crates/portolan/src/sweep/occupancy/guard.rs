@@ -136,21 +136,45 @@ impl Guard {
         );
         self.overall = values.iter().map(|v| known(v.abs())).fold(f32::INFINITY, f32::min);
     }
+}
 
-    /// The smallest windows that hold `columns` and `rows` pixels, by position in `windows`.
+/// Sizes of windows, as lanes to compare with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sizes {
+    columns: [f32; 16],
+    rows: [f32; 16],
+    len: usize,
+}
+
+impl Sizes {
+    /// Of windows that grow along both axes, at most 16.
+    pub(crate) fn of(windows: &[WindowMin]) -> Self {
+        let lane = |i: usize, size: fn(&WindowMin) -> usize| {
+            windows.get(i).map_or(f32::INFINITY, |w| size(w) as f32)
+        };
+        Self {
+            columns: std::array::from_fn(|i| lane(i, |w| w.columns)),
+            rows: std::array::from_fn(|i| lane(i, |w| w.rows)),
+            len: windows.len(),
+        }
+    }
+
+    /// The smallest windows that hold `columns` and `rows` pixels, by position; `None` where none do, or one is not a number.
     #[inline(always)]
-    pub(crate) fn level(windows: &[WindowMin], columns: f32, rows: f32) -> Option<usize> {
-        windows.iter().position(|w| w.columns as f32 >= columns && w.rows as f32 >= rows)
+    pub(crate) fn level(&self, columns: f32, rows: f32) -> Option<usize> {
+        let holds = |i: usize| (self.columns[i] >= columns) & (self.rows[i] >= rows);
+        let level = (0..16).map(|i| usize::from(!holds(i))).sum::<usize>();
+        (level < self.len).then_some(level)
     }
 }
 
 #[cfg(feature = "parallel")]
-fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
+pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     rayon::join(a, b)
 }
 
 #[cfg(not(feature = "parallel"))]
-fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
+pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
     (a(), b())
 }
 
@@ -166,6 +190,10 @@ mod tests {
             let mut guard = Guard::default();
             guard.fill(&[1.0; 800], 40, !closed, 1.0);
             guard.fill(&values, 80, closed, ratio);
+            for need in [0.5, 2.0, 3.5, 16.0, 64.0, 64.5, f32::INFINITY, f32::NAN] {
+                let first = guard.fine.iter().position(|w| w.columns as f32 >= need && w.rows as f32 >= 0.4 * need);
+                prop_assert_eq!(Sizes::of(&guard.fine).level(need, 0.4 * need), first);
+            }
             for w in &guard.fine {
                 for k in 0..40 {
                     let (r, c) = (k * 7 % 24 - k % 3, (k * 31) % 80 - k % 5);

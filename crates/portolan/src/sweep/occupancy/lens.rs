@@ -41,6 +41,8 @@ pub(crate) enum Lens {
         rows_per_radian: f32,
         /// Row in steps by sine of the elevation, from -1 to 1.
         row_of: Vec<i32>,
+        /// The most rows that a radian has, by sections of the sine of the elevation, from -1 to 1.
+        most_rows: [f32; SECTIONS],
     },
     Pinhole {
         focal: [f32; 2],
@@ -52,6 +54,9 @@ pub(crate) enum Lens {
         top: f32,
     },
 }
+
+/// Sections of the sine of the elevation.
+const SECTIONS: usize = 64;
 
 /// A coordinate that is in no image (pixels).
 const NOWHERE: f32 = 60_000.0;
@@ -68,14 +73,18 @@ impl Lens {
                 top: *top as f32,
             },
             Projection::Spherical(s) => {
-                let finest =
-                    s.elevations.windows(2).map(|w| w[0] - w[1]).filter(|d| *d > 0.0).fold(0.1, f32::min);
+                let mut spacing: Vec<f32> =
+                    s.elevations.windows(2).map(|w| w[0] - w[1]).filter(|d| *d > 0.0).collect();
+                spacing.sort_by(f32::total_cmp);
+                let finest = spacing.first().map_or(0.1, |d| d.min(0.1));
+                let median = spacing.get(spacing.len() / 2).map_or(0.1, |d| d.min(0.1));
                 Self::Spherical {
                     first: s.first_azimuth as f32,
                     columns_per_radian: (1.0 / s.azimuth_step) as f32,
                     columns: image.columns as f32,
-                    rows_per_radian: 1.0 / finest,
+                    rows_per_radian: 1.0 / median,
                     row_of: rows_by_sine(&s.elevations, finest),
+                    most_rows: most_rows_by_sine(&s.elevations),
                 }
             }
         }
@@ -107,11 +116,16 @@ impl Lens {
     #[inline(always)]
     pub(crate) fn view_cell(&self, [x, y, z]: [f32; 3], radius: f32, half: f32) -> Option<(f32, f32)> {
         match self {
-            Self::Spherical { columns_per_radian, rows_per_radian, .. } => {
-                let across = (x * x + y * y).sqrt() - radius;
-                let depth = (x * x + y * y + z * z).sqrt() - radius;
-                (across > half)
-                    .then(|| (half / across * columns_per_radian.abs(), half / depth * rows_per_radian))
+            Self::Spherical { columns_per_radian, most_rows, .. } => {
+                let (across, depth) = ((x * x + y * y).sqrt(), (x * x + y * y + z * z).sqrt());
+                let nearest = across - radius;
+                (nearest > half).then(|| {
+                    let (sine, spread) = (z / depth, sine_spread(across, z, depth, radius));
+                    let section = |s: f32| (((s + 1.0) * (0.5 * SECTIONS as f32)) as usize).min(SECTIONS - 1);
+                    let (from, to) = (section(sine - spread), section(sine + spread));
+                    let most = most_rows[from..=to].iter().copied().fold(0.0, f32::max);
+                    (half / nearest * columns_per_radian.abs(), half / (depth - radius) * most)
+                })
             }
             Self::Pinhole { focal, .. } => {
                 let near = z - radius;
@@ -174,12 +188,13 @@ impl Lens {
     pub(crate) fn views(&self, [x, y, z]: &[[f32; 8]; 3], radius: f32, half: f32, views: &mut Views) {
         let wide = radius + half;
         match self {
-            Self::Spherical { first, columns_per_radian, columns, rows_per_radian, row_of } => {
+            Self::Spherical { first, columns_per_radian, columns, row_of, .. } => {
                 let middle = 0.5 * (row_of.len() - 1) as f32;
                 let turn = columns_per_radian.abs() * TAU;
                 // Of all turns the one in which it is nearest to the image's middle.
                 let low = 0.5 * (columns - turn);
-                let mut sine = [0i32; 8];
+                let last = row_of.len() as i32 - 1;
+                let mut sines = [[0i32; 2]; 8];
                 for i in 0..8 {
                     let across = (x[i] * x[i] + y[i] * y[i]).sqrt();
                     let depth = (across * across + z[i] * z[i]).sqrt();
@@ -189,16 +204,20 @@ impl Lens {
                     let c = if c < low { c + turn } else { c };
                     let c = if c < low { c + turn } else { c };
                     views.column[i] = if c >= low + turn { c - turn } else { c };
-                    sine[i] = nearest_integer((z[i] / depth.max(f32::MIN_POSITIVE) + 1.0) * middle);
-                    let arc = |s: f32| if far_enough { arc_sine_above(s) } else { f32::INFINITY };
-                    views.half_columns[i] = arc(wide / a) * columns_per_radian.abs();
-                    views.half_rows[i] = arc(wide / d) * rows_per_radian;
+                    let (sine, spread) = (z[i] / d, sine_spread(across, z[i], d, wide));
+                    let step = |s: f32| nearest_integer((s + 1.0) * middle).clamp(0, last);
+                    sines[i] =
+                        if far_enough { [step(sine + spread), step(sine - spread)] } else { [0, last] };
+                    let width = if far_enough { arc_sine_above(wide / a) } else { f32::INFINITY };
+                    views.half_columns[i] = width * columns_per_radian.abs();
                     views.near[i] = depth - radius;
                     views.far[i] = depth + radius;
                 }
                 for i in 0..8 {
-                    let row = row_of.get(sine[i] as u32 as usize).copied().unwrap_or(i32::MIN / 2);
-                    views.row[i] = row as f32 / STEPS as f32;
+                    // The first of the rows that the ball may be in, and the last.
+                    let [above, below] = sines[i].map(|s| row_of.get(s as usize).copied().unwrap_or(0));
+                    views.row[i] = (above + below) as f32 / (2 * STEPS) as f32;
+                    views.half_rows[i] = (below - above) as f32 / (2 * STEPS) as f32;
                 }
             }
             Self::Pinhole { focal, principal } => {
@@ -243,6 +262,27 @@ fn steps(pixels: f32) -> i32 {
 fn nearest_integer(v: f32) -> i32 {
     const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
     (v + SHIFT).to_bits().wrapping_sub(SHIFT.to_bits()) as i32
+}
+
+/// How far the sine of the elevation may be from a ball's centre, for points of the ball: with `s` the sine of the angle that
+/// the ball takes, `sin(e + a) <= sin e + cos e sin a + |sin e| (1 - cos a)`, and `1 - cos a <= s^2`.
+#[inline(always)]
+fn sine_spread(across: f32, z: f32, depth: f32, radius: f32) -> f32 {
+    let s = radius / depth;
+    (across * s + z.abs() * s * s) / depth
+}
+
+/// The most rows that a radian has in each section of the sine of the elevation. Beyond the rows it is as between the last two.
+fn most_rows_by_sine(elevations: &[f32]) -> [f32; SECTIONS] {
+    let last = elevations.len() - 1;
+    let bound = |i: usize| (2.0 * i as f32 / SECTIONS as f32 - 1.0).clamp(-1.0, 1.0).asin();
+    std::array::from_fn(|section| {
+        let (low, high) = (bound(section), bound(section + 1));
+        let upper_of = |e: f32| elevations.partition_point(|&row| row >= e).saturating_sub(1);
+        let (from, to) = (upper_of(high), upper_of(low).min(last.saturating_sub(1)));
+        let spacing = elevations[from.min(to)..=(to + 1).min(last)].windows(2).map(|w| w[0] - w[1]);
+        1.0 / spacing.filter(|d| *d > 0.0).fold(0.1, f32::min)
+    })
 }
 
 /// An upper bound of the arc sine on `[0, 1]`, exact at both ends.

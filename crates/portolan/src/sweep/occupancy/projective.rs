@@ -1,6 +1,6 @@
 //! Free space through a range image: a cell is free where every beam that looks its way saw farther.
 
-use super::guard::{Guard, WindowMin};
+use super::guard::{Guard, Sizes, WindowMin};
 use super::lens::{LANES, Lens, STEP_BITS, STEPS, Seen, Views};
 use crate::geom::{BLOCK_EDGE, BlockKey, Lattice, Pose};
 use crate::scan::RangeImage;
@@ -23,6 +23,9 @@ enum Class {
 const MARGIN: f32 = 0.5;
 /// Half of the width that a cell has for beams, in cells.
 const HALF_WIDTH: f32 = 0.5;
+/// Bits of pixels' readings.
+const OWN: u8 = 1;
+const BESIDE: u8 = 2;
 /// Edge of the largest nodes, in bricks.
 const TOP: i32 = 8;
 
@@ -35,7 +38,11 @@ const TOP: i32 = 8;
 pub(crate) struct Projective {
     lens: Lens,
     guard: Guard,
-    values: Vec<f32>,
+    /// Of `guard.fine` and `guard.nearest`.
+    fine_sizes: Sizes,
+    coarse_sizes: Sizes,
+    /// For every pixel [`OWN`], where it has a reading, and [`BESIDE`], where it or one of the eight around it has one.
+    readings: Vec<u8>,
     columns: usize,
     rows: usize,
     /// Edge of a cell (metres).
@@ -72,9 +79,11 @@ impl Projective {
             image.values.iter().map(|&v| if v.abs() <= farthest { v } else { 0.0 }).collect();
         guard.fill(&values, image.columns, lens.is_closed(), lens.rows_per_column());
         Self {
+            fine_sizes: Sizes::of(&guard.fine),
+            coarse_sizes: Sizes::of(&guard.nearest),
             guard,
             lens,
-            values,
+            readings: readings(&values, image.columns),
             columns: image.columns,
             rows: image.rows,
             resolution: lattice.resolution as f32,
@@ -167,7 +176,7 @@ impl Projective {
     #[inline(always)]
     fn classify(&self, views: &Views, i: usize) -> Class {
         let (columns, rows) = (2.0 * views.half_columns[i] + 2.0, 2.0 * views.half_rows[i] + 2.0);
-        let Some(level) = Guard::level(&self.guard.nearest, columns, rows) else { return Class::Mixed };
+        let Some(level) = self.coarse_sizes.level(columns, rows) else { return Class::Mixed };
         let Some(at) = self.guard.nearest[level].around(views.column[i], views.row[i]) else {
             return Class::Silent;
         };
@@ -213,7 +222,7 @@ impl Projective {
         // The widest that any of the cells looks: from the nearest of them.
         let view = self.lens.view_cell(centre, self.radius(4), HALF_WIDTH * self.resolution);
         let (c, r) = view.unwrap_or((f32::INFINITY, f32::INFINITY));
-        let level = Guard::level(&self.guard.fine, 2.0 * c + 2.0, 2.0 * r + 2.0);
+        let level = self.fine_sizes.level(2.0 * c + 2.0, 2.0 * r + 2.0);
         let windows = &self.guard.fine[level.unwrap_or(self.guard.fine.len() - 1)];
         let mut seen = Seen { column: [0; LANES], row: [0; LANES], depth: [0.0; LANES] };
         // Where no window is wide enough, so near to the sensor, nothing at all may be nearer.
@@ -228,24 +237,40 @@ impl Projective {
         let mut bits = free_lanes(&self.lens, centre, &self.offsets, &look, &mut seen);
         if !known && bits != 0 {
             // The window may be wider than the cell: its own pixel must have a reading, or one beside that is within its width.
-            let beside = STEPS * i32::from(c >= 2.0 && r >= 2.0);
-            for i in 0..LANES {
-                let has_reading = |dr: i32, dc: i32| {
-                    self.value_at(seen.column[i] + dc * beside, seen.row[i] + dr * beside) != 0.0
-                };
-                let seen_past = has_reading(0, 0)
-                    || beside > 0 && (-1..=1).any(|dr| (-1..=1).any(|dc| has_reading(dr, dc)));
-                bits &= !(u64::from(!seen_past) << i);
+            let enough = if c >= 2.0 && r >= 2.0 { BESIDE } else { OWN };
+            let mut left = bits;
+            while left != 0 {
+                let i = left.trailing_zeros() as usize;
+                left &= left - 1;
+                bits &= !(u64::from(self.readings_at(seen.column[i], seen.row[i]) & enough == 0) << i);
             }
         }
         bits
     }
 
     #[inline(always)]
-    fn value_at(&self, column: i32, row: i32) -> f32 {
+    fn readings_at(&self, column: i32, row: i32) -> u8 {
         let pixel = |v: i32, n: usize| (((v + STEPS / 2) / STEPS).max(0) as usize).min(n - 1);
-        self.values[pixel(row, self.rows) * self.columns + pixel(column, self.columns)]
+        self.readings[pixel(row, self.rows) * self.columns + pixel(column, self.columns)]
     }
+}
+
+/// [`OWN`] and [`BESIDE`] of every pixel. Pixels beyond the border have no reading.
+fn readings(values: &[f32], columns: usize) -> Vec<u8> {
+    let own: Vec<u8> = values.iter().map(|&v| u8::from(v != 0.0)).collect();
+    // Above, here and below; then to the left and to the right.
+    let mut tall = own.clone();
+    let below = tall.iter_mut().zip(own.iter().skip(columns));
+    below.for_each(|(to, from)| *to |= from);
+    let above = tall.iter_mut().skip(columns).zip(&own);
+    above.for_each(|(to, from)| *to |= from);
+    let mut all = own;
+    for (all, tall) in all.chunks_exact_mut(columns.max(1)).zip(tall.chunks_exact(columns.max(1))) {
+        all.iter_mut().zip(tall).for_each(|(to, from)| *to |= from * BESIDE);
+        all.iter_mut().zip(&tall[1..]).for_each(|(to, from)| *to |= from * BESIDE);
+        all[1..].iter_mut().zip(tall).for_each(|(to, from)| *to |= from * BESIDE);
+    }
+    all
 }
 
 /// Eight balls about the corners of a cube.
