@@ -81,7 +81,7 @@ impl RangeImage {
     /// # Errors
     /// What contradicts the rest, in words.
     pub fn check(&self) -> Result<(), &'static str> {
-        let cells = self.columns.checked_mul(self.rows).unwrap_or(usize::MAX);
+        let cells = self.columns.saturating_mul(self.rows);
         let fits = |holds: bool, why: &'static str| if holds { Ok(()) } else { Err(why) };
         fits(cells > 0, "it has no pixels")?;
         let largest = self.columns.max(self.rows);
