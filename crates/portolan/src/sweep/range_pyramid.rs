@@ -67,7 +67,9 @@ impl RangePyramid {
     /// Bounds of the smallest and the largest value in `columns` x `rows`, both ends included; they must lie in the image.
     #[inline]
     pub(super) fn extremes(&self, columns: [usize; 2], rows: [usize; 2]) -> [f32; 2] {
-        let mut k = 1;
+        // The first level that can be coarse enough.
+        let span = (columns[1] - columns[0]).max(rows[1] - rows[0]);
+        let mut k = (span.max(1).ilog2() as usize).saturating_sub(1).clamp(1, self.used);
         let wide = |k: usize| (columns[1] >> k) - (columns[0] >> k) >= SQUARES;
         let high = |k: usize| (rows[1] >> k) - (rows[0] >> k) >= SQUARES;
         while k < self.used && (wide(k) || high(k)) {
