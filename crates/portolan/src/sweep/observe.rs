@@ -179,8 +179,11 @@ fn observe(view: &View<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut L
     if torn.iter().fold(0, |any, t| any | t) != 0 {
         let (other, other_weight) = alone(view, &seen, &at);
         for l in 0..LANES {
-            distance[l] = if torn[l] != 0 { other[l] } else { distance[l] };
-            weight[l] = if torn[l] != 0 { other_weight[l] } else { weight[l] };
+            // Bits, not branches: a choice between two places in memory does not stand in vectors.
+            let mask = 0u32.wrapping_sub(torn[l]);
+            let choose = |a: f32, b: f32| f32::from_bits(a.to_bits() & mask | b.to_bits() & !mask);
+            distance[l] = choose(other[l], distance[l]);
+            weight[l] = choose(other_weight[l], weight[l]);
         }
     }
     if !view.image.cosine.is_empty() {
