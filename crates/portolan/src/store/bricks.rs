@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 /// Keys that are taken out, fused and put back together: enough for every core, few enough that what is allocated
 /// beyond a limit is forgotten quickly.
-const TOGETHER: usize = 1024;
+const TOGETHER: usize = 4096;
 
 /// Cells in bricks of `8^D`, found by hashing the brick's index.
 ///
@@ -156,11 +156,12 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
         self.epoch += 1;
         let mut total = 0;
         let mut work: Vec<Work<C>> = Vec::with_capacity(keys.len().min(TOGETHER));
+        let mut slots = Vec::new();
         let empty = C::Brick::unobserved(0);
         for (chunk, keys) in keys.chunks(TOGETHER).enumerate() {
             work.clear();
-            work.extend(keys.iter().enumerate().map(|(i, key)| {
-                let slot = self.slots.get(key).copied();
+            find(&self.slots, keys, &mut slots);
+            work.extend(slots.iter().enumerate().map(|(i, &slot)| {
                 // Taken out, so that every brick is changed in place by one worker alone.
                 let brick = slot.map(|s| std::mem::replace(&mut self.bricks[s as usize], empty.clone()));
                 let bytes = brick.as_ref().map_or(0, Planes::bytes);
@@ -198,6 +199,22 @@ struct Work<C: Cell> {
     bytes: usize,
     brick: Option<C::Brick>,
     cells: usize,
+}
+
+/// The slots of keys, in their order.
+fn find<const D: usize>(
+    slots: &FxHashMap<BlockKey<D>, u32>,
+    keys: &[BlockKey<D>],
+    found: &mut Vec<Option<u32>>,
+) {
+    #[cfg(feature = "parallel")]
+    if keys.len() >= 1024 && rayon::current_num_threads() > 1 {
+        use rayon::prelude::*;
+        let each = keys.par_iter().with_min_len(256).map(|key| slots.get(key).copied());
+        return each.collect_into_vec(found);
+    }
+    found.clear();
+    found.extend(keys.iter().map(|key| slots.get(key).copied()));
 }
 
 #[cfg(feature = "parallel")]

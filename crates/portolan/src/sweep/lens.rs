@@ -203,24 +203,38 @@ impl Lens {
         out
     }
 
-    /// Distance between a point and the ray of a pixel that is `du`, `dv` pixels away (metres), `length` along the ray.
+    /// Distances between points and the rays of pixels near them (metres).
     #[inline(always)]
-    pub(super) fn aside(&self, du: f32, dv: f32, row: usize, length: f32, scale: f32) -> f32 {
-        let [a, b] = self.openings(row);
-        let depth = match self.kind {
-            Kind::Pinhole { .. } => length / scale,
-            Kind::Spherical(_) => length,
-            Kind::Orthographic { .. } => 1.0,
-        };
-        ((du * a).powi(2) + (dv * b).powi(2)).sqrt() * depth
+    pub(super) fn aside(&self, steps: &Steps, seen: &Projected) -> Lanes {
+        let mut aside = [0.0; LANES];
+        // Checked without a way out of the loops: so the loads are gathers.
+        let openings = &self.openings[..];
+        if matches!(self.kind, Kind::Spherical(_)) {
+            for l in 0..LANES {
+                let row = (steps.row[l] & 0x3fff_ffff) as usize;
+                let row = row.min(openings.len() - 1);
+                let a = if row < openings.len() { openings[row][0] } else { 0.0 };
+                let b = if row < openings.len() { openings[row][1] } else { 0.0 };
+                aside[l] = across(steps.right[l] * a, steps.below[l] * b) * seen.length[l];
+            }
+            return aside;
+        }
+        let [a, b] = self.openings(0);
+        let parallel = self.is_parallel();
+        for l in 0..LANES {
+            let depth = if parallel { 1.0 } else { seen.length[l] / seen.scale[l] };
+            aside[l] = across(steps.right[l] * a, steps.below[l] * b) * depth;
+        }
+        aside
     }
 
-    /// Smallest and largest value that a pixel would have whose surface were in the box of [`Lens::window`].
+    /// Smallest and largest value that a pixel would have whose surface were in the box of [`Lens::window`]; `ranges`: how
+    /// near and far the box is.
     #[inline]
-    pub(super) fn depth(&self, centre: [f64; 3], half: [f64; 3], near: f64, far: f64) -> [f64; 2] {
+    pub(super) fn depth(&self, centre: [f64; 3], half: [f64; 3], ranges: impl Fn() -> [f64; 2]) -> [f64; 2] {
         match &self.kind {
             Kind::Pinhole { .. } => [centre[2] - half[2], centre[2] + half[2]],
-            Kind::Spherical(_) => [near, far],
+            Kind::Spherical(_) => ranges(),
             Kind::Orthographic { top, .. } => [top - centre[2] - half[2], top - centre[2] + half[2]],
         }
     }
@@ -234,13 +248,14 @@ impl Lens {
                 if back <= 0.0 {
                     return None;
                 }
+                let (per_front, per_back) = (1.0 / front, 1.0 / back);
                 let side = |k: usize| {
                     if front <= 1e-9 {
                         return [f64::NEG_INFINITY, f64::INFINITY];
                     }
                     let (low, high) = (centre[k] - half[k], centre[k] + half[k]);
-                    let low = low / if low < 0.0 { front } else { back };
-                    let high = high / if high < 0.0 { back } else { front };
+                    let low = low * if low < 0.0 { per_front } else { per_back };
+                    let high = high * if high < 0.0 { per_back } else { per_front };
                     let (a, b) = (focal[k] * low + c[k], focal[k] * high + c[k]);
                     [a.min(b), a.max(b)]
                 };
@@ -281,6 +296,18 @@ fn clamped(low: f64, high: f64, n: usize) -> Option<[usize; 2]> {
     // What is not negative is rounded down by truncation; `floor` is a call on baseline x86-64.
     (high >= 0.5 && low <= last - 0.5)
         .then(|| [low.clamp(0.0, last) as usize, (high.clamp(0.0, last) as usize + 1).min(n + 1)])
+}
+
+#[inline(always)]
+fn across(a: f32, b: f32) -> f32 {
+    (a * a + b * b).sqrt()
+}
+
+/// From pixels to 64 points: columns, rows, and the row of each pixel (without the border).
+pub(super) struct Steps {
+    pub right: Lanes,
+    pub below: Lanes,
+    pub row: [u32; LANES],
 }
 
 /// What [`Lens::project`] says of 64 points.

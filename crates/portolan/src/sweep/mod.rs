@@ -8,6 +8,7 @@
 //! | [`Projective`] | distances | the centre of every cell of space, against a range image |
 //! | [`PointRays`] | distances | every cell that a ray to a point of space passes through; the nearest ray counts |
 
+mod bands;
 mod cell_centre;
 mod fan;
 mod fan_plan;

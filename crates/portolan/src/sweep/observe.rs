@@ -3,7 +3,7 @@
 //! Every loop runs over the 64 lanes of an octant without calls and without branches, so that it stands in the widest vectors that the
 //! processor has; no operation depends on the width, so that all versions give the same bits.
 
-use super::lens::{LANES, Lanes, Lens};
+use super::lens::{LANES, Lanes, Lens, Projected, Steps};
 use super::padded_image::PaddedImage;
 use crate::geom::block_cells;
 use multiversion::multiversion;
@@ -116,6 +116,8 @@ fn block(
 /// Where 64 points fall: the pixel left above of each, and how far right below of its centre.
 pub(super) struct Places {
     pub index: [u32; LANES],
+    /// Row of that pixel, the border counted.
+    pub row: [u32; LANES],
     pub right: Lanes,
     pub below: Lanes,
 }
@@ -123,13 +125,14 @@ pub(super) struct Places {
 #[inline(always)]
 pub(super) fn places(u: &Lanes, v: &Lanes, stride: usize) -> Places {
     const MAGIC: f32 = 8_388_608.0; // 2^23: adding it leaves the integer in the low bits
-    let mut at = Places { index: [0; LANES], right: [0.0; LANES], below: [0.0; LANES] };
+    let mut at = Places { index: [0; LANES], row: [0; LANES], right: [0.0; LANES], below: [0.0; LANES] };
     let stride = stride as u32;
     for l in 0..LANES {
         let (iu, iv) = ((u[l] - 0.5).max(0.0) + MAGIC, (v[l] - 0.5).max(0.0) + MAGIC);
         at.right[l] = u[l] - (iu - MAGIC);
         at.below[l] = v[l] - (iv - MAGIC);
-        at.index[l] = (iv.to_bits() & 0x7f_ffff) * stride + (iu.to_bits() & 0x7f_ffff);
+        at.row[l] = iv.to_bits() & 0x7f_ffff;
+        at.index[l] = at.row[l] * stride + (iu.to_bits() & 0x7f_ffff);
     }
     at
 }
@@ -174,17 +177,13 @@ fn observe(view: &View<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut L
         weight[l] = if q > 0.0 { w } else { 0.0 };
     }
     if torn.iter().fold(0, |any, t| any | t) != 0 {
+        let (other, other_weight) = alone(view, &seen, &at);
         for l in 0..LANES {
-            if torn[l] != 0 {
-                let spot = Spot {
-                    index: at.index[l] as usize,
-                    right: at.right[l],
-                    below: at.below[l],
-                    length: seen.length[l],
-                    scale: seen.scale[l],
-                };
-                (distance[l], weight[l]) = alone(view, &spot);
-            }
+            // Bits, not branches: a choice between two places in memory does not stand in vectors.
+            let mask = 0u32.wrapping_sub(torn[l]);
+            let choose = |a: f32, b: f32| f32::from_bits(a.to_bits() & mask | b.to_bits() & !mask);
+            distance[l] = choose(other[l], distance[l]);
+            weight[l] = choose(other_weight[l], weight[l]);
         }
     }
     if !view.image.cosine.is_empty() {
@@ -201,54 +200,56 @@ pub(super) fn nearest(index: usize, right: f32, below: f32, stride: usize) -> us
     index + usize::from(right >= 0.5) + if below >= 0.5 { stride } else { 0 }
 }
 
-/// One point between four pixels that are not of one surface.
-struct Spot {
-    index: usize,
-    right: f32,
-    below: f32,
-    length: f32,
-    scale: f32,
-}
-
-/// The nearest ray speaks of its surface, but only as far aside as half a cell; beyond, what is free is free up to the
-/// nearest of the four. A ray that met nothing says that it is free.
+/// Distances and weights as if no point were between pixels of one surface: the nearest ray speaks of its surface, but only
+/// as far aside as half a cell; beyond, what is free is free up to the nearest of the four. A ray that met nothing says that
+/// it is free.
 #[inline(always)]
-fn alone(view: &View<'_>, spot: &Spot) -> (f32, f32) {
-    const NOTHING: (f32, f32) = (0.0, 0.0);
+fn alone(view: &View<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes) {
     let stride = view.image.stride;
-    let value = &view.image.value;
-    let (above, below) = (&value[spot.index..][..2], &value[spot.index + stride..][..2]);
-    let four = [above[0].abs(), above[1].abs(), below[0].abs(), below[1].abs()];
-    let tau = view.truncation;
-    // Most cells here lie behind all four.
-    let farthest = four[0].max(four[1]).max(four[2].max(four[3]));
-    if farthest * spot.scale - spot.length < -tau {
-        return NOTHING;
+    let value = &view.image.value[..];
+    let mut steps = Steps { right: [0.0; LANES], below: [0.0; LANES], row: [0; LANES] };
+    let mut own = [0.0f32; LANES];
+    for l in 0..LANES {
+        let (right, below) = (u32::from(at.right[l] >= 0.5), u32::from(at.below[l] >= 0.5));
+        steps.right[l] = at.right[l] - right as f32;
+        steps.below[l] = at.below[l] - below as f32;
+        steps.row[l] = (at.row[l] + below).max(1) - 1;
+        let i = ((at.index[l] + right + below * stride as u32) & 0x3fff_ffff) as usize;
+        own[l] = if i < value.len() { value[i] } else { 0.0 };
     }
-    let (right, low) = (spot.right >= 0.5, spot.below >= 0.5);
-    let pixel = nearest(spot.index, spot.right, spot.below, stride);
-    let v = value[pixel];
-    let (du, dv) = (spot.right - f32::from(u8::from(right)), spot.below - f32::from(u8::from(low)));
-    let aside = view.lens.aside(du, dv, (pixel / stride).saturating_sub(1), spot.length, spot.scale);
-    let (value, hit) = if aside <= view.aside {
-        (v.abs(), v > 0.0)
-    } else {
-        (four[0].min(four[1]).min(four[2].min(four[3])), false)
-    };
-    if value == 0.0 {
-        return NOTHING;
+    let aside = view.lens.aside(&steps, seen);
+    let mut least = [0.0f32; LANES];
+    // Who says nothing of free space needs no more than the nearest ray.
+    if view.carve_weight > 0.0 {
+        let n = value.len().saturating_sub(stride + 1);
+        let (above, below) = (&value[..n], &value[stride..][..n]);
+        let (above_right, below_right) = (&value[1..][..n], &value[stride + 1..][..n]);
+        for l in 0..LANES {
+            let i = (at.index[l] & 0x3fff_ffff) as usize;
+            let a = if i < n { above[i].abs() } else { 0.0 };
+            let b = if i < n { above_right[i].abs() } else { 0.0 };
+            let c = if i < n { below[i].abs() } else { 0.0 };
+            let d = if i < n { below_right[i].abs() } else { 0.0 };
+            least[l] = a.min(b).min(c.min(d));
+        }
     }
-    let range = value * spot.scale;
-    let d = range - spot.length;
-    let weight = if d > tau {
-        if spot.length >= 0.0 { view.carve_weight } else { 0.0 }
-    } else if hit {
-        (1.0 + d / tau).clamp(0.0, 1.0)
-    } else {
-        return NOTHING;
-    };
-    let squared = view.inverse_square && !view.lens.is_parallel();
-    (d.min(tau), if squared { weight / (range.max(1.0) * range.max(1.0)) } else { weight })
+    let squared = view.inverse_square & !view.lens.is_parallel();
+    let (tau, carve) = (view.truncation, view.carve_weight);
+    let (mut distance, mut weight) = ([0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        let near = aside[l] <= view.aside;
+        let value = if near { own[l].abs() } else { least[l] };
+        let range = value * seen.scale[l];
+        let d = range - seen.length[l];
+        let free = if seen.length[l] >= 0.0 { carve } else { 0.0 };
+        let surface = (1.0 + d / tau).clamp(0.0, 1.0);
+        let surface = if near & (own[l] > 0.0) { surface } else { 0.0 };
+        let w = if d > tau { free } else { surface };
+        let w = if squared { w / (range.max(1.0) * range.max(1.0)) } else { w };
+        distance[l] = d.min(tau);
+        weight[l] = if value > 0.0 { w } else { 0.0 };
+    }
+    (distance, weight)
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! A range image made ready for being looked up: cleaned, with a border, torn where surfaces end.
 
+use super::bands::each_row;
 use super::lens::Lens;
 use super::weight::WeightModel;
 use crate::geom::vector::{dot, norm, sub};
@@ -20,6 +21,7 @@ pub(super) struct PaddedImage {
     pub columns: usize,
     pub rows: usize,
     pub stride: usize,
+    closed: bool,
     /// As in the image: a surface, 0 for nothing known, negative for free up to there. The border knows nothing.
     pub value: Vec<f32>,
     /// What is linear on a plane: 1 / value of a surface (the value itself where rays are parallel), else 0. The sign is
@@ -51,11 +53,15 @@ impl PaddedImage {
         lens: &Lens,
         how: &Cleaning,
     ) -> (BeamCounts, RefusedBeams) {
-        (self.columns, self.rows, self.stride) = (image.columns, image.rows, image.columns + 3);
-        let pixels = self.stride * (self.rows + 2);
-        for plane in [&mut self.value, &mut self.linear] {
-            plane.clear();
-            plane.resize(pixels, 0.0);
+        let shape = (image.columns, image.rows, lens.is_closed());
+        if shape != (self.columns, self.rows, self.closed) {
+            (self.columns, self.rows, self.closed) = shape;
+            self.stride = image.columns + 3;
+            // All but the border is written for every image.
+            for plane in [&mut self.value, &mut self.linear] {
+                plane.clear();
+                plane.resize(self.stride * (self.rows + 2), 0.0);
+            }
         }
         let counted = self.clean(image, lens, how);
         self.tear(lens, how.step as f32);
@@ -74,8 +80,6 @@ impl PaddedImage {
     }
 
     fn clean(&mut self, image: &RangeImage, lens: &Lens, how: &Cleaning) -> (BeamCounts, RefusedBeams) {
-        let mut refused = RefusedBeams::default();
-        let (mut hits, mut free) = (0, 0);
         let (w, stride) = (self.columns, self.stride);
         // Along a row the least and the most that a ray is longer than its value: whole rows need no closer look.
         let all_fit = |row: usize, values: &[f32]| {
@@ -85,9 +89,10 @@ impl PaddedImage {
                 (how.min_range.max(NEAREST) as f32, (how.max_range / most * (1.0 - 1e-6)) as f32);
             all_within(values, low, high)
         };
-        for row in 0..self.rows {
-            let from = &image.values[row * w..][..w];
-            let to = &mut self.value[(row + 1) * stride + 1..][..w];
+        let inside = stride..stride * (self.rows + 1);
+        let clean_row = |row: usize, to: &mut [f32]| {
+            let mut refused = RefusedBeams::default();
+            let (from, to) = (&image.values[row * w..][..w], &mut to[1..=w]);
             if all_fit(row, from) {
                 to.copy_from_slice(from);
             } else {
@@ -95,10 +100,18 @@ impl PaddedImage {
                     *to = clean(v, lens.stretch(column, row), how, &mut refused);
                 }
             }
-            let linear = &mut self.linear[(row + 1) * stride + 1..][..w];
-            let (hit, empty) = make_linear(to, linear, lens.is_parallel());
-            (hits, free) = (hits + hit, free + empty);
-        }
+            refused
+        };
+        let refused = each_row(&mut self.value[inside.clone()], stride, clean_row, |mut a, b| {
+            a += b;
+            a
+        });
+        let (value, parallel) = (&self.value, lens.is_parallel());
+        let linear_row = |row: usize, linear: &mut [f32]| {
+            make_linear(&value[(row + 1) * stride + 1..][..w], &mut linear[1..=w], parallel)
+        };
+        let (hits, free) =
+            each_row(&mut self.linear[inside], stride, linear_row, |a, b| (a.0 + b.0, a.1 + b.1));
         if lens.is_closed() {
             Self::repeat_seam(&mut self.value, stride);
             Self::repeat_seam(&mut self.linear, stride);
@@ -119,14 +132,14 @@ impl PaddedImage {
             (false, true) => (MAX_SLOPE as f32 * opening, step),
             (false, false) => (0.0, f32::NEG_INFINITY),
         };
-        for row in 0..=self.rows {
+        let value = &self.value;
+        let mark_row = |row: usize, linear: &mut [f32]| {
             let [across, down] = lens.openings(row.saturating_sub(1));
             let ((ax, bx), (ay, by)) = (slope(across), slope(down));
-            let (v0, v1) =
-                (&self.value[row * stride..][..stride], &self.value[(row + 1) * stride..][..stride]);
-            let linear = &mut self.linear[row * stride..][..stride - 1];
-            mark_torn(v0, v1, linear, [ax, bx, ay, by]);
-        }
+            let (v0, v1) = (&value[row * stride..][..stride], &value[(row + 1) * stride..][..stride]);
+            mark_torn(v0, v1, &mut linear[..stride - 1], [ax, bx, ay, by]);
+        };
+        each_row(&mut self.linear[..stride * (self.rows + 1)], stride, mark_row, |(), ()| ());
     }
 
     fn repeat_seam(plane: &mut [f32], stride: usize) {
@@ -235,7 +248,8 @@ fn mark_torn(above: &[f32], below: &[f32], linear: &mut [f32], how: [f32; 4]) {
         let [kx, sx, ky, sy] = how;
         let whole = hits & near(a, b, kx, sx) & near(c, d, kx, sx) & near(a, c, ky, sy) & near(b, d, ky, sy);
         let silent = (a == 0.0) & (b == 0.0) & (c == 0.0) & (d == 0.0);
-        linear[i] = if whole | silent { linear[i] } else { -linear[i] };
+        // (What was there may have the mark of another image: in the border.)
+        linear[i] = if whole | silent { linear[i].abs() } else { -linear[i].abs() };
     }
 }
 

@@ -153,7 +153,8 @@ impl Projective {
         if span > 1 << 20 {
             return Err(PlanError::TooManyBlocks);
         }
-        let search = Search { sweep: self, lens, first, last, most };
+        let spread = self.image_from_world.map(|row| row[0].abs() + row[1].abs() + row[2].abs());
+        let search = Search { sweep: self, lens, first, last, most, spread };
         let found = search.run(span);
         if found.len() > most {
             return Err(PlanError::TooManyBlocks);
@@ -271,6 +272,8 @@ struct Search<'a> {
     first: [i64; 3],
     last: [i64; 3],
     most: usize,
+    /// Half edges along the sensor's axes of a box of half edge 1 along the map's.
+    spread: [f64; 3],
 }
 
 /// What the image says of a box of blocks.
@@ -402,17 +405,22 @@ impl Search<'_> {
         });
         // The box of the centres of its cells.
         let half = 0.5 * (edge - 1) as f64 * r;
-        let (mut near, mut far) = (0.0, 0.0);
         let (mut centre, mut halves) = ([0.0; 3], [0.0; 3]);
         for k in 0..3 {
-            let (low, high) = ((offset[k].abs() - half).max(0.0), offset[k].abs() + half);
-            (near, far) = (near + low * low, far + high * high);
             let row = &sweep.image_from_world[k];
             centre[k] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
-            halves[k] = half * (row[0].abs() + row[1].abs() + row[2].abs());
+            halves[k] = half * self.spread[k];
         }
-        let (near, far) = (f64::sqrt(near), f64::sqrt(far));
-        let depth = self.lens.depth(centre, halves, near, far);
+        let depth = self.lens.depth(centre, halves, || {
+            let (mut near, mut far) = (0.0, 0.0);
+            for o in offset.map(f64::abs) {
+                let (low, high) = ((o - half).max(0.0), o + half);
+                (near, far) = (near + low * low, far + high * high);
+            }
+            [near.sqrt(), far.sqrt()]
+        });
+        // No corner is further away than the way to it along the axes.
+        let far = offset[0].abs() + offset[1].abs() + offset[2].abs() + 3.0 * half;
         let (tau, slack) = (sweep.settings.truncation, 1e-4 * r + 1e-6 * (depth[1].abs() + far));
         let class = |[least, most]: [f32; 2]| {
             let before = depth[1] < f64::from(least) - tau - slack;

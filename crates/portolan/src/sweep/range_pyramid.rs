@@ -1,5 +1,6 @@
 //! The nearest and the farthest value of any part of an image in a few reads.
 
+use super::bands::each_row;
 use multiversion::multiversion;
 
 /// Smallest and largest values of squares of 2, 4, 8 ... pixels. Windows are looked up in the level whose squares are no
@@ -27,11 +28,12 @@ impl RangePyramid {
         let rows = values.len() / columns;
         let first = self.level(0, columns.div_ceil(2), rows.div_ceil(2));
         let width = columns.div_ceil(2);
-        for (y, out) in first.extremes.chunks_exact_mut(width).enumerate() {
+        let halve_row = |y: usize, out: &mut [[f32; 2]]| {
             let top = &values[2 * y * columns..][..columns];
             let bottom = values.get((2 * y + 1) * columns..(2 * y + 2) * columns).unwrap_or(top);
             halve(top, bottom, out, surfaces_only);
-        }
+        };
+        each_row(&mut first.extremes, width, halve_row, |(), ()| ());
         self.used = 1;
         loop {
             let below = &self.levels[self.used - 1];
@@ -42,14 +44,16 @@ impl RangePyramid {
             self.level(self.used, w.div_ceil(2), h.div_ceil(2));
             let (fine, coarse) = self.levels.split_at_mut(self.used);
             let (fine, coarse) = (&fine[self.used - 1], &mut coarse[0]);
-            for y in 0..coarse.rows {
-                for x in 0..coarse.columns {
-                    let (x1, y1) = ((2 * x + 1).min(w - 1), (2 * y + 1).min(h - 1));
-                    let at = |x: usize, y: usize| fine.extremes[y * w + x];
-                    coarse.extremes[y * coarse.columns + x] =
-                        join(join(at(2 * x, 2 * y), at(x1, 2 * y)), join(at(2 * x, y1), at(x1, y1)));
+            let halve_row = |y: usize, out: &mut [[f32; 2]]| {
+                let y1 = (2 * y + 1).min(h - 1);
+                let at = |x: usize, y: usize| fine.extremes[y * w + x];
+                for (x, out) in out.iter_mut().enumerate() {
+                    let x1 = (2 * x + 1).min(w - 1);
+                    *out = join(join(at(2 * x, 2 * y), at(x1, 2 * y)), join(at(2 * x, y1), at(x1, y1)));
                 }
-            }
+            };
+            let width = coarse.columns;
+            each_row(&mut coarse.extremes, width, halve_row, |(), ()| ());
             self.used += 1;
         }
     }
@@ -67,7 +71,9 @@ impl RangePyramid {
     /// Bounds of the smallest and the largest value in `columns` x `rows`, both ends included; they must lie in the image.
     #[inline]
     pub(super) fn extremes(&self, columns: [usize; 2], rows: [usize; 2]) -> [f32; 2] {
-        let mut k = 1;
+        // The first level that can be coarse enough.
+        let span = (columns[1] - columns[0]).max(rows[1] - rows[0]);
+        let mut k = (span.max(1).ilog2() as usize).saturating_sub(1).clamp(1, self.used);
         let wide = |k: usize| (columns[1] >> k) - (columns[0] >> k) >= SQUARES;
         let high = |k: usize| (rows[1] >> k) - (rows[0] >> k) >= SQUARES;
         while k < self.used && (wide(k) || high(k)) {
