@@ -74,7 +74,7 @@ impl ExactRays {
         let mut boxes = vec![Aabb::EMPTY; parts];
         in_parallel(boxes.iter_mut().enumerate(), |(i, b)| {
             let short = |r: &Ray| bounds.is_some() || !is_long(lattice, r);
-            *b = extent(lattice, range(i).map(|i| ray(i)).filter(short))
+            *b = extent(lattice, range(i).map(&ray).filter(short))
         });
         let all = boxes.into_iter().fold(extent(lattice, further.iter().copied()), Aabb::union);
         let (first, last) = reach(lattice, bounds, all);

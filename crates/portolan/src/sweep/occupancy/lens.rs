@@ -33,6 +33,7 @@ pub(crate) struct Views {
 
 /// A projection made ready for many points in `f32`.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one a scan, and it is not moved")]
 pub(crate) enum Lens {
     Spherical {
         first: f32,
