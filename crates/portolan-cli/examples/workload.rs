@@ -6,6 +6,7 @@
 //!
 //! Only the library's own calls are inside the clock; reading and decoding files is not.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -77,7 +78,7 @@ fn main() -> anyhow::Result<()> {
     if let (Value::Object(line), Value::Object(more)) = (&mut line, more) {
         line.extend(more);
     }
-    println!("{line}");
+    writeln!(std::io::stdout(), "{line}")?;
     Ok(())
 }
 

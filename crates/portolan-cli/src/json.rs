@@ -1,7 +1,7 @@
 //! Library values as JSON.
 
 use portolan::geom::{Aabb, Grid};
-use portolan::scan::ScanStats;
+use portolan::scan::{RefusedBeams, ScanStats};
 use portolan_io::space_log::SpaceLogStats;
 use portolan_io::{CarmenStats, TimeOrder};
 use serde_json::{Map, Value, json};
@@ -29,6 +29,15 @@ pub(crate) fn stats(stats: &ScanStats) -> Value {
             "too_far": r.too_far,
         },
     })
+}
+
+/// Refused readings by cause, in words.
+pub(crate) fn refused_words(r: &RefusedBeams) -> String {
+    let mut causes = format!("{} not finite, {} negative, {} too near", r.not_finite, r.negative, r.too_near);
+    if r.too_far > 0 {
+        causes += &format!(", {} too far", r.too_far);
+    }
+    format!("{} readings could not be used ({causes})", r.total())
 }
 
 /// Adds the numbers of `other` to those of `sum`, field by field.

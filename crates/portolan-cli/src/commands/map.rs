@@ -4,7 +4,7 @@ mod common;
 mod plane;
 mod space;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use portolan::geom::Aabb;
 use portolan::scan::Body;
@@ -141,13 +141,13 @@ impl Args {
 
     /// A file in place of the folder is found out before the work, not after it.
     fn check_out(&self) -> anyhow::Result<()> {
-        let same =
-            |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
-        if same(&self.out, &self.log) {
-            return Err(bad_call("--out is the log's own folder; name another one"));
-        }
         if self.out.exists() && !self.out.is_dir() {
             anyhow::bail!("{}: is a file, not a folder; name a folder for the results", self.out.display());
+        }
+        if let (Ok(out), Ok(log)) = (self.out.canonicalize(), self.log.canonicalize())
+            && out == log
+        {
+            return Err(bad_call("--out is the log's own folder; name another one"));
         }
         Ok(())
     }

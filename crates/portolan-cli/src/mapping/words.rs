@@ -44,15 +44,7 @@ impl Summary<'_> {
             ));
         }
         if stats.refused.total() > 0 {
-            let r = &stats.refused;
-            warnings.push(format!(
-                "{} readings could not be used ({} not finite, {} negative, {} too near, {} too far)",
-                r.total(),
-                r.not_finite,
-                r.negative,
-                r.too_near,
-                r.too_far
-            ));
+            warnings.push(json::refused_words(&stats.refused));
         }
         if stats.hits_outside > 0 {
             warnings.push(format!("{} hits lie outside of --bounds", stats.hits_outside));

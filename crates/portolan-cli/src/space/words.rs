@@ -46,15 +46,7 @@ impl Summary<'_> {
             warnings.push(format!("{n} scans could not be read (first: {error})"));
         }
         if stats.refused.total() > 0 {
-            let r = &stats.refused;
-            warnings.push(format!(
-                "{} readings could not be used ({} not finite, {} negative, {} too near, {} too far)",
-                r.total(),
-                r.not_finite,
-                r.negative,
-                r.too_near,
-                r.too_far
-            ));
+            warnings.push(json::refused_words(&stats.refused));
         }
         let lost = self.fusion.without_pixel;
         if 20 * lost > stats.beams.hit {

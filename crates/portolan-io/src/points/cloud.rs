@@ -143,7 +143,8 @@ mod tests {
         assert_eq!(scan.points, [[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
         assert_eq!(scan.times, [0.0, 0.2]);
         assert_eq!(scan.origin, Origin::Common([2.0, 0.0, 0.0]));
-        assert_eq!((scan.refused.not_finite, scan.refused.too_near), (3, 1));
+        let refused = scan.refused;
+        assert_eq!((refused.not_finite, refused.too_far, refused.too_near), (1, 2, 1));
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub enum PointSweep {
     Rays,
 }
 
-/// Settings of a [`SparseTsdf`].
+/// Settings of a [`SparseTsdf`](super::SparseTsdf).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SparseTsdfConfig {
     /// Edge of a cell (metres).
