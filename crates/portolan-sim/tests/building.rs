@@ -63,6 +63,16 @@ fn free_space_is_free_and_surfaces_are_not_at_5_cm() {
     assert_labels(0.05, OccupancySweep::Exact, 3e-3);
 }
 
+#[test]
+fn the_default_sweep_keeps_surfaces_at_10_cm() {
+    assert_labels(0.1, OccupancySweep::Auto, 2e-4);
+}
+
+#[test]
+fn the_default_sweep_keeps_surfaces_at_5_cm() {
+    assert_labels(0.05, OccupancySweep::Auto, 2e-4);
+}
+
 /// The mesh's vertices.
 fn vertices(map: &SparseTsdf) -> Vec<[f64; 3]> {
     let mesh = marching_cubes(map.store(), None, &MeshSettings::default());
