@@ -1,10 +1,12 @@
 //! Read-only fields that answer in constant time.
 
+mod clearance;
 mod distance_transform;
 mod envelope;
 mod esdf;
 mod sparse;
 
+pub use clearance::{Clearance, ClearanceField, UnknownSpace};
 pub use distance_transform::squared_distance_transform;
 pub use esdf::{Esdf, EsdfError, EsdfSettings, esdf_from_tsdf};
 pub use sparse::{DenseEsdf, SparseEsdf, SparseEsdfSettings};

@@ -4,7 +4,9 @@
 //! looks at, no further than an upper bound of what will be found. Nothing is computed twice, as it is where tiles
 //! with a halo are solved one by one.
 
+mod crossings;
 mod dense;
+mod feature;
 mod kernels;
 mod min_plus;
 mod pass;
