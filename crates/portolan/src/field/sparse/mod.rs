@@ -4,13 +4,17 @@
 //! looks at, no further than an upper bound of what will be found. Nothing is computed twice, as it is where tiles
 //! with a halo are solved one by one.
 
+mod anchors;
 mod crossings;
 mod dense;
+mod edges;
 mod feature;
 mod kernels;
+mod level;
 mod min_plus;
 mod pass;
 mod reach;
+mod roots;
 mod seeds;
 mod sparse_esdf;
 mod transform;
