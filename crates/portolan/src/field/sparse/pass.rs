@@ -325,6 +325,15 @@ impl<B, const D: usize> Line<'_, B, D> {
     }
 }
 
+/// What `make` makes of each, in the same order; a few in one task.
+pub(super) fn map_each<T: Sync, R: Send>(of: &[T], make: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    const TOGETHER: usize = 32;
+    let mut made: Vec<Vec<R>> = of.chunks(TOGETHER).map(|_| Vec::new()).collect();
+    let tasks = of.chunks(TOGETHER).zip(&mut made).collect();
+    for_each(tasks, || (), |(of, made), ()| *made = of.iter().map(&make).collect());
+    made.into_iter().flatten().collect()
+}
+
 /// Every task by itself, on all cores with the feature `parallel`.
 #[cfg(feature = "parallel")]
 pub(super) fn for_each<T: Send, S>(

@@ -101,7 +101,7 @@ mod tests {
     fn overhead(band: bool, max_distance: f32) -> f64 {
         let store = rooms(band);
         let limit = (max_distance / 0.05).powi(2);
-        let rule = CellRule { min_weight: 0.5, band_cells: 1.5, resolution: 0.05, limit };
+        let rule = CellRule::band(0.5, 1.5, 0.05, limit);
         let survey = Survey::of(&store, &rule);
         let outputs = outputs_of_passes(survey.bricks.clone());
         let seeds: Vec<_> = survey.seeds().map(|(key, source)| Input { key, source }).collect();
