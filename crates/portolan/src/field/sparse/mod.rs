@@ -15,5 +15,6 @@ mod seeds;
 mod sparse_esdf;
 mod transform;
 
+pub(crate) use crossings::{BrickCrossings, Crossings};
 pub use dense::DenseEsdf;
 pub use sparse_esdf::{SparseEsdf, SparseEsdfSettings};
