@@ -2,6 +2,7 @@
 
 mod clearance;
 mod distance_transform;
+mod elements;
 mod envelope;
 mod esdf;
 mod sparse;
