@@ -12,6 +12,9 @@ pub(super) struct Panel<L, const N: usize> {
     pub(super) best: Vec<[L; N]>,
     /// Where they come from, in rows from their own; empty unless they are asked for.
     pub(super) offset: Vec<[L; N]>,
+    /// The cells of `rows`, and after [`solve`] of the minima; empty unless they are asked for.
+    pub(super) cells: Vec<[u32; N]>,
+    gathered: Vec<[u32; N]>,
     /// Which rows hold the minima of a solved row, over all lanes.
     spans: Vec<(u32, u32)>,
 }
@@ -26,8 +29,15 @@ impl<L: Level, const N: usize> Panel<L, N> {
     /// For lines of `n` cells.
     pub(super) fn new(n: usize, with_offsets: bool) -> Self {
         let rows = vec![[L::FAR; N]; n];
-        let offset = if with_offsets { rows.clone() } else { Vec::new() };
-        Self { best: rows.clone(), rows, offset, spans: vec![(0, 0); n] }
+        let asked = if with_offsets { n } else { 0 };
+        Self {
+            best: rows.clone(),
+            rows,
+            offset: vec![[L::ZERO; N]; asked],
+            cells: vec![[0; N]; asked],
+            gathered: vec![[0; N]; asked],
+            spans: vec![(0, 0); n],
+        }
     }
 
     /// Lanes without any value become lanes of zeros, which are done at once. `None`: all lanes are such.
@@ -138,6 +148,26 @@ impl<L: Level, const N: usize> Panel<L, N> {
         self.put::<OFFSET>(row, &found);
     }
 
+    /// Replaces the cells of the rows by those of their minima, `stride` further with every row.
+    #[inline(always)]
+    fn gather(&mut self, stride: u32) {
+        let cells = self.cells.as_flattened();
+        for (q, (offset, to)) in self.offset.iter().zip(&mut self.gathered).enumerate() {
+            let mut row = [0; N];
+            for lane in 0..N {
+                row[lane] = (q as u32).wrapping_add(offset[lane].offset() as u32);
+            }
+            for lane in 0..N {
+                // What is far may have any row.
+                to[lane] = cells.get(row[lane] as usize * N + lane).copied().unwrap_or(u32::MAX);
+            }
+            for lane in 0..N {
+                to[lane] = to[lane].wrapping_add(row[lane].wrapping_mul(stride));
+            }
+        }
+        std::mem::swap(&mut self.cells, &mut self.gathered);
+    }
+
     #[inline(always)]
     fn put<const OFFSET: bool>(&mut self, row: usize, found: &Found<L, N>) {
         self.best[row] = found.best;
@@ -160,12 +190,19 @@ fn bounds<L: Level, const N: usize>(offsets: &[L; N], row: usize) -> (u32, u32) 
 
 /// Fills `best`, and `offset` unless it is empty: `min over |k| <= reach of rows(q + k) + k^2`; ties go to the lowest
 /// row. `squares` holds the costs of all offsets in the line. Values that are far, and beyond `reach` any that is not
-/// less than its square, mean nothing.
+/// less than its square, mean nothing. Where cells are asked for, they become those of the minima: `stride` more with
+/// every row.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
-pub(super) fn solve<L: Level, const N: usize>(panel: &mut Panel<L, N>, reach: usize, squares: &[L]) {
+pub(super) fn solve<L: Level, const N: usize>(
+    panel: &mut Panel<L, N>,
+    reach: usize,
+    squares: &[L],
+    stride: usize,
+) {
     if panel.offset.is_empty() {
         panel.solve_lanes::<false>(reach, squares);
     } else {
         panel.solve_lanes::<true>(reach, squares);
+        panel.gather(stride as u32);
     }
 }

@@ -72,9 +72,9 @@ impl<L: Level, const D: usize> Plan<L, D> {
                 self.columns(source, &mut target, panel, finish);
             });
         }
-        nearest.iter_mut().zip(&*distance).for_each(|(cell, distance)| {
+        for (cell, distance) in nearest.iter_mut().zip(&*distance) {
             *cell = if *distance < f32::INFINITY { *cell } else { u32::MAX };
-        });
+        }
     }
 
     /// All passes but the last, slab by slab of the last axis.
@@ -129,26 +129,33 @@ impl<L: Level, const D: usize> Plan<L, D> {
         for column in (0..width).step_by(N) {
             let lanes = N.min(width - column);
             let from = target.column + column;
-            for (row, value) in panel.rows.iter_mut().zip(value.chunks(stride)) {
-                match value[from..].first_chunk::<N>() {
-                    Some(whole) if lanes == N => *row = *whole,
-                    _ => row[..lanes].copy_from_slice(&value[from..from + lanes]),
-                }
-            }
+            load(value, stride, from, lanes, &mut panel.rows);
             panel.rows.iter_mut().for_each(|row| row[lanes..].fill(L::FAR));
-            solve(panel, self.reach, &self.squares);
+            load(nearest, stride, from, lanes, &mut panel.cells);
+            solve(panel, self.reach, &self.squares, stride);
             for (best, to) in panel.best.iter().zip(&mut target.value) {
                 let to = &mut to[column..column + lanes];
                 to.iter_mut().zip(best).for_each(|(to, &best)| *to = finish(best));
             }
-            for (q, (offset, to)) in panel.offset.iter().zip(&mut target.nearest).enumerate() {
-                for (lane, to) in to[column..column + lanes].iter_mut().enumerate() {
-                    let row = q.saturating_add_signed(offset[lane].offset());
-                    // What is far has any row, and a cell that is not read.
-                    let cell = nearest.get(row * stride + from + lane).copied().unwrap_or(u32::MAX);
-                    *to = cell.wrapping_add((row * stride) as u32);
-                }
+            for (cells, to) in panel.cells.iter().zip(&mut target.nearest) {
+                to[column..column + lanes].copy_from_slice(&cells[..lanes]);
             }
+        }
+    }
+}
+
+/// Some columns of rows, `stride` apart, into the first lanes of a panel.
+fn load<T: Copy, const N: usize>(
+    from: &[T],
+    stride: usize,
+    column: usize,
+    lanes: usize,
+    rows: &mut [[T; N]],
+) {
+    for (row, from) in rows.iter_mut().zip(from.chunks(stride)) {
+        match from[column..].first_chunk::<N>() {
+            Some(whole) if lanes == N => *row = *whole,
+            _ => row[..lanes].copy_from_slice(&from[column..column + lanes]),
         }
     }
 }
