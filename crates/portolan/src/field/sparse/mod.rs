@@ -24,6 +24,7 @@ mod seeds;
 mod settings;
 mod sparse_esdf;
 mod transform;
+mod unknown;
 
 pub(crate) use crossings::{BrickCrossings, Crossings};
 pub use dense::DenseEsdf;
