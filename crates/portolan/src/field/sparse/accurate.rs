@@ -158,3 +158,7 @@ impl<const D: usize> SparseEsdf<D> {
         keys
     }
 }
+
+#[cfg(test)]
+#[path = "accurate_tests.rs"]
+mod tests;
