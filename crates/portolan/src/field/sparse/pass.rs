@@ -332,10 +332,21 @@ impl<B, const D: usize> Line<'_, B, D> {
 
 /// What `make` makes of each, in the same order; a few in one task.
 pub(super) fn map_each<T: Sync, R: Send>(of: &[T], make: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    map_each_with(of, || (), |item, ()| make(item))
+}
+
+/// [`map_each`] with scratch that is used again.
+pub(super) fn map_each_with<T: Sync, R: Send, S>(
+    of: &[T],
+    scratch: impl Fn() -> S + Sync + Send,
+    make: impl Fn(&T, &mut S) -> R + Sync + Send,
+) -> Vec<R> {
     const TOGETHER: usize = 32;
     let mut made: Vec<Vec<R>> = of.chunks(TOGETHER).map(|_| Vec::new()).collect();
     let tasks = of.chunks(TOGETHER).zip(&mut made).collect();
-    for_each(tasks, || (), |(of, made), ()| *made = of.iter().map(&make).collect());
+    for_each(tasks, scratch, |(of, made), scratch| {
+        *made = of.iter().map(|item| make(item, scratch)).collect()
+    });
     made.into_iter().flatten().collect()
 }
 
