@@ -2,6 +2,7 @@
 
 mod clearance;
 mod distance_transform;
+mod elements;
 mod envelope;
 mod esdf;
 mod sparse;
@@ -9,7 +10,7 @@ mod sparse;
 pub use clearance::{Clearance, ClearanceField, UnknownSpace};
 pub use distance_transform::squared_distance_transform;
 pub use esdf::{Esdf, EsdfError, EsdfSettings, esdf_from_tsdf};
-pub use sparse::{DenseEsdf, SparseEsdf, SparseEsdfSettings};
+pub use sparse::{DenseEsdf, EsdfMethod, EsdfUpdate, SparseEsdf, SparseEsdfSettings};
 
 /// A Euclidean signed distance field of the plane.
 pub type Esdf2 = Esdf<2>;

@@ -2,14 +2,14 @@
 
 mod compare;
 mod contour;
-mod cubes;
+pub(crate) mod cubes;
 mod measures;
 mod mesh;
 mod nearest;
 mod polyline;
 mod predict;
 mod ray_cast;
-mod squares;
+pub(crate) mod squares;
 
 pub use compare::{
     CompareSettings, Reference, SurfaceComparison, SurfaceDistances, area_samples, compare_surfaces,

@@ -1,9 +1,10 @@
 //! The squared distance transform of seeds in bricks.
 
-use super::pass::{Input, Level, Source, for_each, inputs, pass, reachable};
+use super::level::{Input, Level, inputs, reachable};
+use super::pass::{Least, Pass, Source, for_each};
 use super::reach::{Reach, line_order, needed};
 use super::seeds::Survey;
-use crate::geom::{BlockKey, block_cells};
+use crate::geom::BlockKey;
 
 /// `min over seeds p of |q - p|^2 + f(p)`, in squared cells, for all cells of the bricks of a survey: exact wherever it
 /// is not beyond the brick's budget, too large or infinite there. Bricks in the order of lines along the last axis,
@@ -34,11 +35,10 @@ pub(super) fn squared_distances<const D: usize>(
         }
     });
     let all = &outputs[last];
-    let mut level = Level {
-        keys: all.iter().map(|r| r.key).collect(),
-        values: vec![0.0; all.len() * block_cells::<D>()],
-    };
-    pass(last, &inputs(&levels, last), all, &mut level.values, solved);
+    let mut level = Level::default();
+    level.hold(all, false);
+    let pass = Pass { axis: last, inputs: &inputs(&levels, last), outputs: all, known: &[], to: last };
+    pass.run(Least, &mut level.values, &mut [], |_, key, values, _| solved(key, values));
     level
 }
 
@@ -64,11 +64,9 @@ fn fill<S: Source, const D: usize>(
     level: &mut Level<D>,
 ) {
     let outputs = reachable(inputs, outputs, axis);
-    level.keys.clear();
-    level.keys.extend(outputs.iter().map(|r| r.key));
-    // Whatever is there from another slab is overwritten.
-    level.values.resize(outputs.len() * block_cells::<D>(), 0.0);
-    pass(axis, inputs, &outputs, &mut level.values, |_, _| {});
+    level.hold(&outputs, false);
+    let pass = Pass { axis, inputs, outputs: &outputs, known: &[], to: axis + 1 };
+    pass.run(Least, &mut level.values, &mut [], |_, _, _, _| {});
 }
 
 #[cfg(test)]
@@ -103,13 +101,14 @@ mod tests {
     fn overhead(band: bool, max_distance: f32) -> f64 {
         let store = rooms(band);
         let limit = (max_distance / 0.05).powi(2);
-        let rule = CellRule { min_weight: 0.5, band_cells: 1.5, resolution: 0.05, limit };
+        let rule = CellRule::band(0.5, 1.5, 0.05, limit);
         let survey = Survey::of(&store, &rule);
         let outputs = outputs_of_passes(survey.bricks.clone());
         let seeds: Vec<_> = survey.seeds().map(|(key, source)| Input { key, source }).collect();
-        let level = |bricks: Vec<Reach<3>>| Level {
-            values: vec![0.0; 512 * bricks.len()],
-            keys: bricks.iter().map(|r| r.key).collect(),
+        let level = |bricks: Vec<Reach<3>>| {
+            let mut level = Level::default();
+            level.hold(&bricks, false);
+            level
         };
         let first = level(reachable(&seeds, &outputs[0], 0));
         let second = level(reachable(&inputs([&first], 1), &outputs[1], 1));
