@@ -19,6 +19,7 @@ pub use cubes::{IncrementalMesh, MeshSettings, isosurface, marching_cubes};
 pub use measures::{DoubledLength, ThinWalls, doubled_length, thin_walls};
 pub use mesh::{EdgeCounts, Mesh};
 pub use nearest::NearestSurface;
+pub(crate) use nearest::point_triangle_sq;
 pub use polyline::Polyline;
 pub use predict::{PredictionScore, RangeNoise, RangePredictions};
 pub use ray_cast::{RayCast, RayCastSettings, RayCaster, cast_ray};

@@ -134,6 +134,15 @@ impl<const D: usize> BrickElements<D> {
         &self.simplices[usize::from(self.starts[n])..usize::from(self.starts[n + 1])]
     }
 
+    /// The cells with surface (places in the brick, ascending), and their simplices.
+    pub(crate) fn cells(&self) -> impl Iterator<Item = (usize, &[[[f32; D]; D]])> {
+        let places = self.cells.iter().enumerate().flat_map(|(word, &cells)| {
+            (0..64).filter(move |bit| cells >> bit & 1 == 1).map(move |bit| 64 * word + bit)
+        });
+        let ranges = self.starts.windows(2).map(|s| usize::from(s[0])..usize::from(s[1]));
+        places.zip(ranges).map(|(at, range)| (at, &self.simplices[range]))
+    }
+
     /// The crossings that its cells use of the neighbour in this octant (0: of the brick itself).
     pub(super) fn used_edges(&self, octant: usize) -> &[UsedEdge] {
         &self.edges[usize::from(self.octants[octant])..usize::from(self.octants[octant + 1])]

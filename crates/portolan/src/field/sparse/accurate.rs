@@ -6,13 +6,13 @@ use super::edges::edge_distances;
 use super::feature::Feature;
 use super::kernels::observes;
 use super::level::Input;
-use super::measure::measure;
-use super::pass::map_each;
+use super::pass::{map_each, map_each_with};
 use super::planes::{EsdfBrick, Nearest};
 use super::reach::{Reach, within};
 use super::settings::EsdfUpdate;
 use super::sparse_esdf::SparseEsdf;
 use crate::cell::SignedDistance;
+use crate::field::elements::Refine;
 use crate::geom::{BlockKey, block_cells};
 use crate::store::Bricks;
 use std::sync::Arc;
@@ -27,6 +27,10 @@ impl<const D: usize> SparseEsdf<D> {
         let changed = store.changed_since(self.epoch);
         self.epoch = store.epoch();
         let first = self.keys.is_empty();
+        let mut uncovered = Vec::new();
+        if self.settings.unknown {
+            uncovered = changed.iter().copied().filter(|&key| self.uncovered(store, key)).collect();
+        }
         let moved = self.come_and_go(store, &changed);
         let touched = self.surface.update(store, &changed);
         let reach = self.limit().sqrt();
@@ -42,11 +46,16 @@ impl<const D: usize> SparseEsdf<D> {
             (self.held(dirty), self.held(stale))
         };
         self.solve(&dirty);
-        let planes = map_each(&stale, |&key| self.measured(store, key));
+        let planes = map_each_with(&stale, Refine::new, |&key, refine| self.measured(store, key, refine));
         for (key, plane) in stale.iter().zip(planes) {
             if let Some(slot) = self.slot(*key) {
                 self.bricks[slot].distance = plane;
             }
+        }
+        if self.settings.unknown {
+            let around = within(&uncovered, (reach + 1.0).powi(2));
+            let dirty = if first { self.keys() } else { self.held(around) };
+            self.solve_unknown(store, &dirty);
         }
         EsdfUpdate {
             changed: changed.len(),
@@ -115,11 +124,22 @@ impl<const D: usize> SparseEsdf<D> {
     }
 
     /// Signed distances of a brick.
-    fn measured(&self, store: &Bricks<SignedDistance, D>, key: BlockKey<D>) -> Arc<[f32]> {
+    fn measured(
+        &self,
+        store: &Bricks<SignedDistance, D>,
+        key: BlockKey<D>,
+        refine: &mut Refine<D>,
+    ) -> Arc<[f32]> {
         let mut plane = vec![f32::NAN; block_cells::<D>()];
         if let (Some(brick), Some(slot)) = (store.brick(key), self.slot(key)) {
             if let Some(nearest) = &self.bricks[slot].nearest {
-                measure(&self.surface, key, nearest, &mut plane);
+                let beside = |axis: usize, side: usize| {
+                    let mut at = key;
+                    at.0[axis] += 2 * side as i32 - 1;
+                    let nearest = self.bricks[self.slot(at)?].nearest.as_ref()?;
+                    Some(&*nearest.feature)
+                };
+                refine.brick(&self.surface, key, &nearest.feature, beside, &mut plane);
             }
             let resolution = self.lattice.resolution as f32;
             let cells = brick.distances().iter().zip(brick.weights());
@@ -140,7 +160,7 @@ impl<const D: usize> SparseEsdf<D> {
     }
 
     /// Those of bricks that the field holds, ascending, each once.
-    fn held(&self, mut keys: Vec<BlockKey<D>>) -> Vec<BlockKey<D>> {
+    pub(super) fn held(&self, mut keys: Vec<BlockKey<D>>) -> Vec<BlockKey<D>> {
         keys.retain(|key| self.slots.contains_key(key));
         keys.sort_unstable();
         keys.dedup();

@@ -13,7 +13,6 @@ mod feature;
 mod from_dense;
 mod kernels;
 mod level;
-mod measure;
 mod min_plus;
 mod pass;
 mod planes;
@@ -24,8 +23,10 @@ mod seeds;
 mod settings;
 mod sparse_esdf;
 mod transform;
+mod unknown;
 
 pub(crate) use crossings::{BrickCrossings, Crossings};
 pub use dense::DenseEsdf;
+pub(crate) use feature::Feature;
 pub use settings::{EsdfMethod, EsdfUpdate, SparseEsdfSettings};
 pub use sparse_esdf::SparseEsdf;
