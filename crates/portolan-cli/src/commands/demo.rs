@@ -19,6 +19,7 @@ use portolan_sim::{LapConfig, Lidar, SEED};
 use self::found::Found;
 use super::gallery;
 use crate::arguments::ForgettingArgs;
+use crate::esdf::EsdfArg;
 use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::json;
 use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, fuse};
@@ -231,6 +232,7 @@ fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
         hold_out: None,
         bounds: None,
         maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
+        esdf: EsdfArg::default(),
     }
 }
 

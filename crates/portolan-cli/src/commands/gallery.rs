@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::{bounds, bytes, length};
 use crate::error::bad_call;
+use crate::esdf::EsdfArg;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen, with_outlier};
 use crate::output::Output;
@@ -126,6 +127,7 @@ impl Args {
             hold_out: None,
             bounds: self.bounds,
             maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
+            esdf: EsdfArg::default(),
         }
     }
 }
