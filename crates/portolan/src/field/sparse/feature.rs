@@ -55,7 +55,8 @@ mod tests {
 
     #[test]
     fn steps_add_up() {
-        let from = |at: [i32; 3]| Feature::new(2, std::array::from_fn::<_, 3, _>(|k| [7, -300, 510][k] - at[k]));
+        let from =
+            |at: [i32; 3]| Feature::new(2, std::array::from_fn::<_, 3, _>(|k| [7, -300, 510][k] - at[k]));
         let seen = from([0; 3]);
         assert_eq!((seen.axis(), seen.offset::<3>()), (2, [7, -300, 510]));
         // The cell five further along y has the crossing in its word; from five before, it is five further away.
