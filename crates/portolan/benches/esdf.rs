@@ -1,15 +1,22 @@
 //! The distance field of a floor of rooms, 24 x 16 x 3.2 m in cells of 5 cm: 9.8 million cells in 19,200 bricks, walls,
 //! floor, ceiling and a pillar in every room. Items are cells of the observed bricks.
 //!
+//! `hall`: 50 x 16 x 3.2 m of nothing, all of it observed, with a wall at either end of x: 20.5 million cells.
+//!
 //! `carved`: all free space was observed, as a lidar does. `band`: only what is within the truncation of a surface, as
 //! fusion without carving leaves it.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::{DistanceBrick, SignedDistance};
-use portolan::field::{SparseEsdf, SparseEsdfSettings, squared_distance_transform};
+use portolan::field::{EsdfMethod, SparseEsdf, SparseEsdfSettings, squared_distance_transform};
 use portolan::geom::{BlockKey, Lattice};
+use portolan::map::{SparseTsdf, SparseTsdfConfig};
 use portolan::store::{Bricks, Store};
+use portolan_sim::SEED;
+use portolan_sim::space::{
+    BuildingConfig, DepthCamera, SpaceSensor, building_poses, building_world, camera_frame,
+};
 use std::sync::LazyLock;
 
 fn main() {
@@ -19,8 +26,11 @@ fn main() {
 const CELLS: [i32; 3] = [480, 320, 64];
 const TRUNCATION: f64 = 0.15;
 
-static CARVED: LazyLock<Bricks<SignedDistance, 3>> = LazyLock::new(|| floor(false));
-static BAND: LazyLock<Bricks<SignedDistance, 3>> = LazyLock::new(|| floor(true));
+static CARVED: LazyLock<Bricks<SignedDistance, 3>> = LazyLock::new(|| floor(CELLS, false, distance));
+static BAND: LazyLock<Bricks<SignedDistance, 3>> = LazyLock::new(|| floor(CELLS, true, distance));
+/// Walls at the ends of x; neither floor nor ceiling.
+static HALL: LazyLock<Bricks<SignedDistance, 3>> =
+    LazyLock::new(|| floor([1000, 320, 64], false, |[x, _, _]| (x - 0.12).min(49.88 - x)));
 static FIELD: LazyLock<SparseEsdf<3>> =
     LazyLock::new(|| SparseEsdf::of(&CARVED, &SparseEsdfSettings::default()));
 static PROBES: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
@@ -39,12 +49,12 @@ fn distance([x, y, z]: [f64; 3]) -> f64 {
     wall.min(pillar).min(z - 0.1).min(3.1 - z)
 }
 
-fn floor(band: bool) -> Bricks<SignedDistance, 3> {
+fn floor(cells: [i32; 3], band: bool, distance: fn([f64; 3]) -> f64) -> Bricks<SignedDistance, 3> {
     let lattice = Lattice::new([0.0; 3], 0.05);
     let mut bricks = Bricks::new(lattice);
-    for z in 0..CELLS[2] / 8 {
-        for y in 0..CELLS[1] / 8 {
-            for x in 0..CELLS[0] / 8 {
+    for z in 0..cells[2] / 8 {
+        for y in 0..cells[1] / 8 {
+            for x in 0..cells[0] / 8 {
                 let key = BlockKey([x, y, z]);
                 let truth: Vec<f64> = (0..512).map(|i| distance(lattice.center(key.cell(i)))).collect();
                 if band && truth.iter().all(|d| d.abs() >= TRUNCATION) {
@@ -91,9 +101,79 @@ fn band_1m(bencher: Bencher, threads: usize) {
 }
 
 fn of(bencher: Bencher, bricks: &Bricks<SignedDistance, 3>, max_distance: f64, threads: usize) {
-    let settings = SparseEsdfSettings { max_distance, ..Default::default() };
+    by(bencher, bricks, max_distance, EsdfMethod::Seeded { band_cells: 1.5 }, threads);
+}
+
+fn by(
+    bencher: Bencher,
+    bricks: &Bricks<SignedDistance, 3>,
+    max_distance: f64,
+    method: EsdfMethod,
+    threads: usize,
+) {
+    let settings = SparseEsdfSettings { max_distance, method, ..Default::default() };
     let pool = pool(threads);
     bencher.counter(cells(bricks)).bench(|| pool.install(|| SparseEsdf::of(bricks, &settings)));
+}
+
+#[divan::bench(args = [1, 2], max_time = 5)]
+fn accurate_carved_1m(bencher: Bencher, threads: usize) {
+    by(bencher, &CARVED, 1.0, EsdfMethod::Accurate, threads);
+}
+
+#[divan::bench(max_time = 5)]
+fn accurate_carved_unbounded(bencher: Bencher) {
+    by(bencher, &CARVED, 25.4, EsdfMethod::Accurate, 1);
+}
+
+#[divan::bench(max_time = 5)]
+fn accurate_band_1m(bencher: Bencher) {
+    by(bencher, &BAND, 1.0, EsdfMethod::Accurate, 1);
+}
+
+#[divan::bench(args = [1.0, 25.4], max_time = 5)]
+fn accurate_hall(bencher: Bencher, max_distance: f64) {
+    by(bencher, &HALL, max_distance, EsdfMethod::Accurate, 1);
+}
+
+#[divan::bench(max_time = 5)]
+fn mask_carved_1m(bencher: Bencher) {
+    by(bencher, &CARVED, 1.0, EsdfMethod::Mask, 1);
+}
+
+/// A walk with a depth camera of 640 x 480 pixels through the simulated Building: the map before one more frame and
+/// after it.
+static WALK: LazyLock<[SparseTsdf; 2]> = LazyLock::new(|| {
+    let camera = DepthCamera::default();
+    let config = BuildingConfig { scans: 600, sensor: SpaceSensor::Camera(camera), seed: SEED };
+    let building = building_world(config.seed);
+    let mut map =
+        SparseTsdf::new(SparseTsdfConfig { max_range: 5.0, ..Default::default() }).expect("a valid map");
+    let mut before = map.clone();
+    for (i, pose) in building_poses(&building, &config).iter().enumerate().take(16) {
+        before = map.clone();
+        map.integrate(pose, &camera_frame(&building.world, pose, &camera, (SEED, i as u64)))
+            .expect("no limit");
+    }
+    [before, map]
+});
+
+/// The field follows one depth frame at 5 cm; items are cells solved again.
+#[divan::bench(args = [(1.0, 1), (1.0, 2), (2.0, 1), (2.0, 2)], max_time = 5)]
+fn one_depth_frame(bencher: Bencher, (max_distance, threads): (f64, usize)) {
+    let [before, after] = &*WALK;
+    let min_weight = 0.5 * SparseTsdfConfig::default().weights.typical_low();
+    let settings = SparseEsdfSettings { min_weight, max_distance, ..Default::default() };
+    let esdf = SparseEsdf::of(before.store(), &settings);
+    let update = esdf.clone().update(after.store());
+    println!("{update:?} of {} bricks", esdf.keys().len());
+    let pool = pool(threads);
+    bencher.counter(ItemsCount::new(512 * update.solved)).with_inputs(|| esdf.clone()).bench_local_values(
+        |mut esdf| {
+            pool.install(|| esdf.update(after.store()));
+            esdf
+        },
+    );
 }
 
 /// The unbounded transform of the whole box, what [`portolan::field::esdf_from_tsdf`] runs.

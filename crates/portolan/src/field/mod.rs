@@ -2,14 +2,17 @@
 
 mod clearance;
 mod distance_transform;
+mod elements;
 mod envelope;
 mod esdf;
+mod mask;
 mod sparse;
 
 pub use clearance::{Clearance, ClearanceField, UnknownSpace};
 pub use distance_transform::squared_distance_transform;
 pub use esdf::{Esdf, EsdfError, EsdfSettings, esdf_from_tsdf};
-pub use sparse::{DenseEsdf, SparseEsdf, SparseEsdfSettings};
+pub use mask::{MaskCell, MaskError, MaskTransform};
+pub use sparse::{DenseEsdf, EsdfMethod, EsdfUpdate, SparseEsdf, SparseEsdfSettings};
 
 /// A Euclidean signed distance field of the plane.
 pub type Esdf2 = Esdf<2>;

@@ -2,14 +2,14 @@
 
 mod compare;
 mod contour;
-mod cubes;
+pub(crate) mod cubes;
 mod measures;
 mod mesh;
 mod nearest;
 mod polyline;
 mod predict;
 mod ray_cast;
-mod squares;
+pub(crate) mod squares;
 
 pub use compare::{
     CompareSettings, Reference, SurfaceComparison, SurfaceDistances, area_samples, compare_surfaces,
@@ -19,6 +19,7 @@ pub use cubes::{IncrementalMesh, MeshSettings, isosurface, marching_cubes};
 pub use measures::{DoubledLength, ThinWalls, doubled_length, thin_walls};
 pub use mesh::{EdgeCounts, Mesh};
 pub use nearest::NearestSurface;
+pub(crate) use nearest::point_triangle_sq;
 pub use polyline::Polyline;
 pub use predict::{PredictionScore, RangeNoise, RangePredictions};
 pub use ray_cast::{RayCast, RayCastSettings, RayCaster, RayTrace, cast_ray, trace_ray};

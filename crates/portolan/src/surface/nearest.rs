@@ -129,7 +129,7 @@ fn build(corners: &mut [[[f32; 3]; 3]], first: usize, nodes: &mut Vec<Node>) {
 
 /// Squared distance from a point to a triangle *(Ericson 2005, section 5.1.5)*; a degenerate one is the nearest of its
 /// sides.
-fn point_triangle_sq(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
+pub(crate) fn point_triangle_sq(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let normal = cross3(ab, ac);
     let area_sq = dot(normal, normal);

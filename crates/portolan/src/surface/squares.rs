@@ -105,7 +105,7 @@ pub fn level_set(
 
 /// Pairs of edges to join: from the edge where, counter-clockwise, the inside begins to the one where it ends.
 /// Edge `n` runs from corner `n` to corner `n + 1`.
-fn segments(code: usize, d: &[f32; 4], ambiguity: Ambiguity) -> &'static [[u8; 2]] {
+pub(crate) fn segments(code: usize, d: &[f32; 4], ambiguity: Ambiguity) -> &'static [[u8; 2]] {
     const TABLE: [&[[u8; 2]]; 16] = [
         &[],
         &[[3, 0]],
@@ -150,14 +150,20 @@ fn vertex(
         _ => (&mut edges.side[x], [x, y], 1, d[0], d[3]),
     };
     if *slot == NONE {
-        let (da, db) = (f64::from(da), f64::from(db));
         let lattice = &grid.lattice;
         let mut p = lattice.center(low.map(|v| v as i32));
-        p[axis] += da / (da - db) * lattice.resolution;
+        p[axis] += crossing_place(da, db) * lattice.resolution;
         *slot = contour.vertices.len() as u32;
         contour.vertices.push(p);
     }
     *slot
+}
+
+/// Where between two centres with these values of different sign the contour crosses: in cells from the lower one.
+#[inline]
+pub(crate) fn crossing_place(a: f32, b: f32) -> f64 {
+    let (a, b) = (f64::from(a), f64::from(b));
+    a / (a - b)
 }
 
 #[cfg(test)]

@@ -104,7 +104,7 @@ impl<const D: usize> SparseEsdf<D> {
     /// The cells of all bricks: the first, and behind the last.
     fn extent(&self) -> Option<([i32; D], [i32; D])> {
         let (mut first, mut end) = (self.keys.first()?.first_cell(), self.keys.first()?.first_cell());
-        for key in &self.keys {
+        for key in self.keys.iter() {
             let low = key.first_cell();
             first = std::array::from_fn(|k| first[k].min(low[k]));
             end = std::array::from_fn(|k| end[k].max(low[k] + BLOCK_EDGE as i32));

@@ -6,18 +6,37 @@ use multiversion::multiversion;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CellRule {
     /// Cells of smaller weight count as never observed.
-    pub(super) min_weight: f32,
-    /// Cells within so many cells of zero are seeds.
-    pub(super) band_cells: f32,
+    min_weight: f32,
+    /// Cells whose estimate is so many cells from zero are seeds: at least, at most.
+    offsets: [f32; 2],
+    /// The most that `f` of a seed is.
+    most: f32,
     /// Edge of a cell (metres).
-    pub(super) resolution: f32,
+    resolution: f32,
     /// Squared distances (cells) beyond this are saturated.
     pub(super) limit: f32,
 }
 
 impl CellRule {
+    /// Every cell within `band_cells` of zero is a seed with its own estimate.
+    pub(super) fn band(min_weight: f32, band_cells: f32, resolution: f32, limit: f32) -> Self {
+        Self { min_weight, offsets: [-band_cells, band_cells], most: f32::INFINITY, resolution, limit }
+    }
+
+    /// Every cell inside of the surface is a seed, every cell outside.
+    pub(super) fn sides(min_weight: f32, resolution: f32, limit: f32) -> [Self; 2] {
+        let below_zero = -f32::from_bits(1);
+        [[f32::NEG_INFINITY, below_zero], [0.0, f32::INFINITY]].map(|offsets| Self {
+            min_weight,
+            offsets,
+            most: 0.0,
+            resolution,
+            limit,
+        })
+    }
+
     #[inline(always)]
-    pub(super) fn observed(&self, weight: f32) -> bool {
+    fn observed(&self, weight: f32) -> bool {
         (weight > 0.0) & (weight >= self.min_weight)
     }
 
@@ -25,8 +44,8 @@ impl CellRule {
     #[inline(always)]
     fn seed(&self, inverse: f32, distance: f32, weight: f32) -> f32 {
         let offset = distance * inverse;
-        let is_seed = self.observed(weight) & (offset.abs() <= self.band_cells);
-        if is_seed { offset * offset } else { f32::INFINITY }
+        let is_seed = self.observed(weight) & (offset >= self.offsets[0]) & (offset <= self.offsets[1]);
+        if is_seed { (offset * offset).min(self.most) } else { f32::INFINITY }
     }
 
     #[inline(always)]
@@ -71,4 +90,26 @@ pub(super) fn sign(values: &mut [f32], distances: &[f32], weights: &[f32], rule:
         let signed = if d < 0.0 { -length } else { length };
         *value = if rule.observed(w) { signed } else { f32::NAN };
     }
+}
+
+/// The squared distances of both sides become signed ones (metres), from the centre to half a cell before that of the
+/// nearest cell of the other side; as [`sign`] does where there is none.
+pub(super) fn mask(
+    to_free: &mut [f32],
+    to_occupied: &[f32],
+    distances: &[f32],
+    weights: &[f32],
+    rule: &CellRule,
+) {
+    let cells = to_occupied.iter().zip(distances.iter().zip(weights));
+    for (value, (&to_occupied, (&d, &w))) in to_free.iter_mut().zip(cells) {
+        let (sq, side) = if d < 0.0 { (*value, -1.0) } else { (to_occupied, 1.0) };
+        let length = if sq <= rule.limit { (sq.sqrt() - 0.5) * rule.resolution } else { f32::INFINITY };
+        *value = if rule.observed(w) { side * length } else { f32::NAN };
+    }
+}
+
+/// Whether some cell was observed.
+pub(super) fn observes(weights: &[f32], min_weight: f32) -> bool {
+    weights.iter().fold(false, |any, &w| any | ((w > 0.0) & (w >= min_weight)))
 }

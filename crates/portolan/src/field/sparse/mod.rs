@@ -4,16 +4,29 @@
 //! looks at, no further than an upper bound of what will be found. Nothing is computed twice, as it is where tiles
 //! with a halo are solved one by one.
 
+mod accurate;
+mod anchors;
 mod crossings;
 mod dense;
+mod edges;
 mod feature;
+mod from_dense;
 mod kernels;
+mod level;
 mod min_plus;
 mod pass;
+mod planes;
 mod reach;
+mod roots;
+mod seeded;
 mod seeds;
+mod settings;
 mod sparse_esdf;
 mod transform;
+mod unknown;
 
+pub(crate) use crossings::{BrickCrossings, Crossings};
 pub use dense::DenseEsdf;
-pub use sparse_esdf::{SparseEsdf, SparseEsdfSettings};
+pub(crate) use feature::Feature;
+pub use settings::{EsdfMethod, EsdfUpdate, SparseEsdfSettings};
+pub use sparse_esdf::SparseEsdf;

@@ -1,35 +1,135 @@
 //! One pass of the separable transform over lines of bricks.
 
-use super::min_plus::{LANES, Row, min_plus};
-use super::reach::{Reach, bricks_within, line_order, same_line};
+use super::level::{Input, lines};
+use super::min_plus::{Found, LANES, Panels, Row, Words, min_plus, min_plus_boxes, min_plus_words};
+use super::reach::{Reach, bricks_within};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
 
-/// Values of some bricks, brick by brick, in the layout of the next pass: inside a brick the pass's axis is the
-/// slowest and the others follow in their order, so that lines lie side by side. Behind the last pass that is the
-/// order of every brick, x fastest.
-#[derive(Default)]
-pub(super) struct Level<const D: usize> {
-    pub(super) keys: Vec<BlockKey<D>>,
-    pub(super) values: Vec<f32>,
+/// What a pass looks for on its lines, in bricks of type `B`.
+pub(super) trait Search<B, const D: usize>: Sync {
+    /// A run of bricks of a line, made ready for the search.
+    type Line: Default;
+    /// Whether words are carried.
+    const WORDS: bool;
+    /// Bricks that are made ready on either side of what is there.
+    const MARGIN: i32 = 0;
+
+    /// Makes the line ready for `length` cells, with nothing on it.
+    fn clear(&self, line: &mut Self::Line, rows: &Rows, length: usize);
+
+    /// Puts a brick on the line, from row `first` on.
+    fn put(&self, line: &mut Self::Line, brick: &B, first: usize, rows: &Rows, length: usize);
+
+    /// Finds the eight rows from `first` on, no further than `reach` rows away, beginning with what is found already.
+    fn find(&self, line: &mut Self::Line, length: usize, first: usize, reach: usize, found: &mut Found);
 }
 
-/// The values of one brick, in the layout of the pass that reads them.
+/// The values and words of one brick, in the layout of the pass that reads them.
 pub(super) trait Source: Sync {
+    /// May be put together in `scratch`.
     fn values<'s>(&'s self, scratch: &'s mut [Vec<f32>; 2]) -> &'s [f32];
+    /// Empty where none are carried.
+    fn words(&self) -> &[u32];
 }
 
-impl Source for &[f32] {
+/// A brick of an earlier pass.
+#[derive(Clone, Copy)]
+pub(super) struct Planes<'a> {
+    pub(super) values: &'a [f32],
+    /// Empty where none are carried.
+    pub(super) words: &'a [u32],
+}
+
+impl Source for Planes<'_> {
     fn values<'s>(&'s self, _: &'s mut [Vec<f32>; 2]) -> &'s [f32] {
-        self
+        self.values
+    }
+
+    fn words(&self) -> &[u32] {
+        self.words
     }
 }
 
-/// A brick that a pass reads.
+/// The least sum of a sample and its squared offset.
 #[derive(Clone, Copy)]
-pub(super) struct Input<S, const D: usize> {
-    pub(super) key: BlockKey<D>,
-    pub(super) source: S,
+pub(super) struct Least;
+
+/// The same, with the word of the least: a [`super::feature::Feature`], to which the way along this axis is added.
+#[derive(Clone, Copy)]
+pub(super) struct LeastWord {
+    pub(super) axis: usize,
 }
+
+/// The least sum of a sample and its squared offset less half a cell; where no brick is, samples are 0.
+#[derive(Clone, Copy)]
+pub(super) struct LeastBox;
+
+/// Panels of rows of a run of bricks.
+#[derive(Default)]
+pub(super) struct RowLines {
+    values: Vec<Row>,
+    words: Vec<Words>,
+    /// Of a source.
+    brick: [Vec<f32>; 2],
+}
+
+impl RowLines {
+    fn clear(&mut self, rows: &Rows, length: usize, blank: f32, carries: bool) {
+        // Lanes without a line are done at once.
+        let blank: Row = std::array::from_fn(|lane| if lane < rows.lines { blank } else { 0.0 });
+        self.values.clear();
+        self.values.resize(rows.panels * length, blank);
+        self.words.resize(if carries { rows.panels * length } else { 0 }, [0; LANES]);
+    }
+
+    fn put(&mut self, source: &impl Source, first: usize, rows: &Rows, length: usize) {
+        let Self { values, words, brick } = self;
+        rows.spread(source.words(), first, length, words);
+        rows.spread(source.values(brick), first, length, values);
+    }
+
+    fn panels(&self, length: usize) -> Panels<'_> {
+        Panels { values: &self.values, words: &self.words, rows: length }
+    }
+}
+
+/// A search over [`RowLines`].
+macro_rules! search_rows {
+    ($kind:ty, $carries:expr, $blank:expr, $margin:expr, |$kind_:ident, $f:ident, $first:ident, $reach:ident, $found:ident| $find:expr) => {
+        impl<S: Source, const D: usize> Search<S, D> for $kind {
+            type Line = RowLines;
+            const WORDS: bool = $carries;
+            const MARGIN: i32 = $margin;
+
+            fn clear(&self, line: &mut RowLines, rows: &Rows, length: usize) {
+                line.clear(rows, length, $blank, $carries);
+            }
+
+            fn put(&self, line: &mut RowLines, brick: &S, first: usize, rows: &Rows, length: usize) {
+                line.put(brick, first, rows, length);
+            }
+
+            fn find(
+                &self,
+                line: &mut RowLines,
+                length: usize,
+                $first: usize,
+                $reach: usize,
+                $found: &mut Found,
+            ) {
+                let ($kind_, $f) = (self, line.panels(length));
+                $find
+            }
+        }
+    };
+}
+search_rows!(Least, false, f32::INFINITY, 0, |_kind, f, first, reach, found| min_plus(
+    f, first, reach, found
+));
+search_rows!(LeastBox, false, 0.0, 1, |_kind, f, first, reach, found| min_plus_boxes(f, first, reach, found));
+search_rows!(LeastWord, true, f32::INFINITY, 0, |kind, f, first, reach, found| {
+    min_plus_words(f, first, reach, 10 * kind.axis as u32, found);
+});
 
 /// Position of cell `i` of a brick in the layout of a pass along `axis`.
 pub(super) fn layout<const D: usize>(axis: usize, i: usize) -> usize {
@@ -38,145 +138,139 @@ pub(super) fn layout<const D: usize>(axis: usize, i: usize) -> usize {
     others.chain([axis]).enumerate().map(|(place, k)| digit(k) << (3 * place)).sum()
 }
 
-/// The bricks of several levels, sorted by lines along `axis`.
-pub(super) fn inputs<'a, const D: usize>(
-    levels: impl IntoIterator<Item = &'a Level<D>>,
-    axis: usize,
-) -> Vec<Input<&'a [f32], D>> {
-    let bricks = |l: &'a Level<D>| l.keys.iter().zip(l.values.chunks_exact(block_cells::<D>()));
-    let mut inputs: Vec<_> =
-        levels.into_iter().flat_map(bricks).map(|(&key, source)| Input { key, source }).collect();
-    inputs.sort_unstable_by_key(|i| line_order(&i.key, axis));
-    inputs
+/// What a pass does: along which axis, what is read, and what is to be filled.
+pub(super) struct Pass<'a, B, const D: usize> {
+    pub(super) axis: usize,
+    /// Sorted by lines along the axis, as are the outputs.
+    pub(super) inputs: &'a [Input<B, D>],
+    pub(super) outputs: &'a [Reach<D>],
+    /// What is known of each output already, in the layout of this pass; empty: of none.
+    pub(super) known: &'a [Option<Planes<'a>>],
+    /// Axis of the layout of the outputs.
+    pub(super) to: usize,
 }
 
-/// Lines along `axis` of `outputs`, each with the inputs on it (which may be none). Both sorted by lines.
-fn lines<'i, 'o, S, const D: usize>(
-    mut inputs: &'i [Input<S, D>],
-    outputs: &'o [Reach<D>],
-    axis: usize,
-) -> impl Iterator<Item = (&'i [Input<S, D>], &'o [Reach<D>])> {
-    outputs.chunk_by(move |a, b| same_line(&a.key, &b.key, axis)).map(move |line| {
-        let first = line_order(&line[0].key, axis);
-        let before = inputs.iter().take_while(|i| line_order(&i.key, axis)[..D - 1] < first[..D - 1]).count();
-        let here = inputs[before..].iter().take_while(|i| same_line(&i.key, &line[0].key, axis)).count();
-        let (on_line, rest) = inputs[before..].split_at(here);
-        inputs = rest;
-        (on_line, line)
-    })
-}
-
-/// The outputs that have an input within their reach, in the same order.
-pub(super) fn reachable<S, const D: usize>(
-    inputs: &[Input<S, D>],
-    outputs: &[Reach<D>],
-    axis: usize,
-) -> Vec<Reach<D>> {
-    let mut reachable = Vec::with_capacity(outputs.len());
-    for (inputs, line) in lines(inputs, outputs, axis) {
-        let mut next = 0;
-        reachable.extend(line.iter().filter(|reach| {
-            let at = reach.key.0[axis];
-            next += inputs[next..].iter().take_while(|i| i.key.0[axis] < at).count();
-            let near = &inputs[next.saturating_sub(1)..inputs.len().min(next + 1)];
-            near.iter().any(|i| (i.key.0[axis] - at).abs() <= bricks_within(reach.budget))
-        }));
+impl<B: Sync, const D: usize> Pass<'_, B, D> {
+    /// Fills the bricks of `outputs`: for every cell the least that `search` finds on its line as far as the brick's budget
+    /// reaches, infinity where there is nothing. In the layout `to`; `filled` has the last word on each, and its place
+    /// among the outputs.
+    ///
+    /// `words` is empty where none are carried. Lines are shared out to all cores with the feature `parallel`; every value
+    /// is computed by itself.
+    pub(super) fn run<S: Search<B, D>>(
+        &self,
+        search: S,
+        values: &mut [f32],
+        words: &mut [u32],
+        filled: impl Fn(usize, BlockKey<D>, &mut [f32], &mut [u32]) + Sync + Send,
+    ) {
+        let rows = Rows::of::<D>(self.axis, self.to);
+        let cells = block_cells::<D>();
+        let mut tasks = Vec::new();
+        let (mut values, mut words) = (values, words);
+        let mut first = 0;
+        for (inputs, outputs) in lines(self.inputs, self.outputs, self.axis) {
+            let count = outputs.len() * cells;
+            let (here, behind) = std::mem::take(&mut values).split_at_mut(count);
+            let (words_here, words_behind) =
+                std::mem::take(&mut words).split_at_mut(if S::WORDS { count } else { 0 });
+            (values, words) = (behind, words_behind);
+            let known = if self.known.is_empty() { &[] } else { &self.known[first..first + outputs.len()] };
+            let line = Line { axis: self.axis, inputs, outputs, known, values: here, words: words_here };
+            tasks.push((first, line));
+            first += outputs.len();
+        }
+        for_each(tasks, Scratch::default, |(first, mut line), scratch| {
+            line.solve(&search, &rows, scratch);
+            let mut words = line.words.chunks_exact_mut(cells);
+            for (n, (output, values)) in
+                line.outputs.iter().zip(line.values.chunks_exact_mut(cells)).enumerate()
+            {
+                filled(first + n, output.key, values, words.next().unwrap_or_default());
+            }
+        });
     }
-    reachable
-}
-
-/// Fills the bricks of `outputs`: the least of the inputs on a cell's line plus squared offset, as far as the brick's
-/// budget reaches; infinity where there is none. In the layout of the next pass; `filled` has the last word on each.
-///
-/// Lines are shared out to all cores with the feature `parallel`; every value is computed by itself.
-pub(super) fn pass<S: Source, const D: usize>(
-    axis: usize,
-    inputs: &[Input<S, D>],
-    outputs: &[Reach<D>],
-    values: &mut [f32],
-    filled: impl Fn(BlockKey<D>, &mut [f32]) + Sync + Send,
-) {
-    let rows = Rows::of::<D>(axis);
-    let mut tasks = Vec::new();
-    let mut rest = values;
-    for (inputs, outputs) in lines(inputs, outputs, axis) {
-        let (here, behind) = std::mem::take(&mut rest).split_at_mut(outputs.len() * block_cells::<D>());
-        rest = behind;
-        tasks.push(Line { axis, inputs, outputs, values: here });
-    }
-    for_each(tasks, Scratch::default, |mut line, scratch| {
-        line.solve(&rows, scratch);
-        let bricks = line.values.chunks_exact_mut(block_cells::<D>());
-        line.outputs.iter().zip(bricks).for_each(|(output, values)| filled(output.key, values));
-    });
 }
 
 /// How rows of lines lie in a brick.
-struct Rows {
+pub(super) struct Rows {
     /// Lines through a brick.
-    lines: usize,
-    panels: usize,
-    /// Where each cell of the next pass's layout is among the solved rows; of chunks of eight, unless they are torn
+    pub(super) lines: usize,
+    pub(super) panels: usize,
+    /// Where each cell of the outputs' layout is among the found rows; of chunks of eight, unless they are torn
     /// apart.
     places: Vec<u16>,
     torn: bool,
 }
 
 impl Rows {
-    fn of<const D: usize>(axis: usize) -> Self {
+    fn of<const D: usize>(axis: usize, to: usize) -> Self {
         let cells = block_cells::<D>();
         let lines = cells / BLOCK_EDGE;
-        let next = (axis + 1).min(D - 1);
         let mut places = vec![0; cells];
         for i in 0..cells {
             let from = layout::<D>(axis, i);
             let (row, lane) = (from / lines, from % lines);
-            places[layout::<D>(next, i)] = ((lane / LANES * BLOCK_EDGE + row) * LANES + lane % LANES) as u16;
+            places[layout::<D>(to, i)] = ((lane / LANES * BLOCK_EDGE + row) * LANES + lane % LANES) as u16;
         }
-        // Only the pass along x has to turn rows into columns; behind it x stays the fastest.
-        let torn = axis == 0;
+        // Chunks stay together where the same axis is the fastest on both sides.
+        let torn = axis != to && (axis == 0 || to == 0);
         if !torn {
             places = places.into_iter().step_by(BLOCK_EDGE).collect();
         }
         Self { lines, panels: lines.div_ceil(LANES), places, torn }
     }
 
-    /// A brick's values from its solved rows.
-    fn collect(&self, solved: &[Row], values: &mut [f32]) {
-        let solved = solved.as_flattened();
+    /// A brick's plane from its found rows.
+    fn collect<T: Copy>(&self, found: &[[T; LANES]], plane: &mut [T]) {
+        let found = found.as_flattened();
         if self.torn {
-            for (value, &place) in values.iter_mut().zip(&self.places) {
-                *value = solved[place as usize];
+            for (value, &place) in plane.iter_mut().zip(&self.places) {
+                *value = found[place as usize];
             }
         } else {
-            for (chunk, &place) in values.chunks_exact_mut(BLOCK_EDGE).zip(&self.places) {
-                chunk.copy_from_slice(&solved[place as usize..][..BLOCK_EDGE]);
+            for (chunk, &place) in plane.chunks_exact_mut(BLOCK_EDGE).zip(&self.places) {
+                chunk.copy_from_slice(&found[place as usize..][..BLOCK_EDGE]);
             }
+        }
+    }
+
+    /// Puts a brick's plane into panels of `length` rows, from row `first` on.
+    fn spread<T: Copy>(&self, plane: &[T], first: usize, length: usize, to: &mut [[T; LANES]]) {
+        for (r, row) in plane.chunks_exact(self.lines).enumerate() {
+            let (whole, rest) = row.as_chunks::<LANES>();
+            for (panel, lanes) in whole.iter().enumerate() {
+                to[panel * length + first + r] = *lanes;
+            }
+            // In the plane eight lines go through a brick.
+            to[(self.panels - 1) * length + first + r][..rest.len()].copy_from_slice(rest);
         }
     }
 }
 
 /// One line of bricks.
-struct Line<'a, S, const D: usize> {
+struct Line<'a, B, const D: usize> {
     axis: usize,
-    inputs: &'a [Input<S, D>],
+    inputs: &'a [Input<B, D>],
     outputs: &'a [Reach<D>],
+    known: &'a [Option<Planes<'a>>],
     values: &'a mut [f32],
+    words: &'a mut [u32],
 }
 
-#[derive(Default)]
-struct Scratch {
-    /// Panels of rows of a run of bricks.
-    rows: Vec<Row>,
-    /// Eight rows of each panel.
-    solved: Vec<Row>,
-    /// Of a source.
-    brick: [Vec<f32>; 2],
+struct Scratch<L> {
+    line: L,
+    found: Found,
 }
 
-impl<S: Source, const D: usize> Line<'_, S, D> {
-    fn solve(&mut self, rows: &Rows, scratch: &mut Scratch) {
-        let cells = block_cells::<D>();
+impl<L: Default> Default for Scratch<L> {
+    fn default() -> Self {
+        Self { line: L::default(), found: Found::default() }
+    }
+}
+
+impl<B, const D: usize> Line<'_, B, D> {
+    fn solve<S: Search<B, D>>(&mut self, search: &S, rows: &Rows, scratch: &mut Scratch<S::Line>) {
         let axis = self.axis;
         let at = |key: &BlockKey<D>| key.0[axis];
         let far = self.outputs.iter().map(|o| bricks_within(o.budget)).max().unwrap_or(0);
@@ -186,51 +280,74 @@ impl<S: Source, const D: usize> Line<'_, S, D> {
             let (first, last) = (at(&run[0].key), at(&run[run.len() - 1].key));
             let from = self.outputs.partition_point(|o| at(&o.key) < first - far);
             let to = self.outputs.partition_point(|o| at(&o.key) <= last + far);
-            self.values[done * cells..from * cells].fill(f32::INFINITY);
+            self.leave(done..from, rows, scratch);
             done = to;
             let outputs = &self.outputs[from..to];
             let (Some(lowest), Some(highest)) = (outputs.first(), outputs.last()) else { continue };
-            let start = first.min(at(&lowest.key));
-            let length = (last.max(at(&highest.key)) - start + 1) as usize * BLOCK_EDGE;
-            scratch.clear(rows, length);
+            let start = first.min(at(&lowest.key)) - S::MARGIN;
+            let length = (last.max(at(&highest.key)) - start + 1 + S::MARGIN) as usize * BLOCK_EDGE;
+            search.clear(&mut scratch.line, rows, length);
             for input in run {
                 let row = (at(&input.key) - start) as usize * BLOCK_EDGE;
-                scratch.put(&input.source, row, rows, length);
+                search.put(&mut scratch.line, &input.source, row, rows, length);
             }
-            let values = self.values[from * cells..to * cells].chunks_exact_mut(cells);
-            for (output, values) in outputs.iter().zip(values) {
+            for (n, output) in outputs.iter().enumerate() {
                 let reach = output.budget.sqrt() as usize;
                 let row = (at(&output.key) - start) as usize * BLOCK_EDGE;
-                min_plus(&scratch.rows, length, row, reach, &mut scratch.solved);
-                rows.collect(&scratch.solved, values);
+                self.begin(from + n, rows, &mut scratch.found);
+                search.find(&mut scratch.line, length, row, reach, &mut scratch.found);
+                self.end(from + n, rows, &scratch.found);
             }
         }
-        self.values[done * cells..].fill(f32::INFINITY);
+        self.leave(done..self.outputs.len(), rows, scratch);
+    }
+
+    /// Outputs that no input reaches.
+    fn leave<L>(&mut self, outputs: std::ops::Range<usize>, rows: &Rows, scratch: &mut Scratch<L>) {
+        for n in outputs {
+            self.begin(n, rows, &mut scratch.found);
+            self.end(n, rows, &scratch.found);
+        }
+    }
+
+    fn begin(&self, n: usize, rows: &Rows, found: &mut Found) {
+        let blank: Row = std::array::from_fn(|lane| if lane < rows.lines { f32::INFINITY } else { 0.0 });
+        found.values.clear();
+        found.values.resize(rows.panels * BLOCK_EDGE, blank);
+        found.words.resize(if self.words.is_empty() { 0 } else { rows.panels * BLOCK_EDGE }, [0; LANES]);
+        if let Some(Some(known)) = self.known.get(n) {
+            rows.spread(known.values, 0, BLOCK_EDGE, &mut found.values);
+            rows.spread(known.words, 0, BLOCK_EDGE, &mut found.words);
+        }
+    }
+
+    fn end(&mut self, n: usize, rows: &Rows, found: &Found) {
+        let cells = n * block_cells::<D>()..(n + 1) * block_cells::<D>();
+        rows.collect(&found.values, &mut self.values[cells.clone()]);
+        if let Some(words) = self.words.get_mut(cells) {
+            rows.collect(&found.words, words);
+        }
     }
 }
 
-impl Scratch {
-    /// Rows for `length` cells of the lines, empty.
-    fn clear(&mut self, rows: &Rows, length: usize) {
-        // Lanes without a line are done at once.
-        let blank: Row = std::array::from_fn(|lane| if lane < rows.lines { f32::INFINITY } else { 0.0 });
-        self.rows.clear();
-        self.rows.resize(rows.panels * length, blank);
-        self.solved.resize(rows.panels * BLOCK_EDGE, blank);
-    }
+/// What `make` makes of each, in the same order; a few in one task.
+pub(super) fn map_each<T: Sync, R: Send>(of: &[T], make: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    map_each_with(of, || (), |item, ()| make(item))
+}
 
-    /// Puts a brick's values into the panels, from row `first` on.
-    fn put(&mut self, source: &impl Source, first: usize, rows: &Rows, length: usize) {
-        let Self { rows: to, brick, .. } = self;
-        for (r, row) in source.values(brick).chunks_exact(rows.lines).enumerate() {
-            let (whole, rest) = row.as_chunks::<LANES>();
-            for (panel, lanes) in whole.iter().enumerate() {
-                to[panel * length + first + r] = *lanes;
-            }
-            // In the plane eight lines go through a brick.
-            to[(rows.panels - 1) * length + first + r][..rest.len()].copy_from_slice(rest);
-        }
-    }
+/// [`map_each`] with scratch that is used again.
+pub(super) fn map_each_with<T: Sync, R: Send, S>(
+    of: &[T],
+    scratch: impl Fn() -> S + Sync + Send,
+    make: impl Fn(&T, &mut S) -> R + Sync + Send,
+) -> Vec<R> {
+    const TOGETHER: usize = 32;
+    let mut made: Vec<Vec<R>> = of.chunks(TOGETHER).map(|_| Vec::new()).collect();
+    let tasks = of.chunks(TOGETHER).zip(&mut made).collect();
+    for_each(tasks, scratch, |(of, made), scratch| {
+        *made = of.iter().map(|item| make(item, scratch)).collect()
+    });
+    made.into_iter().flatten().collect()
 }
 
 /// Every task by itself, on all cores with the feature `parallel`.

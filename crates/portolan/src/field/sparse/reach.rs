@@ -79,6 +79,16 @@ fn flush<const D: usize>(
     budgets.clear();
 }
 
+/// The bricks with a cell no further from some cell of `keys` than a squared distance, unordered.
+pub(super) fn within<const D: usize>(keys: &[BlockKey<D>], budget: f32) -> Vec<BlockKey<D>> {
+    let mut reaches: Vec<_> = keys.iter().map(|&key| Reach { key, budget }).collect();
+    for axis in 0..D {
+        reaches.sort_unstable_by_key(|r| line_order(&r.key, axis));
+        reaches = needed(&reaches, axis);
+    }
+    reaches.into_iter().map(|r| r.key).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

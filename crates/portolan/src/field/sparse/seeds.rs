@@ -1,34 +1,14 @@
 //! What seeds the transform, and how far each brick needs to look for it.
 
-use rustc_hash::FxHashMap;
-
+use super::anchors::{Anchor, bounds, furthest_of_cells};
 use super::kernels::{CellRule, seeds, survey};
-use super::pass::{Source, for_each, layout};
+use super::level::{Input, Level};
+use super::pass::{Least, Source, for_each, layout};
 use super::reach::Reach;
+use super::transform::squared_distances;
 use crate::cell::{DistanceBrick, SignedDistance};
-use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
+use crate::geom::{BlockKey, block_cells};
 use crate::store::Bricks;
-
-/// A seed of a brick: no cell is further from a seed than from this one.
-#[derive(Clone, Copy)]
-struct Anchor<const D: usize> {
-    cell: [i32; D],
-    value: f32,
-}
-
-impl<const D: usize> Anchor<D> {
-    /// No least squared distance in a brick exceeds this.
-    fn bound(&self, key: BlockKey<D>) -> f32 {
-        let first = key.first_cell();
-        self.value + furthest_sq(std::array::from_fn::<_, D, _>(|k| self.cell[k] - first[k]))
-    }
-}
-
-/// Squared distance to the cell of the brick at 0 that is the furthest from `cell`.
-fn furthest_sq<const D: usize>(cell: [i32; D]) -> f32 {
-    let far = cell.map(|c| c.abs().max((BLOCK_EDGE as i32 - 1 - c).abs()) as f32);
-    far.iter().map(|f| f * f).sum()
-}
 
 /// The seeds of one brick of the map, read when they are needed.
 #[derive(Clone, Copy)]
@@ -50,6 +30,10 @@ impl Source for Seeds<'_> {
         }
         laid_out
     }
+
+    fn words(&self) -> &[u32] {
+        &[]
+    }
 }
 
 /// Every observed cell within the band is a seed, `f = (D / r)^2`.
@@ -66,8 +50,7 @@ pub(super) struct Survey<'a, const D: usize> {
 impl<'a, const D: usize> Survey<'a, D> {
     pub(super) fn of(store: &'a Bricks<SignedDistance, D>, rule: &'a CellRule) -> Self {
         let places = (0..block_cells::<D>()).map(|i| layout::<D>(0, i) as u16).collect();
-        let at_zero = |i| furthest_sq(BlockKey([0; D]).cell(i));
-        let furthest: Vec<f32> = (0..block_cells::<D>()).map(at_zero).collect();
+        let furthest = furthest_of_cells::<D>();
         let keys = store.keys();
         let mut found: Vec<(bool, Option<Anchor<D>>)> = vec![(false, None); keys.len()];
         // A brick is too little for a task.
@@ -102,6 +85,12 @@ impl<'a, const D: usize> Survey<'a, D> {
             Some((key, Seeds { brick, rule: self.rule, places: &self.places }))
         })
     }
+
+    /// `min over seeds p of |q - p|^2 + f(p)`, in squared cells, for all bricks with an observed cell.
+    pub(super) fn solve(&self, solved: impl Fn(BlockKey<D>, &mut [f32]) + Sync + Send) -> Level<D> {
+        let seeds: Vec<_> = self.seeds().map(|(key, source)| Input { key, source }).collect();
+        squared_distances(Least, &seeds, self.bricks.clone(), |_| true, solved)
+    }
 }
 
 /// Bricks looked at in one task.
@@ -121,41 +110,5 @@ fn look<const D: usize>(
     let mut values = vec![0.0; furthest.len()];
     seeds(brick.distances(), brick.weights(), rule, &mut values);
     let at = values.iter().zip(furthest).position(|(value, far)| value + far == best);
-    (observed, at.map(|i| Anchor { cell: key.cell(i), value: values[i] }))
-}
-
-/// For each brick, what no least squared distance in it exceeds: by a seed of its own, or by one that its neighbours
-/// handed on, from face to face. `limit` where that is less.
-fn bounds<const D: usize>(keys: &[BlockKey<D>], mut anchors: Vec<Option<Anchor<D>>>, limit: f32) -> Vec<f32> {
-    let slots: FxHashMap<BlockKey<D>, usize> = keys.iter().enumerate().map(|(i, &key)| (key, i)).collect();
-    let bound = |anchor: &Option<Anchor<D>>, i: usize| {
-        // A little more, for what rounding takes away.
-        anchor.as_ref().map_or(limit, |a| (a.bound(keys[i]) * 1.001 + 0.01).min(limit))
-    };
-    let mut bounds: Vec<f32> = anchors.iter().enumerate().map(|(i, a)| bound(a, i)).collect();
-    let mut since: Vec<u32> = anchors.iter().map(|a| if a.is_some() { 0 } else { u32::MAX }).collect();
-    let mut frontier: Vec<usize> = (0..keys.len()).filter(|&i| anchors[i].is_some()).collect();
-    let mut round = 0;
-    while !frontier.is_empty() {
-        round += 1;
-        let mut next = Vec::new();
-        for &i in &frontier {
-            for (k, step) in (0..D).flat_map(|k| [(k, -1), (k, 1)]) {
-                let mut key = keys[i];
-                key.0[k] += step;
-                let Some(&j) = slots.get(&key) else { continue };
-                let handed = bound(&anchors[i], j);
-                if since[j] < round || handed >= bounds[j] {
-                    continue;
-                }
-                if since[j] == u32::MAX {
-                    since[j] = round;
-                    next.push(j);
-                }
-                (bounds[j], anchors[j]) = (handed, anchors[i]);
-            }
-        }
-        frontier = next;
-    }
-    bounds
+    (observed, at.map(|i| Anchor { cell: key.cell(i), offset: [0.0; D], value: values[i] }))
 }

@@ -1,55 +1,45 @@
 //! The Euclidean signed distance field of a map in bricks.
 
-use rustc_hash::FxHashMap;
-
-use super::kernels::{CellRule, sign};
-use super::seeds::Survey;
-use super::transform::squared_distances;
+use super::planes::EsdfBrick;
+use super::settings::{EsdfMethod, EsdfUpdate, SparseEsdfSettings};
 use crate::answer::Answer;
 use crate::cell::SignedDistance;
-use crate::geom::{BLOCK_EDGE, BlockKey, Lattice, block_cells, interpolate, vector};
+use crate::field::elements::SurfaceElements;
+use crate::geom::{BLOCK_EDGE, BlockKey, Lattice, interpolate, vector};
 use crate::store::{Bricks, Store};
-
-/// Settings of a [`SparseEsdf`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SparseEsdfSettings {
-    /// Cells of smaller weight count as never observed.
-    pub min_weight: f32,
-    /// Cells whose estimate is within this many cells of zero seed the transform.
-    pub band_cells: f32,
-    /// Distances are maintained up to here (metres); beyond it answers are saturated. Positive.
-    pub max_distance: f64,
-}
-
-impl Default for SparseEsdfSettings {
-    /// The chapter's `W_min` 0.5 and band of 1.5 cells; one metre.
-    fn default() -> Self {
-        Self { min_weight: 0.5, band_cells: 1.5, max_distance: 1.0 }
-    }
-}
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// Signed Euclidean distances (metres) at the centres of the cells of a map in bricks, positive in free space, up to a
 /// largest distance.
 ///
 /// Every cell that the map observed is known or saturated; all others are unknown. Outside begins where no brick is
 /// near: a brick away from every brick of the map.
+///
+/// A clone is a snapshot that shares all bricks which neither side has solved again since: readers keep one while
+/// [`SparseEsdf::update`] follows the map.
 #[derive(Clone, Debug)]
 pub struct SparseEsdf<const D: usize> {
     pub(super) lattice: Lattice<D>,
-    max_distance: f32,
-    slots: FxHashMap<BlockKey<D>, u32>,
-    /// In the order of slots.
-    pub(super) keys: Vec<BlockKey<D>>,
-    /// Brick by brick, x fastest: metres; infinite (with the side's sign) beyond `max_distance`; NaN: unknown. Stays
-    /// inside: answers are typed.
-    distance: Vec<f32>,
+    pub(super) settings: SparseEsdfSettings,
+    pub(super) max_distance: f32,
+    /// Of the map, when it was looked at last.
+    pub(super) epoch: u64,
+    pub(super) slots: Arc<FxHashMap<BlockKey<D>, u32>>,
+    /// In the order of slots, as are the bricks.
+    pub(super) keys: Arc<Vec<BlockKey<D>>>,
+    pub(super) bricks: Vec<EsdfBrick>,
+    /// Of the accurate method.
+    pub(super) surface: SurfaceElements<D>,
 }
 
 impl<const D: usize> SparseEsdf<D> {
-    /// The chapter's transform over the observed bricks: seeds every observed cell within the band of the surface with
-    /// its own estimate, `f = (D / r)^2`, finds the exact minimum of squared distance plus `f`, and takes the sign from
-    /// `D`. What [`crate::field::esdf_from_tsdf`] makes of a dense map, up to `max_distance`; how far to trust it is said
-    /// there.
+    /// The field over the observed bricks of a map, by [`SparseEsdfSettings::method`].
+    ///
+    /// Accurate: the exact distance to the crossings of the surface that [`crate::surface`] extracts, and from there to its
+    /// segments or triangles; up to 509 cells, whatever `max_distance` says. Seeded: what
+    /// [`crate::field::esdf_from_tsdf`] makes of a dense map, up to `max_distance`. The sign is that of the cell's own
+    /// estimate.
     ///
     /// O(cells of the observed bricks x cells of `max_distance`) at worst, where nothing is near. In parallel with the
     /// feature `parallel`; the result is the same bytes.
@@ -59,21 +49,45 @@ impl<const D: usize> SparseEsdf<D> {
     pub fn of(store: &Bricks<SignedDistance, D>, settings: &SparseEsdfSettings) -> Self {
         assert!(settings.max_distance > 0.0, "distances are maintained up to a positive length");
         let lattice = *store.lattice();
-        let limit = ((settings.max_distance / lattice.resolution).powi(2) as f32).min(LARGEST_SQ);
-        let rule = CellRule {
-            min_weight: settings.min_weight,
-            band_cells: settings.band_cells,
-            resolution: lattice.resolution as f32,
-            limit,
+        let reach = settings.reach_cells(lattice.resolution);
+        let mut field = Self {
+            lattice,
+            settings: *settings,
+            max_distance: (reach * lattice.resolution) as f32,
+            epoch: 0,
+            slots: Arc::default(),
+            keys: Arc::default(),
+            bricks: Vec::new(),
+            surface: SurfaceElements::new(settings.min_weight),
         };
-        let level = squared_distances(&Survey::of(store, &rule), |key, values| {
-            if let Some(brick) = store.brick(key) {
-                sign(values, brick.distances(), brick.weights(), &rule);
-            }
-        });
-        let slots = level.keys.iter().enumerate().map(|(i, &key)| (key, i as u32)).collect();
-        let max_distance = limit.sqrt() * lattice.resolution as f32;
-        Self { lattice, max_distance, slots, keys: level.keys, distance: level.values }
+        field.update(store);
+        field
+    }
+
+    /// Follows the map that the field was made of: afterwards it is what [`SparseEsdf::of`] makes of it, bit for bit.
+    /// Only what changed since and what lies within the largest distance of it is solved again, and only where the surface
+    /// is not what it was; by the other methods than [`EsdfMethod::Accurate`], everything.
+    ///
+    /// O(bricks + cells within reach of a change).
+    ///
+    /// # Panics
+    /// Where the map has another lattice.
+    pub fn update(&mut self, store: &Bricks<SignedDistance, D>) -> EsdfUpdate {
+        assert_eq!(self.lattice, *store.lattice(), "the map that the field was made of");
+        if self.settings.method == EsdfMethod::Accurate {
+            return self.follow(store);
+        }
+        let changed = store.changed_since(self.epoch).len();
+        if changed > 0 {
+            self.solve_cells(store);
+        }
+        let solved = if changed > 0 { self.keys.len() } else { 0 };
+        EsdfUpdate { changed, touched: changed, solved, measured: solved }
+    }
+
+    /// How the field is made.
+    pub fn settings(&self) -> &SparseEsdfSettings {
+        &self.settings
     }
 
     /// Index to metres.
@@ -88,7 +102,7 @@ impl<const D: usize> SparseEsdf<D> {
 
     /// The keys of the bricks that hold an observed cell, ascending. O(n log n).
     pub fn keys(&self) -> Vec<BlockKey<D>> {
-        let mut keys = self.keys.clone();
+        let mut keys = self.keys.to_vec();
         keys.sort_unstable();
         keys
     }
@@ -96,9 +110,10 @@ impl<const D: usize> SparseEsdf<D> {
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         let bucket = size_of::<(BlockKey<D>, u32)>() + 1;
-        self.distance.capacity() * size_of::<f32>()
+        self.bricks.iter().map(EsdfBrick::bytes).sum::<usize>()
             + self.keys.capacity() * size_of::<BlockKey<D>>()
             + self.slots.capacity() * 8 / 7 * bucket
+            + self.surface.memory_bytes()
             + size_of::<Self>()
     }
 
@@ -172,8 +187,34 @@ impl<const D: usize> SparseEsdf<D> {
 
     #[inline]
     pub(super) fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
-        let slot = *self.slots.get(&key)? as usize;
-        self.distance.get(slot * block_cells::<D>()..(slot + 1) * block_cells::<D>())
+        Some(&self.bricks[self.slot(key)?].distance)
+    }
+
+    #[inline]
+    pub(super) fn slot(&self, key: BlockKey<D>) -> Option<usize> {
+        self.slots.get(&key).map(|&slot| slot as usize)
+    }
+
+    pub(super) fn add(&mut self, key: BlockKey<D>, brick: EsdfBrick) {
+        Arc::make_mut(&mut self.slots).insert(key, self.bricks.len() as u32);
+        Arc::make_mut(&mut self.keys).push(key);
+        self.bricks.push(brick);
+    }
+
+    /// The last brick takes its place.
+    pub(super) fn remove(&mut self, key: BlockKey<D>, slot: usize) {
+        let (slots, keys) = (Arc::make_mut(&mut self.slots), Arc::make_mut(&mut self.keys));
+        slots.remove(&key);
+        keys.swap_remove(slot);
+        self.bricks.swap_remove(slot);
+        if let Some(moved) = keys.get(slot) {
+            slots.insert(*moved, slot as u32);
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        (self.slots, self.keys) = Default::default();
+        self.bricks.clear();
     }
 
     /// The stored value of a cell; `None` where there is no brick.
@@ -193,18 +234,17 @@ impl<const D: usize> SparseEsdf<D> {
     }
 }
 
-/// Squares of whole numbers up to this are exact in `f32`.
-const LARGEST_SQ: f32 = 4096.0 * 4096.0;
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cell::{DistanceBrick, Planes};
     use crate::field::esdf_from_tsdf;
+    use crate::geom::block_cells;
     use crate::map::{Tsdf, TsdfConfig};
     use proptest::prelude::*;
 
     const R: f64 = 0.1;
+    const SEEDED: EsdfMethod = EsdfMethod::Seeded { band_cells: 1.5 };
 
     /// Key, and cells: place, distance, weight.
     type RandomBrick = ([i32; 3], Vec<(usize, f32, f32)>);
@@ -232,8 +272,13 @@ mod tests {
         prop::collection::vec((prop::array::uniform3(at), prop::collection::vec(cell, 1..60)), 0..12)
     }
 
-    fn matches_brute_force<const D: usize>(bricks: &[RandomBrick], settings: &SparseEsdfSettings) {
+    fn matches_brute_force<const D: usize>(
+        bricks: &[RandomBrick],
+        settings: &SparseEsdfSettings,
+        band_cells: f32,
+    ) {
         let store = store::<D>(bricks);
+        let settings = &SparseEsdfSettings { method: EsdfMethod::Seeded { band_cells }, ..*settings };
         let esdf = SparseEsdf::of(&store, settings);
         let observed: Vec<([i32; D], f32)> = store
             .keys()
@@ -243,8 +288,7 @@ mod tests {
                 store.cell(cell).filter(|c| c.weight >= settings.min_weight).map(|c| (cell, c.distance))
             })
             .collect();
-        let seeds: Vec<_> =
-            observed.iter().filter(|(_, d)| (d / R as f32).abs() <= settings.band_cells).collect();
+        let seeds: Vec<_> = observed.iter().filter(|(_, d)| (d / R as f32).abs() <= band_cells).collect();
         for (cell, d) in &observed {
             let nearest = seeds.iter().map(|(seed, offset)| {
                 let sq: f64 = (0..D).map(|k| f64::from(cell[k] - seed[k]).powi(2)).sum();
@@ -266,18 +310,19 @@ mod tests {
                 other => panic!("{other:?} where {want}"),
             }
         }
-        let known = esdf.distance.iter().filter(|v| !v.is_nan()).count();
+        let values = esdf.bricks.iter().flat_map(|b| b.distance.iter());
+        let known = values.filter(|v| !v.is_nan()).count();
         assert_eq!(known, observed.len());
     }
 
     proptest! {
         #[test]
         fn matches_brute_force_2d(bricks in bricks(), max_distance in prop_oneof![Just(0.05), 0.2..4.0f64], band_cells in 0.1..2.0f32) {
-            matches_brute_force::<2>(&bricks, &SparseEsdfSettings { max_distance, band_cells, ..Default::default() });
+            matches_brute_force::<2>(&bricks, &SparseEsdfSettings { max_distance, ..Default::default() }, band_cells);
         }
         #[test]
         fn matches_brute_force_3d(bricks in bricks(), max_distance in prop_oneof![Just(0.05), 0.2..4.0f64], band_cells in 0.1..2.0f32) {
-            matches_brute_force::<3>(&bricks, &SparseEsdfSettings { max_distance, band_cells, ..Default::default() });
+            matches_brute_force::<3>(&bricks, &SparseEsdfSettings { max_distance, ..Default::default() }, band_cells);
         }
     }
 
@@ -303,8 +348,8 @@ mod tests {
         let n = 35;
         let (tsdf, bricks) = ball::<D>(n);
         let dense = esdf_from_tsdf(&tsdf, 0.5, 1.5);
-        let far = SparseEsdf::of(&bricks, &SparseEsdfSettings { max_distance: 10.0, ..Default::default() });
-        let near = SparseEsdf::of(&bricks, &SparseEsdfSettings { max_distance: 0.6, ..Default::default() });
+        let seeded = |max_distance| SparseEsdfSettings { max_distance, method: SEEDED, ..Default::default() };
+        let (far, near) = (SparseEsdf::of(&bricks, &seeded(10.0)), SparseEsdf::of(&bricks, &seeded(0.6)));
         let mut saturated = 0;
         for i in 0..4000 {
             let p: [f64; D] = std::array::from_fn(|k| {
@@ -354,7 +399,10 @@ mod tests {
         };
         let (one, three) = (of(1), of(3));
         assert_eq!(one.keys, three.keys);
-        let bits = |esdf: &SparseEsdf<3>| esdf.distance.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        let bits = |esdf: &SparseEsdf<3>| {
+            let values = esdf.bricks.iter().flat_map(|b| b.distance.iter());
+            values.map(|v| v.to_bits()).collect::<Vec<_>>()
+        };
         assert_eq!(bits(&one), bits(&three));
     }
 

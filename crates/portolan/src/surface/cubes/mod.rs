@@ -28,3 +28,7 @@ mod tunnel;
 pub use dense::isosurface;
 pub use extract::{MeshSettings, marching_cubes};
 pub use incremental::IncrementalMesh;
+pub(crate) use numbering::edge_start;
+pub(crate) use parallel::map as parallel_map;
+pub(crate) use piece::crossing_place;
+pub(crate) use table::cube_patch;

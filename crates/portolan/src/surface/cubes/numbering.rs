@@ -14,7 +14,7 @@
 pub(super) const EDGES: u8 = 12;
 
 /// Axis of an edge, and its lower corner.
-pub(super) const fn edge_start(edge: u8) -> (usize, u8) {
+pub(crate) const fn edge_start(edge: u8) -> (usize, u8) {
     let (axis, a, b) = (edge as usize >> 2, edge & 1, (edge >> 1) & 1);
     let corner = match axis {
         0 => a << 1 | b << 2,

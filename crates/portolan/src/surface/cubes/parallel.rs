@@ -2,7 +2,7 @@
 
 /// `make(scratch, i)` for every `i` below `count`.
 #[cfg(feature = "parallel")]
-pub(super) fn map<S: Send, R: Send>(
+pub(crate) fn map<S: Send, R: Send>(
     count: usize,
     scratch: impl Fn() -> S + Sync + Send,
     make: impl Fn(&mut S, usize) -> R + Sync + Send,
@@ -31,7 +31,7 @@ pub(super) fn for_each<T: Send, S: Send>(
 }
 
 #[cfg(not(feature = "parallel"))]
-pub(super) fn map<S: Send, R: Send>(
+pub(crate) fn map<S: Send, R: Send>(
     count: usize,
     scratch: impl Fn() -> S + Sync + Send,
     make: impl Fn(&mut S, usize) -> R + Sync + Send,

@@ -69,6 +69,12 @@ struct Vertex {
     color: [u8; 3],
 }
 
+/// Where between two nodes with these values of different sign the surface crosses: in cells from the lower one.
+#[inline(always)]
+pub(crate) fn crossing_place(a: f32, b: f32) -> f32 {
+    (a / (a - b)).clamp(MARGIN, 1.0 - MARGIN)
+}
+
 /// The crossing of the edge that starts at `node`: linear between its ends, from the lower one to the upper one, so
 /// that every cube at the edge computes the same bits.
 #[inline(always)]
@@ -76,7 +82,7 @@ fn crossing(samples: &impl Samples, node: [i32; 3], axis: usize, want: Attribute
     let mut end = node;
     end[axis] += 1;
     let (a, b) = (samples.value(node), samples.value(end));
-    let t = (a / (a - b)).clamp(MARGIN, 1.0 - MARGIN);
+    let t = crossing_place(a, b);
     let mut vertex =
         Vertex { position: [node[0] as f32, node[1] as f32, node[2] as f32], ..Vertex::default() };
     vertex.position[axis] += t;

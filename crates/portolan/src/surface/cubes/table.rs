@@ -59,6 +59,14 @@ pub(super) struct Table {
 /// The one table.
 pub(super) static TABLE: LazyLock<Table> = LazyLock::new(Table::generate);
 
+/// The triangles of a cube with these values at its corners, all observed: the places 0 to 11 are the crossings of its
+/// edges ([`edge_start`]), those from 12 on the means of the crossings that the second list names.
+pub(crate) fn cube_patch(d: &[f32; 8]) -> (&'static [[u8; 3]], &'static [Vec<u8>]) {
+    let case = d.iter().enumerate().fold(0, |case, (c, &v)| case | u8::from(v < 0.0) << c);
+    let patch = TABLE.patch(case, d);
+    (&patch.triangles, &patch.centres)
+}
+
 impl Table {
     fn generate() -> Self {
         let mut table = Self {

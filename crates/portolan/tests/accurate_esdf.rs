@@ -1,0 +1,90 @@
+//! The accurate distance field against the extracted surface.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
+
+mod common;
+#[path = "common/scenes.rs"]
+mod scenes;
+
+use portolan::field::{SparseEsdf, SparseEsdfSettings};
+use portolan::geom::{Lattice, block_cells};
+use portolan::map::SweepKind;
+use portolan::surface::{ContourSettings, MeshSettings, NearestSurface, marching_cubes, marching_squares};
+use scenes::{Random, Segments, Spoiled, room};
+
+/// Errors of the nodes in cells, by distance in cells.
+#[derive(Default)]
+struct Errors(Vec<(f64, f64)>);
+
+impl Errors {
+    /// Of every node that the field knows, or one of `every` of them.
+    fn of<const D: usize>(esdf: &SparseEsdf<D>, every: u64, exact: impl Fn([f64; D]) -> Option<f64>) -> Self {
+        let mut random = Random(1);
+        let mut errors = Self::default();
+        let r = esdf.lattice().resolution;
+        for cell in esdf.keys().iter().flat_map(|key| (0..block_cells::<D>()).map(|i| key.cell(i))) {
+            if random.next().is_multiple_of(every) {
+                if let Some(got) = esdf.cell(cell).known() {
+                    let want = exact(esdf.lattice().center(cell)).unwrap();
+                    errors.0.push((want / r, (f64::from(got.abs()) - want) / r));
+                }
+            }
+        }
+        errors
+    }
+
+    /// Share of nodes that are exact, and the worst error (cells), among those between two distances.
+    fn check(&self, name: &str, from: f64, to: f64) -> (f64, f64) {
+        let here: Vec<f64> = self.0.iter().filter(|(d, _)| (from..to).contains(d)).map(|e| e.1).collect();
+        let exact = here.iter().filter(|e| e.abs() <= 1e-3).count() as f64 / here.len() as f64;
+        let worst = here.iter().fold(0.0, |a: f64, e| a.max(e.abs()));
+        let least = here.iter().fold(0.0, |a: f64, e| a.min(*e));
+        println!(
+            "{name} {from}..{to}: {} nodes, {:.4} % exact, worst {worst:.4}, too small by {:.1e}",
+            here.len(),
+            100.0 * exact,
+            -least
+        );
+        // An element's distance is never less than that to the surface: f32 alone, of up to 20 cells and of the
+        // vertices of the mesh.
+        assert!(least > -2e-4);
+        (exact, worst)
+    }
+
+    fn assert_exact(&self, name: &str, share: f64) {
+        let near = self.check(name, 0.0, 1.0);
+        let middle = self.check(name, 1.0, 3.0);
+        let far = self.check(name, 3.0, f64::INFINITY);
+        let (exact, worst) = self.check(name, 0.0, f64::INFINITY);
+        assert_eq!(near.0, 1.0, "all exact within one cell");
+        assert!(exact >= share && worst <= 0.2 && middle.1 <= 0.2 && far.1 <= 0.2);
+    }
+}
+
+fn nodes_of_the_room(spoiled: Spoiled, share: f64, name: &str) {
+    let store = room(112, [-40, 3, 0], Lattice::new([0.0; 3], 0.05), spoiled);
+    let mesh = marching_cubes(&store, None, &MeshSettings::default());
+    let nearest = NearestSurface::of_mesh(&mesh);
+    let esdf = SparseEsdf::of(&store, &SparseEsdfSettings::default());
+    Errors::of(&esdf, 4, |p| nearest.distance(p)).assert_exact(name, share);
+}
+
+#[test]
+fn nodes_in_space_are_exact() {
+    nodes_of_the_room(Spoiled::Noisy, 0.999, "noisy room");
+}
+
+#[test]
+fn nodes_in_space_are_exact_where_crossings_are_at_nodes() {
+    nodes_of_the_room(Spoiled::Rounded, 0.995, "rounded room");
+}
+
+#[test]
+fn nodes_of_the_apartment_are_exact() {
+    let tsdf = common::tsdf(SweepKind::CellCentre, true, &common::apartment().log);
+    let settings = ContourSettings::of(&tsdf);
+    let contour = marching_squares(&tsdf, &settings);
+    let segments = Segments::of(&contour, 0.1);
+    let settings = SparseEsdfSettings { min_weight: settings.min_weight, ..Default::default() };
+    let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
+    Errors::of(&esdf, 1, |p| segments.distance(p)).assert_exact("apartment", 0.999);
+}
