@@ -27,6 +27,10 @@ impl<const D: usize> SparseEsdf<D> {
         let changed = store.changed_since(self.epoch);
         self.epoch = store.epoch();
         let first = self.keys.is_empty();
+        let mut uncovered = Vec::new();
+        if self.settings.unknown {
+            uncovered = changed.iter().copied().filter(|&key| self.uncovered(store, key)).collect();
+        }
         let moved = self.come_and_go(store, &changed);
         let touched = self.surface.update(store, &changed);
         let reach = self.limit().sqrt();
@@ -47,6 +51,11 @@ impl<const D: usize> SparseEsdf<D> {
             if let Some(slot) = self.slot(*key) {
                 self.bricks[slot].distance = plane;
             }
+        }
+        if self.settings.unknown {
+            let around = within(&uncovered, (reach + 1.0).powi(2));
+            let dirty = if first { self.keys() } else { self.held(around) };
+            self.solve_unknown(store, &dirty);
         }
         EsdfUpdate {
             changed: changed.len(),
@@ -151,7 +160,7 @@ impl<const D: usize> SparseEsdf<D> {
     }
 
     /// Those of bricks that the field holds, ascending, each once.
-    fn held(&self, mut keys: Vec<BlockKey<D>>) -> Vec<BlockKey<D>> {
+    pub(super) fn held(&self, mut keys: Vec<BlockKey<D>>) -> Vec<BlockKey<D>> {
         keys.retain(|key| self.slots.contains_key(key));
         keys.sort_unstable();
         keys.dedup();

@@ -184,6 +184,48 @@ proptest! {
     }
 }
 
+fn is_the_nearest_unknown_box<const D: usize>(steps: &[Vec<Change>], settings: &SparseEsdfSettings) {
+    let mut store = Bricks::new(Lattice::new([3.0; D], R));
+    steps.iter().flatten().for_each(|change| apply(&mut store, change));
+    let esdf = SparseEsdf::of(&store, &SparseEsdfSettings { unknown: true, ..*settings });
+    let reach = (settings.max_distance / R) as f32;
+    let far = reach as i32 + 2;
+    for key in esdf.keys() {
+        let plane = esdf.bricks[esdf.slot(key).unwrap()].unknown.as_deref().unwrap();
+        // Too many for all of them.
+        for i in
+            (key.0[0].unsigned_abs() as usize % 7..block_cells::<D>()).step_by(if D == 2 { 3 } else { 61 })
+        {
+            let cell = key.cell(i);
+            let mut want = f32::INFINITY;
+            let edge = 2 * far + 1;
+            for n in 0..edge.pow(D as u32) {
+                let step: [i32; D] = std::array::from_fn(|k| n / edge.pow(k as u32) % edge - far);
+                let cost: f32 = step.map(|k| (k.abs() as f32 - 0.5).max(0.0).powi(2)).iter().sum();
+                let there = store.cell(std::array::from_fn(|k| cell[k] + step[k]));
+                if cost < want && there.is_none_or(|c| c.weight < settings.min_weight) {
+                    want = cost;
+                }
+            }
+            let want = if want <= reach * reach { want } else { f32::INFINITY };
+            assert_eq!(plane[i], want, "{cell:?}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn is_the_nearest_unknown_box_2d(steps in changes(), settings in settings()) {
+        is_the_nearest_unknown_box::<2>(&steps, &settings);
+    }
+    #[test]
+    fn is_the_nearest_unknown_box_3d(steps in changes(), settings in settings()) {
+        let max_distance = settings.max_distance.min(0.9);
+        is_the_nearest_unknown_box::<3>(&steps, &SparseEsdfSettings { max_distance, ..settings });
+    }
+}
+
 /// A ball of 0.8 m in an array that is no multiple of a brick, with a corner that was not observed.
 fn ball<const D: usize>() -> Tsdf<D> {
     let config = TsdfConfig { cells: [37; D], resolution: R, truncation: 0.3, ..Default::default() };

@@ -26,6 +26,7 @@ mod settings;
 mod sparse_esdf;
 mod surroundings;
 mod transform;
+mod unknown;
 
 pub(crate) use crossings::{BrickCrossings, Crossings};
 pub use dense::DenseEsdf;

@@ -11,6 +11,8 @@ pub(super) trait Search<B, const D: usize>: Sync {
     type Line: Default;
     /// Whether words are carried.
     const WORDS: bool;
+    /// Bricks that are made ready on either side of what is there.
+    const MARGIN: i32 = 0;
 
     /// Makes the line ready for `length` cells, with nothing on it.
     fn clear(&self, line: &mut Self::Line, rows: &Rows, length: usize);
@@ -93,10 +95,11 @@ impl RowLines {
 
 /// A search over [`RowLines`].
 macro_rules! search_rows {
-    ($kind:ty, $carries:expr, $blank:expr, |$kind_:ident, $f:ident, $first:ident, $reach:ident, $found:ident| $find:expr) => {
+    ($kind:ty, $carries:expr, $blank:expr, $margin:expr, |$kind_:ident, $f:ident, $first:ident, $reach:ident, $found:ident| $find:expr) => {
         impl<S: Source, const D: usize> Search<S, D> for $kind {
             type Line = RowLines;
             const WORDS: bool = $carries;
+            const MARGIN: i32 = $margin;
 
             fn clear(&self, line: &mut RowLines, rows: &Rows, length: usize) {
                 line.clear(rows, length, $blank, $carries);
@@ -120,9 +123,11 @@ macro_rules! search_rows {
         }
     };
 }
-search_rows!(Least, false, f32::INFINITY, |_kind, f, first, reach, found| min_plus(f, first, reach, found));
-search_rows!(LeastBox, false, 0.0, |_kind, f, first, reach, found| min_plus_boxes(f, first, reach, found));
-search_rows!(LeastWord, true, f32::INFINITY, |kind, f, first, reach, found| {
+search_rows!(Least, false, f32::INFINITY, 0, |_kind, f, first, reach, found| min_plus(
+    f, first, reach, found
+));
+search_rows!(LeastBox, false, 0.0, 1, |_kind, f, first, reach, found| min_plus_boxes(f, first, reach, found));
+search_rows!(LeastWord, true, f32::INFINITY, 0, |kind, f, first, reach, found| {
     min_plus_words(f, first, reach, 10 * kind.axis as u32, found);
 });
 
@@ -279,8 +284,8 @@ impl<B, const D: usize> Line<'_, B, D> {
             done = to;
             let outputs = &self.outputs[from..to];
             let (Some(lowest), Some(highest)) = (outputs.first(), outputs.last()) else { continue };
-            let start = first.min(at(&lowest.key));
-            let length = (last.max(at(&highest.key)) - start + 1) as usize * BLOCK_EDGE;
+            let start = first.min(at(&lowest.key)) - S::MARGIN;
+            let length = (last.max(at(&highest.key)) - start + 1 + S::MARGIN) as usize * BLOCK_EDGE;
             search.clear(&mut scratch.line, rows, length);
             for input in run {
                 let row = (at(&input.key) - start) as usize * BLOCK_EDGE;

@@ -7,7 +7,6 @@ use super::planes::EsdfBrick;
 use super::seeds::Survey;
 use super::settings::EsdfMethod;
 use super::sparse_esdf::SparseEsdf;
-use super::transform::squared_distances;
 use crate::cell::SignedDistance;
 use crate::geom::block_cells;
 use crate::store::Bricks;
@@ -21,7 +20,7 @@ impl<const D: usize> SparseEsdf<D> {
         let level = match self.settings.method {
             EsdfMethod::Seeded { band_cells } => {
                 let rule = CellRule::band(min_weight, band_cells, resolution, (reach * reach) as f32);
-                squared_distances(&Survey::of(store, &rule), |key, values| {
+                Survey::of(store, &rule).solve(|key, values| {
                     if let Some(brick) = store.brick(key) {
                         sign(values, brick.distances(), brick.weights(), &rule);
                     }
@@ -30,8 +29,8 @@ impl<const D: usize> SparseEsdf<D> {
             EsdfMethod::Mask | EsdfMethod::Accurate => {
                 let limit = (reach + 0.5).powi(2) as f32;
                 let [occupied, free] = CellRule::sides(min_weight, resolution, limit);
-                let to_occupied = squared_distances(&Survey::of(store, &occupied), |_, _| {});
-                let mut to_free = squared_distances(&Survey::of(store, &free), |_, _| {});
+                let to_occupied = Survey::of(store, &occupied).solve(|_, _| {});
+                let mut to_free = Survey::of(store, &free).solve(|_, _| {});
                 // Both hold all bricks with an observed cell in one order.
                 let cells = block_cells::<D>();
                 let bricks =
@@ -46,6 +45,9 @@ impl<const D: usize> SparseEsdf<D> {
         };
         self.epoch = store.epoch();
         self.hold(&level);
+        if self.settings.unknown {
+            self.solve_unknown(store, &self.keys());
+        }
     }
 
     fn hold(&mut self, level: &Level<D>) {

@@ -2,8 +2,10 @@
 
 use super::anchors::{Anchor, bounds, furthest_of_cells};
 use super::kernels::{CellRule, seeds, survey};
-use super::pass::{Source, for_each, layout};
+use super::level::{Input, Level};
+use super::pass::{Least, Source, for_each, layout};
 use super::reach::Reach;
+use super::transform::squared_distances;
 use crate::cell::{DistanceBrick, SignedDistance};
 use crate::geom::{BlockKey, block_cells};
 use crate::store::Bricks;
@@ -82,6 +84,12 @@ impl<'a, const D: usize> Survey<'a, D> {
             let brick = self.store.brick(key)?;
             Some((key, Seeds { brick, rule: self.rule, places: &self.places }))
         })
+    }
+
+    /// `min over seeds p of |q - p|^2 + f(p)`, in squared cells, for all bricks with an observed cell.
+    pub(super) fn solve(&self, solved: impl Fn(BlockKey<D>, &mut [f32]) + Sync + Send) -> Level<D> {
+        let seeds: Vec<_> = self.seeds().map(|(key, source)| Input { key, source }).collect();
+        squared_distances(Least, &seeds, self.bricks.clone(), |_| true, solved)
     }
 }
 

@@ -1,24 +1,29 @@
 //! The squared distance transform of seeds in bricks.
 
 use super::level::{Input, Level, inputs, reachable};
-use super::pass::{Least, Pass, Source, for_each};
+use super::pass::{Pass, Planes, Search, Source, for_each};
 use super::reach::{Reach, line_order, needed};
-use super::seeds::Survey;
 use crate::geom::BlockKey;
 
-/// `min over seeds p of |q - p|^2 + f(p)`, in squared cells, for all cells of the bricks of a survey: exact wherever it
-/// is not beyond the brick's budget, too large or infinite there. Bricks in the order of lines along the last axis,
-/// cells x fastest; `solved` has the last word on each.
+/// The least over seeds of `f(p)` and of what the way to `p` costs by `search`, in squared cells, for all cells of the
+/// bricks of `outputs`: exact wherever it is not beyond the brick's budget, too large or infinite there. Bricks in the
+/// order of lines along the last axis, cells x fastest; `solved` has the last word on each. `seeds` ascending; passes fill
+/// only bricks that are `wanted`.
 ///
 /// Pass by pass along x, y, z *(Saito & Toriwaki 1994)*. The passes before the last run slab by slab of the last axis,
 /// so that only what the last pass reads is held for the whole map.
-pub(super) fn squared_distances<const D: usize>(
-    survey: &Survey<'_, D>,
+pub(super) fn squared_distances<B: Source, S, const D: usize>(
+    search: S,
+    seeds: &[Input<B, D>],
+    outputs: Vec<Reach<D>>,
+    wanted: impl Fn(&BlockKey<D>) -> bool + Sync + Send,
     solved: impl Fn(BlockKey<D>, &mut [f32]) + Sync + Send,
-) -> Level<D> {
+) -> Level<D>
+where
+    S: Search<B, D> + for<'a> Search<Planes<'a>, D> + Copy + Send,
+{
     let last = D - 1;
-    let outputs = outputs_of_passes(survey.bricks.clone());
-    let seeds: Vec<_> = survey.seeds().map(|(key, source)| Input { key, source }).collect();
+    let outputs = outputs_of_passes(outputs);
     let slabs: Vec<_> = seeds.chunk_by(|a, b| a.key.0[last] == b.key.0[last]).collect();
     let mut levels: Vec<Level<D>> = slabs.iter().map(|_| Level::default()).collect();
     for_each(slabs.into_iter().zip(&mut levels).collect(), Level::default, |(slab, level), spare| {
@@ -27,10 +32,11 @@ pub(super) fn squared_distances<const D: usize>(
             let all = &outputs[axis];
             let from = all.partition_point(|r| r.key.0[last] < z);
             let to = all.partition_point(|r| r.key.0[last] <= z);
+            let here: Vec<_> = all[from..to].iter().filter(|r| wanted(&r.key)).copied().collect();
             std::mem::swap(level, spare);
             match axis {
-                0 => fill(axis, slab, &all[from..to], level),
-                _ => fill(axis, &inputs([&*spare], axis), &all[from..to], level),
+                0 => fill(axis, search, slab, &here, level),
+                _ => fill(axis, search, &inputs([&*spare], axis), &here, level),
             }
         }
     });
@@ -38,7 +44,7 @@ pub(super) fn squared_distances<const D: usize>(
     let mut level = Level::default();
     level.hold(all, false);
     let pass = Pass { axis: last, inputs: &inputs(&levels, last), outputs: all, known: &[], to: last };
-    pass.run(Least, &mut level.values, &mut [], |_, key, values, _| solved(key, values));
+    pass.run(search, &mut level.values, &mut [], |_, key, values, _| solved(key, values));
     level
 }
 
@@ -57,16 +63,17 @@ fn outputs_of_passes<const D: usize>(mut bricks: Vec<Reach<D>>) -> Vec<Vec<Reach
 }
 
 /// The bricks that the inputs reach, filled.
-fn fill<S: Source, const D: usize>(
+fn fill<B: Sync, const D: usize>(
     axis: usize,
-    inputs: &[Input<S, D>],
+    search: impl Search<B, D>,
+    inputs: &[Input<B, D>],
     outputs: &[Reach<D>],
     level: &mut Level<D>,
 ) {
     let outputs = reachable(inputs, outputs, axis);
     level.hold(&outputs, false);
     let pass = Pass { axis, inputs, outputs: &outputs, known: &[], to: axis + 1 };
-    pass.run(Least, &mut level.values, &mut [], |_, _, _, _| {});
+    pass.run(search, &mut level.values, &mut [], |_, _, _, _| {});
 }
 
 #[cfg(test)]
@@ -74,6 +81,7 @@ mod tests {
     use super::*;
     use crate::cell::DistanceBrick;
     use crate::field::sparse::kernels::CellRule;
+    use crate::field::sparse::seeds::Survey;
     use crate::geom::Lattice;
     use crate::store::Bricks;
 
