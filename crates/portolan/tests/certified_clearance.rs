@@ -163,3 +163,50 @@ fn bounds_hold_in_the_apartment() {
     let simplices: Vec<_> = contour.ends().collect();
     no_bound_is_violated("apartment", &esdf, &simplices, |p| segments.distance(p));
 }
+
+#[test]
+#[ignore]
+fn timing_tmp() {
+    use std::time::Instant;
+    let store = room(112, [-40, 3, 0], Lattice::new([0.0; 3], 0.05), Spoiled::Noisy);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    pool.install(|| {
+        for max_distance in [0.06, 1.0] {
+            let mut best = 1e9f64;
+            for _ in 0..5 {
+                let t = Instant::now();
+                let esdf = SparseEsdf::of(&store, &SparseEsdfSettings { max_distance, ..Default::default() });
+                best = best.min(t.elapsed().as_secs_f64());
+                std::hint::black_box(&esdf);
+            }
+            println!("{max_distance}: {:.1} ns a cell", best / (store.len() as f64 * 512.0) * 1e9);
+        }
+    });
+    let esdf = SparseEsdf::of(&store, &SparseEsdfSettings::default());
+    let mesh = marching_cubes(&store, None, &MeshSettings::default());
+    let nearest = NearestSurface::of_mesh(&mesh);
+    let simplices: Vec<_> = mesh.triangles.iter().map(|&t| mesh.corners_world(t)).collect();
+    let mut probes = Probes { random: Random(3), esdf: &esdf, keys: esdf.keys(), simplices: &simplices };
+    let points: Vec<_> = (0..100_000).map(|n| probes.next(n % 3)).collect();
+    let d: Vec<_> = points.iter().map(|p| nearest.distance(*p).unwrap()).collect();
+    for (lo, hi) in [(0.0, 0.05), (0.05, 0.15), (0.15, 0.4), (0.4, 0.7), (0.7, 1.0), (1.0, 9.0)] {
+        let here: Vec<_> =
+            points.iter().zip(&d).filter(|(_, d)| (lo..hi).contains(*d)).map(|(p, _)| *p).collect();
+        let time = |f: &dyn Fn([f64; 3]) -> f64| {
+            let mut best = 1e9f64;
+            for _ in 0..5 {
+                let t = Instant::now();
+                let s: f64 = here.iter().map(|p| f(*p)).sum();
+                std::hint::black_box(s);
+                best = best.min(t.elapsed().as_secs_f64() / here.len() as f64);
+            }
+            best * 1e9
+        };
+        let c = time(&|p| match esdf.clearance(p, UnknownSpace::Optimistic) {
+            Answer::Known(c) | Answer::Saturated(c) => c.lower,
+            _ => 0.0,
+        });
+        let n = time(&|p| nearest.distance(p).unwrap_or(0.0));
+        println!("{lo}..{hi}: clearance {c:.0} ns, tree {n:.0} ns, {} points", here.len());
+    }
+}
