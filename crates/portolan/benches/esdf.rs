@@ -193,7 +193,6 @@ fn follow(bencher: Bencher, max_distance: f64, threads: usize, measure: bool) {
     let esdf = SparseEsdf::of(before.store(), &settings);
     esdf.measure();
     let update = esdf.clone().update(after.store());
-    println!("{update:?} of {} bricks", esdf.keys().len());
     let pool = pool(threads);
     bencher.counter(ItemsCount::new(512 * update.solved)).with_inputs(|| esdf.clone()).bench_local_values(
         |mut esdf| {

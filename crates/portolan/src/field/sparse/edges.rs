@@ -18,7 +18,7 @@ pub(super) type Edges<'a, const D: usize> = Input<&'a BrickCrossings<D>, D>;
 /// Crossings on edges along an axis enter the pass along it as parabolas with real-valued roots, and the passes along the
 /// other axes are sums with squares of whole numbers: the separable transform of *(Felzenszwalb & Huttenlocher 2012)* once
 /// per axis. With `g_a` the first pass and `M_a` a further one, `min(M_y g_x, M_x g_y)` in the plane and
-/// `min(M_y M_x g_z, M_z min(M_y g_x, M_x g_y))` in space, where one pass serves two axes.
+/// `min(M_x M_y g_z, M_z min(M_y g_x, M_x g_y))` in space, where one pass serves two axes.
 ///
 /// No value depends on the budgets, on which other bricks are asked for, or on threads; of crossings at the same distance
 /// the same one is named.
@@ -48,11 +48,11 @@ fn in_space<R: Send, const D: usize>(
     outputs: &[Reach<D>],
     solved: impl Fn(BlockKey<D>, &mut [f32], &mut [u32]) -> R + Sync + Send,
 ) -> Vec<R> {
-    let across = sorted(outputs, 1);
-    let before_y = sorted(&needed(&across, 1), 0);
+    let along = sorted(outputs, 0);
+    let before_x = sorted(&needed(&along, 0), 1);
     let mut roots_z = Level::default();
-    first_pass(2, edges, needed(&before_y, 0), 0, &mut roots_z);
-    let roots_z = inputs([&roots_z], 0);
+    first_pass(2, edges, needed(&before_x, 1), 1, &mut roots_z);
+    let roots_z = inputs([&roots_z], 1);
     let before_z = sorted(&needed(outputs, 2), 1);
     // Slab by slab of the last axis, so that only what the last pass reads is held for the whole map.
     let slabs: Vec<i32> = before_z.chunk_by(|a, b| a.key.0[2] == b.key.0[2]).map(|s| s[0].key.0[2]).collect();
@@ -62,9 +62,9 @@ fn in_space<R: Send, const D: usize>(
         Spare::default,
         |(z, [along_z, in_slab]), spare| {
             let here = slab(&roots_z, z, |i| &i.key);
-            let along_x = &mut spare.0[0];
-            further(0, here, slab(&before_y, z, |r| &r.key), 1, along_x);
-            further(1, &inputs([&*along_x], 1), slab(&across, z, |r| &r.key), 2, along_z);
+            let along_y = &mut spare.0[0];
+            further(1, here, slab(&before_x, z, |r| &r.key), 0, along_y);
+            further(0, &inputs([&*along_y], 0), slab(&along, z, |r| &r.key), 2, along_z);
             let edges = slab(edges, z, |i| &i.key);
             let pass = InPlane::of(edges, slab(&before_z, z, |r| &r.key).to_vec(), false, spare);
             in_slab.hold(&pass.outputs, true);

@@ -83,8 +83,9 @@ fn solve<const D: usize>(map: &Map<D>, keys: &[BlockKey<D>], limit: f32, bounded
 fn power<const D: usize>(q: [i32; D], (axis, cell, place, height): (usize, [i32; D], f32, f32)) -> f32 {
     let d = (cell[axis] - q[axis]) as f32 + place;
     let mut sum = d * d + height;
-    // Whole squares are exact, their sum with the root is rounded once per pass.
-    for k in [0, 1, 2].into_iter().filter(|&k| k < D && k != axis) {
+    // Whole squares are exact, their sum with the root is rounded once per pass: of z-edges along y first.
+    let order = if axis == 2 { [1, 0, 2] } else { [0, 1, 2] };
+    for k in order.into_iter().filter(|&k| k < D && k != axis) {
         let d = (cell[k] - q[k]) as f32;
         sum += d * d;
     }

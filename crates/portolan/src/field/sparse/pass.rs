@@ -4,6 +4,7 @@ use super::level::{Input, lines};
 use super::min_plus::{Found, LANES, Panels, Row, Words, min_plus, min_plus_boxes, min_plus_words};
 use super::reach::{Reach, bricks_within};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
+use multiversion::multiversion;
 
 /// What a pass looks for on its lines, in bricks of type `B`.
 pub(super) trait Search<B, const D: usize>: Sync {
@@ -274,14 +275,7 @@ impl Rows {
                     chunk.copy_from_slice(&flat[place as usize..][..BLOCK_EDGE]);
                 }
             }
-            Way::Lane => {
-                let (panels, _) = found.as_chunks::<BLOCK_EDGE>();
-                for (chunk, &place) in chunks.iter_mut().zip(&self.places) {
-                    let (panel, lane) = (place as usize / (BLOCK_EDGE * LANES), place as usize % LANES);
-                    let rows = &panels[panel];
-                    *chunk = std::array::from_fn(|r| rows[r][lane]);
-                }
-            }
+            Way::Lane => turn(found, &self.places, chunks),
             Way::Torn => {
                 for (value, &place) in plane.iter_mut().zip(&self.places) {
                     *value = flat[place as usize];
@@ -300,6 +294,17 @@ impl Rows {
             // In the plane eight lines go through a brick.
             to[(self.panels - 1) * length + first + r][..rest.len()].copy_from_slice(rest);
         }
+    }
+}
+
+/// Chunks of eight from the lanes in which they stand.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+fn turn<T: Copy>(found: &[[T; LANES]], places: &[u16], chunks: &mut [[T; BLOCK_EDGE]]) {
+    let (panels, _) = found.as_chunks::<BLOCK_EDGE>();
+    for (chunk, &place) in chunks.iter_mut().zip(places) {
+        let rows = &panels[place as usize / (BLOCK_EDGE * LANES)];
+        let lane = place as usize % LANES;
+        *chunk = std::array::from_fn(|r| rows[r][lane]);
     }
 }
 
