@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 mod common;
+#[allow(dead_code, reason = "each test file uses its own part")]
 #[path = "common/scenes.rs"]
 mod scenes;
 
