@@ -2,7 +2,7 @@
 """The distance transform of masks beside the `edt` wheel and SciPy, on one thread: results are compared, and must be equal.
 
     cargo build --release -p portolan-cli --example fields
-    python3 bench/edt.py [--data DIR] [--repeats 3]
+    python3 bench/distance_transform.py [--data DIR] [--repeats 3]
 
 DIR may hold `grids/w3_*_u8.npy` (0: obstacle); without it masks are made here. Runs of all take turns; the least of each
 counts. One item is a cell.
