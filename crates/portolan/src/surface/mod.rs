@@ -22,5 +22,5 @@ pub use nearest::NearestSurface;
 pub(crate) use nearest::point_triangle_sq;
 pub use polyline::Polyline;
 pub use predict::{PredictionScore, RangeNoise, RangePredictions};
-pub use ray_cast::{RayCast, RayCastSettings, RayCaster, cast_ray};
+pub use ray_cast::{RayCast, RayCastSettings, RayCaster, RayTrace, cast_ray, trace_ray};
 pub use squares::{Ambiguity, ContourSettings, level_set, marching_squares};

@@ -3,6 +3,7 @@
 use super::{RayCast, RayCaster};
 use crate::geom::Pose;
 use crate::geom::vector::{distance, sub, unit};
+use crate::in_order::in_order;
 use crate::scan::Frame;
 
 /// How measured ranges spread about predicted ones: a Gaussian for the surface that was predicted and a uniform share for
@@ -87,7 +88,7 @@ impl RangePredictions {
         let seen = seen(frame);
         let taken = at_most.min(seen.len());
         let taken: Vec<_> = (0..taken).map(|i| seen[i * seen.len() / taken]).collect();
-        let casts = in_order(&taken, |&(origin, end)| {
+        let casts = in_order(&taken, 64, |&(origin, end)| {
             let direction = unit(sub(end, origin))?;
             let origin_world = world_from_sensor.transform_point(origin);
             Some((rays.cast(origin_world, world_from_sensor.rotate(direction)), distance(origin, end)))
@@ -145,17 +146,6 @@ fn seen(frame: &Frame) -> Vec<([f64; 3], [f64; 3])> {
             ends.filter_map(|(i, p)| Some((scan.origin_of(i)?, p.map(f64::from)))).collect()
         }
     }
-}
-
-#[cfg(feature = "parallel")]
-fn in_order<T: Sync, U: Send>(items: &[T], work: impl Fn(&T) -> U + Sync + Send) -> Vec<U> {
-    use rayon::prelude::*;
-    items.par_iter().with_min_len(64).map(work).collect()
-}
-
-#[cfg(not(feature = "parallel"))]
-fn in_order<T, U>(items: &[T], work: impl Fn(&T) -> U) -> Vec<U> {
-    items.iter().map(work).collect()
 }
 
 #[cfg(test)]

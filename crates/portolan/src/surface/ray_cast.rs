@@ -1,7 +1,8 @@
 //! Rays through a distance field.
 
 use crate::cell::{Planes, SignedDistance};
-use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, interpolate, vector::along};
+use crate::geom::vector::{along, norm, unit};
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, interpolate};
 use crate::map::Tsdf;
 use crate::store::{Bricks, Store};
 use crate::sweep::clip;
@@ -17,6 +18,19 @@ pub enum RayCast {
     Outside(f64),
     /// Nothing up to the largest length asked for.
     Free,
+}
+
+/// A ray's end, and what it went through on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayTrace<const D: usize> {
+    /// Where it ends.
+    pub end: RayCast,
+    /// Length in unknown space that it passed over before its end (metres), to half a cell at each border: more than zero
+    /// only where [`RayCastSettings::unknown_tolerance`] or [`RayCastSettings::blind`] allow it.
+    pub unknown: f64,
+    /// At a hit: away from the surface, at length one, from the derivative of the field there. `None` where it does not
+    /// hit, or not all cells around the place were observed.
+    pub normal: Option<[f64; D]>,
 }
 
 /// How rays are cast.
@@ -47,37 +61,94 @@ impl RayCastSettings {
 }
 
 /// Casts a ray (world, unit direction) through a field: steps of half a cell over the interpolated field until
-/// its sign turns from free to occupied, then the root of the line between the two samples. O(length).
+/// its sign turns from free to occupied, then the root of the line between the two samples. What is no ray (NaN, a
+/// direction far from length one) is outside at once. O(length).
 pub fn cast_ray<const D: usize>(
     tsdf: &Tsdf<D>,
     origin: [f64; D],
     direction: [f64; D],
     settings: &RayCastSettings,
 ) -> RayCast {
+    cast_dense(tsdf, origin, direction, settings).0
+}
+
+/// [`cast_ray`], with what the ray went through and the normal where it hits.
+///
+/// ```
+/// use portolan::map::{Tsdf2, Tsdf2Config};
+/// use portolan::surface::{RayCast, RayCastSettings, trace_ray};
+///
+/// // A wall at x = 1 m, and a gap in what was seen before it.
+/// let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [24, 8], resolution: 0.05, ..Default::default() })?;
+/// for i in (0..192).filter(|i| !(8..12).contains(&(i % 24))) {
+///     let cell = [i % 24, i / 24];
+///     tsdf.fuse(cell, 1.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
+/// }
+/// let trace = |unknown_tolerance| {
+///     let settings = RayCastSettings { unknown_tolerance, ..Default::default() };
+///     trace_ray(&tsdf, [0.1, 0.2], [1.0, 0.0], &settings)
+/// };
+/// assert!(matches!(trace(0.0).end, RayCast::Unknown(s) if (s - 0.3).abs() < 0.026));
+/// let through = trace(1.0);
+/// assert!(matches!(through.end, RayCast::Hit(s) if (s - 0.9).abs() < 1e-6));
+/// assert!((through.unknown - 0.25).abs() < 0.051 && through.normal == Some([-1.0, 0.0]));
+/// # Ok::<(), portolan::map::MapError>(())
+/// ```
+pub fn trace_ray<const D: usize>(
+    tsdf: &Tsdf<D>,
+    origin: [f64; D],
+    direction: [f64; D],
+    settings: &RayCastSettings,
+) -> RayTrace<D> {
+    let (end, unknown) = cast_dense(tsdf, origin, direction, settings);
+    RayTrace {
+        end,
+        unknown,
+        normal: normal(end, |s| look_dense(tsdf, along(origin, direction, s), s, settings)),
+    }
+}
+
+fn cast_dense<const D: usize>(
+    tsdf: &Tsdf<D>,
+    origin: [f64; D],
+    direction: [f64; D],
+    settings: &RayCastSettings,
+) -> (RayCast, f64) {
+    if !is_ray(origin, direction) {
+        return (RayCast::Outside(0.0), 0.0);
+    }
+    let step = 0.5 * tsdf.grid().lattice.resolution;
+    march(step, settings, |s| look_dense(tsdf, along(origin, direction, s), s, settings))
+}
+
+#[inline(always)]
+fn look_dense<const D: usize>(tsdf: &Tsdf<D>, p: [f64; D], s: f64, settings: &RayCastSettings) -> Seen<D> {
     let grid = tsdf.grid();
     let strides = grid.strides();
     let planes = tsdf.store().planes();
-    let bounds = grid.aabb();
-    march(0.5 * grid.lattice.resolution, settings, |s| {
-        let p = along(origin, direction, s);
-        if !bounds.contains(p) {
-            return Seen::Outside;
-        }
-        let known = grid.interpolation(p).and_then(|(base, fraction)| {
-            let at = grid.index(base)?;
-            let observed = (0..1usize << D).all(|c| {
-                let corner: usize = (0..D).map(|k| ((c >> k) & 1) * strides[k]).sum();
-                settings.observed(planes.weights()[at + corner])
-            });
-            observed.then(|| interpolate(planes.distances(), &strides, at, &fraction).0)
+    if !grid.aabb().contains(p) {
+        return Seen::Outside;
+    }
+    let known = grid.interpolation(p).and_then(|(base, fraction)| {
+        let at = grid.index(base)?;
+        let observed = (0..1usize << D).all(|c| {
+            let corner: usize = (0..D).map(|k| ((c >> k) & 1) * strides[k]).sum();
+            settings.observed(planes.weights()[at + corner])
         });
-        known.map_or(Seen::Unknown { until: s }, Seen::Known)
-    })
+        observed.then(|| interpolate(planes.distances(), &strides, at, &fraction))
+    });
+    known.map_or(Seen::Unknown { until: s }, |(value, slope)| Seen::Known(value, slope))
+}
+
+/// Whether a ray goes anywhere: with another length its steps would be, too, down to none.
+fn is_ray<const D: usize>(origin: [f64; D], direction: [f64; D]) -> bool {
+    (0.5..2.0).contains(&norm(direction)) && origin.iter().all(|v| v.is_finite())
 }
 
 /// What a field says at a point of a ray.
-enum Seen {
-    Known(f64),
+enum Seen<const D: usize> {
+    /// Value, and slope per cell.
+    Known(f64, [f64; D]),
     /// Nothing is known from here to this arc length at least.
     Unknown {
         until: f64,
@@ -85,23 +156,39 @@ enum Seen {
     Outside,
 }
 
-/// Looks along a ray every `step` metres until it ends.
-fn march(step: f64, settings: &RayCastSettings, look: impl Fn(f64) -> Seen) -> RayCast {
+/// The normal at the end of a ray, where it hits.
+fn normal<const D: usize>(end: RayCast, look: impl Fn(f64) -> Seen<D>) -> Option<[f64; D]> {
+    let RayCast::Hit(s) = end else { return None };
+    match look(s) {
+        Seen::Known(_, slope) => unit(slope),
+        _ => None,
+    }
+}
+
+/// Looks along a ray every `step` metres until it ends; also the length in unknown space before that.
+fn march<const D: usize>(
+    step: f64,
+    settings: &RayCastSettings,
+    look: impl Fn(f64) -> Seen<D>,
+) -> (RayCast, f64) {
     let mut last: Option<(f64, f64)> = None;
     let mut unknown_since = None;
+    let mut passed = 0.0;
     let mut n = 0.0;
     loop {
         let s = n * step;
         n += 1.0;
+        let open = |s: f64| unknown_since.map_or(0.0, |since| f64::max(s - since, 0.0));
         if s > settings.max_range {
-            return RayCast::Free;
+            return (RayCast::Free, passed + open(settings.max_range));
         }
         match (look(s), last) {
-            (Seen::Outside, _) => return RayCast::Outside(s),
-            (Seen::Known(d), Some((before, at))) if before >= 0.0 && d < 0.0 => {
-                return RayCast::Hit(at + (s - at) * before / (before - d));
+            (Seen::Outside, _) => return (RayCast::Outside(s), passed + open(s)),
+            (Seen::Known(d, _), Some((before, at))) if before >= 0.0 && d < 0.0 => {
+                return (RayCast::Hit(at + (s - at) * before / (before - d)), passed);
             }
-            (Seen::Known(d), _) => {
+            (Seen::Known(d, _), _) => {
+                passed += open(s);
                 last = Some((d, s));
                 unknown_since = None;
             }
@@ -110,7 +197,7 @@ fn march(step: f64, settings: &RayCastSettings, look: impl Fn(f64) -> Seen) -> R
                 last = None;
                 let end = until.max(s);
                 if end >= settings.blind && end - since.max(settings.blind) >= settings.unknown_tolerance {
-                    return RayCast::Unknown(since);
+                    return (RayCast::Unknown(since), passed);
                 }
                 n = n.max((until.min(settings.max_range) / step).ceil());
             }
@@ -143,12 +230,24 @@ impl<'a, const D: usize> RayCaster<'a, D> {
         &self.settings
     }
 
-    /// Where a ray (world, unit direction) ends. Outside: it leaves the box of all bricks, or never enters it. A ray that
-    /// begins outside of the box has passed unknown space where it enters. Bricks that are not there are passed over at
-    /// once. O(length in bricks that are there).
+    /// Where a ray (world, unit direction) ends. Outside: it leaves the box of all bricks, never enters it, or is no ray
+    /// (NaN, a direction far from length one). A ray that begins outside of the box has passed unknown space where it
+    /// enters. Bricks that are not there are passed over at once. O(length in bricks that are there).
     pub fn cast(&self, origin: [f64; D], direction: [f64; D]) -> RayCast {
-        let Some((enter, leave)) = clip(&self.bounds, origin, direction, self.settings.max_range) else {
-            return RayCast::Outside(0.0);
+        self.follow(origin, direction).0
+    }
+
+    /// [`RayCaster::cast`], with what the ray went through and the normal where it hits; as [`trace_ray`] of an array.
+    pub fn trace(&self, origin: [f64; D], direction: [f64; D]) -> RayTrace<D> {
+        let (end, unknown) = self.follow(origin, direction);
+        let look = |s| self.look(along(origin, direction, s), direction, s);
+        RayTrace { end, unknown, normal: normal(end, look) }
+    }
+
+    fn follow(&self, origin: [f64; D], direction: [f64; D]) -> (RayCast, f64) {
+        let inside = clip(&self.bounds, origin, direction, self.settings.max_range);
+        let Some((enter, leave)) = inside.filter(|_| is_ray(origin, direction)) else {
+            return (RayCast::Outside(0.0), 0.0);
         };
         let resolution = self.store.lattice().resolution;
         march(0.5 * resolution, &self.settings, |s| {
@@ -165,7 +264,7 @@ impl<'a, const D: usize> RayCaster<'a, D> {
         })
     }
 
-    fn look(&self, p: [f64; D], direction: [f64; D], s: f64) -> Seen {
+    fn look(&self, p: [f64; D], direction: [f64; D], s: f64) -> Seen<D> {
         let lattice = self.store.lattice();
         let nothing = Seen::Unknown { until: s };
         // In cells, from the centre of cell 0: between whole numbers lie the samples that are interpolated.
@@ -194,7 +293,8 @@ impl<'a, const D: usize> RayCaster<'a, D> {
             }
         }
         let fraction: [f64; D] = std::array::from_fn(|k| (at[k] - f64::from(base[k])).clamp(0.0, 1.0));
-        Seen::Known(interpolate(&corners, &std::array::from_fn(|k| 1 << k), 0, &fraction).0)
+        let (value, slope) = interpolate(&corners, &std::array::from_fn(|k| 1 << k), 0, &fraction);
+        Seen::Known(value, slope)
     }
 }
 
@@ -267,7 +367,7 @@ mod tests {
             }
         }
         let bricks = in_bricks(&tsdf);
-        let mut counts = [0; 4];
+        let (mut counts, mut normals, mut passed) = ([0; 4], 0, 0);
         for i in 0..2000 {
             let at = |a: f64| (f64::from(i) * a).fract();
             let origin: [f64; D] = std::array::from_fn(|k| 0.1 + 1.3 * at([0.618, 0.755, 0.569][k]));
@@ -276,10 +376,22 @@ mod tests {
             let tolerance = [0.0, 0.25, f64::INFINITY][i as usize % 3];
             let settings =
                 RayCastSettings { unknown_tolerance: tolerance, max_range: 0.9, ..Default::default() };
-            let (got, want) = (
-                RayCaster::new(&bricks, settings).cast(origin, direction),
-                cast_ray(&tsdf, origin, direction, &settings),
-            );
+            let traced = [
+                RayCaster::new(&bricks, settings).trace(origin, direction),
+                trace_ray(&tsdf, origin, direction, &settings),
+            ];
+            let [got, want] = traced.map(|t| t.end);
+            assert_eq!(got, RayCaster::new(&bricks, settings).cast(origin, direction));
+            assert_eq!(want, cast_ray(&tsdf, origin, direction, &settings));
+            // In bricks a ray that begins in unknown space at the border is followed on from there; else the same.
+            assert!((traced[0].unknown - traced[1].unknown).abs() < 0.06, "{traced:?}");
+            assert!(traced[0].unknown == 0.0 || tolerance > 0.0);
+            if let (Some(a), Some(b)) = (traced[0].normal, traced[1].normal) {
+                // The wall is flat: off by what f32 distances leave of a slope over a cell.
+                assert!(crate::geom::vector::distance(a, b) < 1e-6 && a[0] < -1.0 + 1e-6);
+                normals += 1;
+            }
+            passed += usize::from(matches!(want, RayCast::Hit(_)) && traced[1].unknown > 0.0);
             match (got, want) {
                 (RayCast::Hit(a), RayCast::Hit(b)) => assert!((a - b).abs() < 1e-9),
                 (RayCast::Unknown(a), RayCast::Unknown(b)) => assert_eq!(a, b),
@@ -295,6 +407,7 @@ mod tests {
             }] += 1;
         }
         assert!(counts.iter().all(|&n| n > 20), "{counts:?}");
+        assert!(normals > 20 && passed > 5, "{normals} {passed}");
     }
 
     #[test]
@@ -324,6 +437,28 @@ mod tests {
         let rays = RayCaster::new(&bricks, patient);
         let RayCast::Hit(s) = rays.cast([-700_000.0, 0.5, 0.5], [1.0, 0.0, 0.0]) else { panic!("no hit") };
         assert!((s - 700_001.234).abs() < 1e-4, "{s}");
+    }
+
+    #[test]
+    fn what_is_no_ray_is_outside_and_ends() {
+        let tsdf = wall::<2>();
+        let bricks = in_bricks(&tsdf);
+        let settings = RayCastSettings {
+            max_range: f64::INFINITY,
+            unknown_tolerance: f64::INFINITY,
+            ..Default::default()
+        };
+        let rays = RayCaster::new(&bricks, settings);
+        let (at, ahead) = ([0.5; 2], [1.0, 0.0]);
+        for (origin, direction) in
+            [(at, [0.0; 2]), (at, [f64::NAN, 1.0]), (at, [1e-150, 0.0]), ([f64::NAN, 0.5], ahead)]
+        {
+            assert_eq!(rays.cast(origin, direction), RayCast::Outside(0.0));
+            assert_eq!(cast_ray(&tsdf, origin, direction, &settings), RayCast::Outside(0.0));
+        }
+        // Behind the wall nothing is known to the end.
+        let trace = rays.trace([1.46, 0.5], ahead);
+        assert!(matches!(trace.end, RayCast::Outside(_)) && trace.unknown > 0.1 && trace.normal.is_none());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::brick::{BrickElements, Scratch};
 use crate::cell::SignedDistance;
 use crate::field::sparse::{BrickCrossings, Crossings};
-use crate::geom::{BlockKey, block_cells};
+use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
 use crate::store::Bricks;
 use crate::surface::cubes::parallel_map;
 use rustc_hash::FxHashMap;
@@ -18,6 +18,8 @@ pub(crate) struct SurfaceElements<const D: usize> {
     min_weight: f32,
     elements: FxHashMap<BlockKey<D>, Arc<BrickElements<D>>>,
     crossings: FxHashMap<BlockKey<D>, Arc<BrickCrossings<D>>>,
+    /// Cells along the longest axis of the box of all bricks with elements.
+    extent: f64,
 }
 
 /// Bricks of one task.
@@ -26,7 +28,7 @@ const TOGETHER: usize = 16;
 impl<const D: usize> SurfaceElements<D> {
     /// Of no brick yet; a node of smaller weight than `min_weight`, or of none, counts as never observed.
     pub(crate) fn new(min_weight: f32) -> Self {
-        Self { min_weight, elements: FxHashMap::default(), crossings: FxHashMap::default() }
+        Self { min_weight, elements: FxHashMap::default(), crossings: FxHashMap::default(), extent: 0.0 }
     }
 
     /// The surface of a whole map. O(cells).
@@ -66,6 +68,9 @@ impl<const D: usize> SurfaceElements<D> {
                 put(&mut self.crossings, key, made);
             }
         }
+        if !touched.is_empty() {
+            self.extent = extent(self.elements.keys());
+        }
         touched.sort_unstable();
         touched.dedup();
         touched
@@ -81,6 +86,13 @@ impl<const D: usize> SurfaceElements<D> {
     #[inline]
     pub(crate) fn cell(&self, cell: [i32; D]) -> &[[[f32; D]; D]] {
         self.brick_elements(BlockKey::of_cell(cell)).map_or(&[], |b| b.cell(BlockKey::offset(cell)))
+    }
+
+    /// How far, in cells, an element may be from where the extracted mesh has it: a mesh keeps vertices as `f32` from a
+    /// corner of its box, and a contour from zero in `f64`.
+    #[inline]
+    pub(crate) fn vertex_margin(&self) -> f64 {
+        (D as f64).sqrt() * f64::from(f32::EPSILON) * (8.0 + 0.5 * self.extent)
     }
 
     /// The keys of the bricks with elements, ascending.
@@ -110,6 +122,18 @@ impl<const D: usize> Crossings<D> for SurfaceElements<D> {
     fn brick(&self, key: BlockKey<D>) -> Option<&BrickCrossings<D>> {
         self.crossings.get(&key).map(|c| &**c)
     }
+}
+
+/// Cells along the longest axis of a box of bricks.
+fn extent<'k, const D: usize>(keys: impl Iterator<Item = &'k BlockKey<D>>) -> f64 {
+    let (mut low, mut high) = ([i32::MAX; D], [i32::MIN; D]);
+    for key in keys {
+        for k in 0..D {
+            (low[k], high[k]) = (low[k].min(key.0[k]), high[k].max(key.0[k]));
+        }
+    }
+    let bricks = (0..D).map(|k| i64::from(high[k]) - i64::from(low[k]) + 1).max();
+    (bricks.unwrap_or(0).max(0) * BLOCK_EDGE as i64) as f64
 }
 
 /// The bricks of `keys` and their neighbours in all octants in the direction of `sign`, ascending.

@@ -6,6 +6,7 @@
 
 mod accurate;
 mod anchors;
+mod clearance;
 mod crossings;
 mod dense;
 mod edges;
@@ -18,10 +19,12 @@ mod pass;
 mod planes;
 mod reach;
 mod roots;
+mod search;
 mod seeded;
 mod seeds;
 mod settings;
 mod sparse_esdf;
+mod surroundings;
 mod transform;
 mod unknown;
 

@@ -219,12 +219,12 @@ impl<const D: usize> SparseEsdf<D> {
 
     /// The stored value of a cell; `None` where there is no brick.
     #[inline]
-    fn value(&self, cell: [i32; D]) -> Option<f32> {
+    pub(super) fn value(&self, cell: [i32; D]) -> Option<f32> {
         Some(self.brick(BlockKey::of_cell(cell))?[BlockKey::offset(cell)])
     }
 
     /// Unknown beside a brick of the map, outside elsewhere.
-    fn nothing_at<T>(&self, cell: [i32; D]) -> Answer<T> {
+    pub(super) fn nothing_at<T>(&self, cell: [i32; D]) -> Answer<T> {
         let key = BlockKey::of_cell(cell);
         let near = (0..3usize.pow(D as u32)).any(|n| {
             let step = |k: usize| (n / 3usize.pow(k as u32) % 3) as i32 - 1;

@@ -1,0 +1,160 @@
+//! Frontier cells that touch, as one.
+
+use super::faces::{BrickFrontier, neighbour};
+use crate::geom::vector::unit;
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
+use rustc_hash::FxHashMap;
+use std::cmp::Reverse;
+
+/// A border of the known: free cells that touch each other, by a face, an edge or a corner, each with an unknown cell
+/// beside one of its faces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frontier<const D: usize> {
+    /// The free cells, brick by brick as keys ascend, in a brick x fastest.
+    pub cells: Vec<[i32; D]>,
+    /// Faces between these cells and unknown ones; times `resolution^(D - 1)` the length or area of the border.
+    pub faces: usize,
+    /// Mean of the cells' centres (world). May lie in a wall, or in what is unknown, where the border is bent.
+    pub centroid: [f64; D],
+    /// Centre of the cell that is nearest to the centroid (world), the first of equals: a place to go to.
+    pub middle: [f64; D],
+    /// Mean direction of the faces, from free space to the unknown, at length one; `None` where they cancel out.
+    pub normal: Option<[f64; D]>,
+    /// Box of the cells (world).
+    pub extent: Aabb<D>,
+}
+
+/// Everything kept per brick, by key.
+pub(super) type Pieces<const D: usize> = FxHashMap<BlockKey<D>, BrickFrontier>;
+
+/// Joins the groups of all bricks and measures them: largest first, of equal ones that with the lowest first cell.
+pub(super) fn join<const D: usize>(
+    pieces: &Pieces<D>,
+    lattice: &Lattice<D>,
+    min_cells: usize,
+) -> Vec<Frontier<D>> {
+    let mut keys: Vec<_> = pieces.keys().copied().collect();
+    keys.sort_unstable();
+    // Groups are numbered through, in the order of keys.
+    let mut first = FxHashMap::default();
+    let mut groups = 0u32;
+    for key in &keys {
+        first.insert(*key, groups);
+        groups += u32::from(pieces[key].groups);
+    }
+    let mut sets = Sets((0..groups).collect());
+    for key in &keys {
+        join_with_neighbours(pieces, &first, *key, &mut sets);
+    }
+    let mut sums: Vec<Sum<D>> = Vec::new();
+    let mut sum_of = FxHashMap::default();
+    for key in &keys {
+        for cell in &pieces[key].cells {
+            let root = sets.find(first[key] + u32::from(cell.group));
+            let at = *sum_of.entry(root).or_insert(sums.len());
+            if at == sums.len() {
+                sums.push(Sum::default());
+            }
+            sums[at].include(key.cell(usize::from(cell.offset)), cell.faces);
+        }
+    }
+    sums.retain(|sum| sum.cells.len() >= min_cells.max(1));
+    // Stable: they came in the order of their first cells.
+    sums.sort_by_key(|sum| Reverse(sum.cells.len()));
+    sums.into_iter().map(|sum| sum.measured(lattice)).collect()
+}
+
+/// Joins the groups of a brick with those that they touch in the bricks around it with greater keys; the others did it
+/// already.
+fn join_with_neighbours<const D: usize>(
+    pieces: &Pieces<D>,
+    first: &FxHashMap<BlockKey<D>, u32>,
+    key: BlockKey<D>,
+    sets: &mut Sets,
+) {
+    let around: [Option<(&BrickFrontier, u32)>; 27] = std::array::from_fn(|n| {
+        let at = BlockKey(if n < 3usize.pow(D as u32) { neighbour(key.0, n) } else { key.0 });
+        if at > key { pieces.get(&at).map(|piece| (piece, first[&at])) } else { None }
+    });
+    if around.iter().all(Option::is_none) {
+        return;
+    }
+    for cell in &pieces[&key].cells {
+        let at = BlockKey([0; D]).cell(usize::from(cell.offset));
+        for n in 0..3usize.pow(D as u32) {
+            let next = neighbour(at, n);
+            // Which of the bricks around: their numbers count like those of cells.
+            let brick =
+                (0..D).rev().fold(0, |b, k| 3 * b + (1 + next[k].div_euclid(BLOCK_EDGE as i32)) as usize);
+            if let Some((piece, first_there)) = around[brick]
+                && let Some(group) = piece.group_at(BlockKey::offset(next))
+            {
+                sets.join(first[&key] + u32::from(cell.group), first_there + u32::from(group));
+            }
+        }
+    }
+}
+
+/// Disjoint sets; a set's name is its lowest member.
+struct Sets(Vec<u32>);
+
+impl Sets {
+    fn find(&mut self, mut i: u32) -> u32 {
+        while self.0[i as usize] != i {
+            // Halves the way for the next one.
+            self.0[i as usize] = self.0[self.0[i as usize] as usize];
+            i = self.0[i as usize];
+        }
+        i
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+}
+
+/// What is added up of a frontier: whole numbers, so that no order matters.
+struct Sum<const D: usize> {
+    cells: Vec<[i32; D]>,
+    places: [i64; D],
+    /// Faces upwards less faces downwards.
+    normal: [i64; D],
+    faces: usize,
+}
+
+impl<const D: usize> Default for Sum<D> {
+    fn default() -> Self {
+        Self { cells: Vec::new(), places: [0; D], normal: [0; D], faces: 0 }
+    }
+}
+
+impl<const D: usize> Sum<D> {
+    fn include(&mut self, cell: [i32; D], faces: u8) {
+        self.cells.push(cell);
+        self.faces += faces.count_ones() as usize;
+        for k in 0..D {
+            self.places[k] += i64::from(cell[k]);
+            self.normal[k] += i64::from(faces >> (2 * k + 1) & 1) - i64::from(faces >> (2 * k) & 1);
+        }
+    }
+
+    fn measured(self, lattice: &Lattice<D>) -> Frontier<D> {
+        let n = self.cells.len() as f64;
+        let mean = self.places.map(|sum| sum as f64 / n);
+        let off = |cell: &[i32; D]| (0..D).map(|k| (f64::from(cell[k]) - mean[k]).powi(2)).sum::<f64>();
+        let nearest = self.cells.iter().copied().reduce(|a, b| if off(&b) < off(&a) { b } else { a });
+        let mut extent = Aabb::EMPTY;
+        for cell in &self.cells {
+            extent = extent.union(lattice.aabb(*cell, cell.map(|v| v + 1)));
+        }
+        Frontier {
+            faces: self.faces,
+            centroid: std::array::from_fn(|k| lattice.origin[k] + (mean[k] + 0.5) * lattice.resolution),
+            middle: lattice.center(nearest.unwrap_or([0; D])),
+            normal: unit(self.normal.map(|v| v as f64)),
+            extent,
+            cells: self.cells,
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! How much that is unknown a sensor would see from somewhere.
+
+use super::cells::{Known, Reader};
+use crate::cell::SignedDistance;
+use crate::geom::vector::unit;
+use crate::geom::{Aabb, BlockKey, Pose, RayWalk};
+use crate::in_order::in_order;
+use crate::store::{Bricks, Store};
+use crate::sweep::clip;
+use rustc_hash::FxHashMap;
+
+/// How far views reach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GainSettings<const D: usize> {
+    /// Cells of smaller weight count as never observed.
+    pub min_weight: f32,
+    /// The sensor sees no further (metres). Infinite is the longest a ray may be at all: 100 000 cells.
+    pub max_range: f64,
+    /// A ray is expected to see so far into the unknown (metres, summed along the ray), and no further; infinite: to its
+    /// largest range. What is unknown may be full.
+    pub penetration: f64,
+    /// Rays end where they leave this box (world): what lies outside of it is of no interest. `None`: all of space is.
+    pub bounds: Option<Aabb<D>>,
+}
+
+impl<const D: usize> Default for GainSettings<D> {
+    /// Half an observation; 5 m; to the largest range; everywhere.
+    fn default() -> Self {
+        Self { min_weight: 0.5, max_range: 5.0, penetration: f64::INFINITY, bounds: None }
+    }
+}
+
+/// What is expected to be new.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ViewGain {
+    /// Of the unknown cells that rays cross (square or cubic metres); each is counted once.
+    pub volume: f64,
+    /// Their number.
+    pub cells: usize,
+    /// Rays that end at something occupied.
+    pub hit: usize,
+    /// Rays that end in the unknown: as far in as they see, or at the largest range.
+    pub unknown: usize,
+    /// Rays that leave the bounds, or what a lattice can number.
+    pub outside: usize,
+    /// Rays that end in free space, at the largest range.
+    pub free: usize,
+    /// Directions that are none (zero, NaN).
+    pub refused: usize,
+}
+
+/// Cells that a ray crosses, at most, along each axis: its largest range in cells.
+const FARTHEST: f64 = 1e5;
+
+/// Casts rays (the sensor's frame; of any length) from a pose and counts the unknown cells that they would see *(as
+/// Bircher et al. 2016, who count the volume in a frustum)*.
+///
+/// A ray runs through free space until it meets an occupied cell. Where it enters unknown cells it counts them, and goes on
+/// for [`GainSettings::penetration`] in all. O(cells crossed).
+///
+/// ```
+/// use portolan::cell::DistanceBrick;
+/// use portolan::explore::{GainSettings, expected_gain, fan};
+/// use portolan::geom::{BlockKey, Lattice, Pose};
+/// use portolan::store::Bricks;
+///
+/// // 8 x 8 free cells of 10 cm, nothing else is known.
+/// let mut store = Bricks::new(Lattice::new([0.0, 0.0], 0.1));
+/// store.insert(BlockKey([0, 0]), DistanceBrick::from_parts(&[0.3; 64], &[1.0; 64]).expect("sane"))?;
+/// // A single ray to the right sees 2 cells if it sees 15 cm of what is beyond.
+/// let world_from_sensor = Pose::<2>::new(0.45, 0.45, 0.0);
+/// let settings = GainSettings { penetration: 0.15, ..Default::default() };
+/// let gain = expected_gain(&store, &world_from_sensor, &fan(0.0, 0.0, 1), &settings);
+/// assert_eq!((gain.cells, gain.unknown), (2, 1));
+/// assert!((gain.volume - 0.02).abs() < 1e-12);
+/// # Ok::<(), portolan::store::BricksFull>(())
+/// ```
+pub fn expected_gain<const D: usize>(
+    store: &Bricks<SignedDistance, D>,
+    world_from_sensor: &Pose<D>,
+    directions_sensor: &[[f64; D]],
+    settings: &GainSettings<D>,
+) -> ViewGain {
+    let mut view = View {
+        origin: world_from_sensor.translation,
+        reader: Reader::new(store, settings.min_weight),
+        store,
+        settings,
+        seen: Seen::new(),
+    };
+    let mut gain = ViewGain::default();
+    for direction in directions_sensor {
+        let count = match unit(world_from_sensor.rotate(*direction)).map(|d| view.cast(d)) {
+            None => &mut gain.refused,
+            Some(End::Hit) => &mut gain.hit,
+            Some(End::Unknown) => &mut gain.unknown,
+            Some(End::Outside) => &mut gain.outside,
+            Some(End::Free) => &mut gain.free,
+        };
+        *count += 1;
+    }
+    gain.cells = view.seen.count;
+    gain.volume = gain.cells as f64 * store.lattice().resolution.powi(D as i32);
+    gain
+}
+
+/// [`expected_gain`] from many poses (world from sensor), each by itself, in their order. On all cores with the feature
+/// `parallel`: the same answers.
+pub fn expected_gains<const D: usize>(
+    store: &Bricks<SignedDistance, D>,
+    poses: &[Pose<D>],
+    directions_sensor: &[[f64; D]],
+    settings: &GainSettings<D>,
+) -> Vec<ViewGain> {
+    in_order(poses, 1, |pose| expected_gain(store, pose, directions_sensor, settings))
+}
+
+enum End {
+    Hit,
+    Unknown,
+    Outside,
+    Free,
+}
+
+/// All rays of one pose.
+struct View<'a, const D: usize> {
+    origin: [f64; D],
+    reader: Reader<'a, D>,
+    store: &'a Bricks<SignedDistance, D>,
+    settings: &'a GainSettings<D>,
+    seen: Seen<D>,
+}
+
+impl<const D: usize> View<'_, D> {
+    fn cast(&mut self, direction: [f64; D]) -> End {
+        let lattice = self.store.lattice();
+        // NaN is no range: `min` takes the other.
+        let range = self.settings.max_range.min(FARTHEST * lattice.resolution);
+        let part = match &self.settings.bounds {
+            Some(bounds) => clip(bounds, self.origin, direction, f64::INFINITY),
+            None => Some((0.0, f64::INFINITY)),
+        };
+        let (Some((enter, leave)), Some(mut walk)) = (part, RayWalk::new(lattice, self.origin, direction))
+        else {
+            return End::Outside;
+        };
+        let end = range.min(leave);
+        let (mut at, mut passed) = (0.0, 0.0);
+        loop {
+            let exit = walk.exit().min(end);
+            let inside = exit - f64::max(at, enter);
+            // A cell that a ray only touches, at a corner or behind the bounds by rounding, is not seen.
+            let crossed = exit - at > 1e-9 * lattice.resolution;
+            let found = if crossed { self.reader.at(walk.cell()) } else { Known::Free };
+            if found == Known::Occupied {
+                return End::Hit;
+            }
+            if found == Known::Unknown && inside > 1e-9 * lattice.resolution {
+                if passed >= self.settings.penetration {
+                    return End::Unknown;
+                }
+                self.seen.insert(walk.cell());
+                passed += inside;
+            }
+            // False only for what is not a number.
+            if !(exit < end) {
+                return match found {
+                    _ if leave < range => End::Outside,
+                    Known::Unknown => End::Unknown,
+                    _ => End::Free,
+                };
+            }
+            at = exit;
+            walk.advance();
+        }
+    }
+}
+
+/// A set of cells: a bit each, brick by brick.
+struct Seen<const D: usize> {
+    slots: FxHashMap<BlockKey<D>, usize>,
+    bits: Vec<[u64; 8]>,
+    /// The brick asked for last.
+    last: Option<(BlockKey<D>, usize)>,
+    count: usize,
+}
+
+impl<const D: usize> Seen<D> {
+    fn new() -> Self {
+        Self { slots: FxHashMap::default(), bits: Vec::new(), last: None, count: 0 }
+    }
+
+    #[inline]
+    fn insert(&mut self, cell: [i32; D]) {
+        let key = BlockKey::of_cell(cell);
+        let slot = match self.last {
+            Some((last, slot)) if last == key => slot,
+            _ => {
+                let slot = *self.slots.entry(key).or_insert(self.bits.len());
+                if slot == self.bits.len() {
+                    self.bits.push([0; 8]);
+                }
+                self.last = Some((key, slot));
+                slot
+            }
+        };
+        let i = BlockKey::offset(cell);
+        let (word, bit) = (&mut self.bits[slot][i >> 6], 1u64 << (i & 63));
+        self.count += usize::from(*word & bit == 0);
+        *word |= bit;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explore::testing::{Edit, edits, put};
+    use crate::explore::{fan, spherical};
+    use crate::geom::Lattice;
+    use crate::geom::vector::along;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn store<const D: usize>(edits: &[Edit]) -> Bricks<SignedDistance, D> {
+        let mut store = Bricks::new(Lattice::new([100.0; D], 0.1));
+        edits.iter().for_each(|edit| put(&mut store, edit));
+        store
+    }
+
+    /// What the rays see, in steps of a hundredth of a cell.
+    fn by_small_steps<const D: usize>(
+        store: &Bricks<SignedDistance, D>,
+        pose: &Pose<D>,
+        directions: &[[f64; D]],
+        settings: &GainSettings<D>,
+    ) -> (BTreeSet<[i32; D]>, [usize; 4]) {
+        let step = 0.01 * store.lattice().resolution;
+        let (mut seen, mut ends) = (BTreeSet::new(), [0; 4]);
+        for d in directions {
+            let d = unit(pose.rotate(*d)).unwrap();
+            let (mut passed, mut in_unknown) = (0.0, false);
+            let mut end = None;
+            let mut s = 0.0;
+            while s <= settings.max_range && end.is_none() {
+                let p = along(pose.translation, d, s);
+                let cell = store.lattice().cell_of(p).unwrap();
+                let inside = settings.bounds.is_none_or(|b| b.contains(p));
+                match store.cell(cell).filter(|c| c.weight >= settings.min_weight) {
+                    Some(c) if c.distance <= 0.0 => end = Some(0),
+                    _ if !inside => end = Some(2),
+                    Some(_) => in_unknown = false,
+                    None => {
+                        in_unknown = true;
+                        if passed >= settings.penetration && !seen.contains(&cell) {
+                            end = Some(1);
+                        } else {
+                            seen.insert(cell);
+                            passed += step;
+                        }
+                    }
+                }
+                s += step;
+            }
+            ends[end.unwrap_or(if in_unknown { 1 } else { 3 })] += 1;
+        }
+        (seen, ends)
+    }
+
+    fn sees_what_small_steps_see<const D: usize>(
+        store: &Bricks<SignedDistance, D>,
+        pose: &Pose<D>,
+        directions: &[[f64; D]],
+        settings: &GainSettings<D>,
+    ) {
+        let gain = expected_gain(store, pose, directions, settings);
+        let (seen, ends) = by_small_steps(store, pose, directions, settings);
+        // Steps miss the corners of cells that a ray cuts by less than a hundredth of a cell: about one in fifty.
+        let few = |n: usize| 3 + n / 20;
+        assert!(gain.cells.abs_diff(seen.len()) <= few(seen.len()), "{gain:?} {}", seen.len());
+        let got = [gain.hit, gain.unknown, gain.outside, gain.free];
+        for (a, b) in got.iter().zip(&ends) {
+            assert!(a.abs_diff(*b) <= few(directions.len()), "{got:?} {ends:?}");
+        }
+        assert_eq!(got.iter().sum::<usize>() + gain.refused, directions.len());
+        assert!((gain.volume - gain.cells as f64 * 0.1f64.powi(D as i32)).abs() < 1e-12);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 48, ..Default::default() })]
+        #[test]
+        fn sees_what_small_steps_see_2d(edits in edits(), x in 99.0..101.5f64, y in 99.0..101.5f64, bounded in any::<bool>()) {
+            let bounds = bounded.then(|| Aabb::new([98.0; 2], [102.0; 2]));
+            let settings = GainSettings { max_range: 1.7, bounds, ..Default::default() };
+            sees_what_small_steps_see(&store(&edits), &Pose::<2>::new(x, y, 0.3), &fan(-3.0, 3.0, 61), &settings);
+        }
+        #[test]
+        fn sees_what_small_steps_see_3d(edits in edits(), p in prop::array::uniform3(99.0..101.5f64)) {
+            let pose = Pose { translation: p, ..Pose::IDENTITY };
+            let rays = spherical([-3.0, 3.0], 9, [-1.2, 1.3], 5);
+            let settings = GainSettings { max_range: 1.7, ..Default::default() };
+            sees_what_small_steps_see::<3>(&store(&edits), &pose, &rays, &settings);
+        }
+    }
+
+    /// A free strip of 16 x 8 cells, a wall in its last column.
+    fn strip() -> Bricks<SignedDistance, 2> {
+        let mut store = Bricks::new(Lattice::new([0.0; 2], 0.1));
+        for x in 0..2 {
+            let d: Vec<f32> = (0..64).map(|i| if x == 1 && i % 8 == 7 { -0.1 } else { 0.3 }).collect();
+            let brick = crate::cell::DistanceBrick::from_parts(&d, &[1.0; 64]).unwrap();
+            store.insert(BlockKey([x, 0]), brick).unwrap();
+        }
+        store
+    }
+
+    #[test]
+    fn rays_are_counted_by_how_they_end() {
+        let store = strip();
+        let at = Pose::<2>::new(0.85, 0.45, 0.0);
+        let directions = [[1.0, 0.0], [-3.0, 0.0], [0.0, 1.0], [0.0, -1.0], [0.0, 0.0], [f64::NAN, 1.0]];
+        let settings = GainSettings { max_range: 0.6, ..Default::default() };
+        let gain = expected_gain(&store, &at, &directions, &settings);
+        // To the wall; not to the end of the strip; 0.25 m and 0.15 m of the unknown above and below.
+        assert_eq!((gain.hit, gain.free, gain.unknown, gain.outside, gain.refused), (0, 2, 2, 0, 2));
+        assert_eq!(gain.cells, 3 + 2);
+        let far = GainSettings { max_range: 5.0, penetration: 0.25, ..Default::default() };
+        let gain = expected_gain(&store, &at, &directions, &far);
+        assert_eq!((gain.hit, gain.free, gain.unknown, gain.cells), (1, 0, 3, 9));
+        let none = expected_gain(&store, &at, &directions, &GainSettings { penetration: 0.0, ..far });
+        assert_eq!((none.cells, none.unknown), (0, 3));
+        let bounds = Some(Aabb::new([0.0; 2], [1.6, 1.0]));
+        let gain = expected_gain(&store, &at, &directions, &GainSettings { bounds, ..far });
+        assert_eq!((gain.hit, gain.outside, gain.cells), (1, 3, 2));
+        // From outside of the bounds, what lies before them does not count, but hides.
+        let away = Pose::<2>::new(0.85, 3.05, 0.0);
+        let gain =
+            expected_gain(&store, &away, &[[0.0, -1.0]], &GainSettings { bounds, penetration: 9.0, ..far });
+        assert_eq!((gain.outside, gain.cells), (1, 2));
+    }
+
+    #[test]
+    fn absurd_ranges_end() {
+        let store = strip();
+        let settings = GainSettings { max_range: f64::INFINITY, ..Default::default() };
+        let diagonal = [[1.0, 1.0], [-1.0, 0.3]];
+        let gain = expected_gain(&store, &Pose::<2>::new(0.5, 0.5, 0.0), &diagonal, &settings);
+        assert_eq!(gain.unknown, 2);
+        assert!(gain.cells < 400_000);
+        let nan = GainSettings { max_range: f64::NAN, penetration: f64::NAN, ..Default::default() };
+        assert_eq!(expected_gain(&store, &Pose::<2>::new(0.5, 0.5, 0.0), &diagonal, &nan).unknown, 2);
+        let lost = Pose::<2>::new(f64::NAN, 1e300, 0.0);
+        assert_eq!(expected_gain(&store, &lost, &diagonal, &settings).outside, 2);
+    }
+
+    #[test]
+    #[cfg(feature = "parallel")]
+    fn many_views_are_the_same_on_any_number_of_threads() {
+        let store = strip();
+        let poses: Vec<_> = (0..40).map(|i| Pose::<2>::new(0.04 * f64::from(i), 0.4, 0.1)).collect();
+        let of = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| expected_gains(&store, &poses, &fan(-3.0, 3.0, 90), &GainSettings::default()))
+        };
+        assert_eq!(of(1), of(3));
+    }
+}

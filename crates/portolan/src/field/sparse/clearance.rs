@@ -1,0 +1,137 @@
+//! Certified clearance: an interval that holds the distance to the extracted surface, at any point.
+
+use super::search::FURTHEST;
+use super::sparse_esdf::SparseEsdf;
+use super::surroundings::{Nearby, Spot};
+use crate::answer::Answer;
+use crate::field::{Clearance, ClearanceField, UnknownSpace};
+
+/// Bounds that are further apart (cells) are tightened by looking at the elements between them.
+const APART: f64 = 1.0 / 64.0;
+
+/// An interval in cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interval {
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+}
+
+impl Interval {
+    fn nearer(self, other: Self) -> Self {
+        Self { lower: self.lower.min(other.lower), upper: self.upper.min(other.upper) }
+    }
+}
+
+/// Of fields made by [`super::EsdfMethod::Accurate`]; others certify nothing and answer that they do not know.
+///
+/// The distance meant is that to the segments or triangles that [`crate::surface::marching_squares`] and
+/// [`crate::surface::marching_cubes`] extract with the same `min_weight`, as they are: not to the true surface, from
+/// which noise, truncation and the lattice keep them away. Rounding is paid for: that of the field, of world coordinates,
+/// and of the vertices of a [`crate::surface::Mesh`].
+///
+/// Lower bounds come from the transform: a node's least `|q - w|^2 + h_w` over all crossings is at most its squared
+/// distance plus `D / 4`, whatever the surface does between crossings. Between nodes squared distance less `|x|^2` is
+/// concave for any closed set, so that multilinear interpolation of lower bounds less `sum t (1 - t)` is one; and no
+/// distance changes faster than the point moves. Upper bounds are distances to elements around what the nodes found.
+/// Where the lower bound is less than a cell, the elements around the point are looked at: both bounds are then exact up
+/// to a distance of one cell. Further away, up to 24 cells, bounds that are more than 1/64 of a cell apart make it look at
+/// all elements that lie between them: O(bricks within the distance); O(1) otherwise.
+///
+/// Pessimistic answers need the distances to unknown cells ([`super::SparseEsdfSettings::unknown`]); without them
+/// unknown cells are looked for around the point only, and `lower` is never more than a cell.
+impl<const D: usize> ClearanceField<D> for SparseEsdf<D> {
+    fn clearance(&self, p_world: [f64; D], unknown: UnknownSpace) -> Answer<Clearance> {
+        let Some(spot) = Spot::of(self, p_world) else { return Answer::Outside };
+        if unknown == UnknownSpace::Pessimistic && !self.observes(spot.holder) {
+            return self.unobserved_at(spot.holder);
+        }
+        let mut nearby = Nearby::of(self, &spot);
+        let Some((mut interval, signed)) = self.to_surface(&spot, &mut nearby) else {
+            return self.unobserved_at(spot.holder);
+        };
+        if unknown == UnknownSpace::Pessimistic {
+            interval = interval.nearer(self.to_unknown(&spot, &nearby));
+        }
+        self.answer(&spot, interval, signed < 0.0)
+    }
+
+    fn distance_and_gradient(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])> {
+        SparseEsdf::distance_and_gradient(self, p_world)
+    }
+
+    fn resolution(&self) -> f64 {
+        self.lattice.resolution
+    }
+}
+
+impl<const D: usize> SparseEsdf<D> {
+    /// How far the nearest cell is that was not observed, at least and at most (metres); cells of bricks that were never
+    /// made are among them. 0 in such a cell; saturated beyond the largest distance, and beyond a cell where
+    /// [`super::SparseEsdfSettings::unknown`] did not ask for these distances. `inside` is false. O(1).
+    pub fn unknown_distance(&self, p_world: impl Into<[f64; D]>) -> Answer<Clearance> {
+        let Some(spot) = Spot::of(self, p_world.into()) else { return Answer::Outside };
+        if !self.observes(spot.holder) {
+            return match self.unobserved_at::<Clearance>(spot.holder) {
+                Answer::Outside => Answer::Outside,
+                _ => Answer::Known(Clearance { lower: 0.0, upper: 0.0, inside: false }),
+            };
+        }
+        let nearby = Nearby::of(self, &spot);
+        self.answer(&spot, self.to_unknown(&spot, &nearby), false)
+    }
+
+    /// In metres, and less and more by what rounding may have done.
+    fn answer(&self, spot: &Spot<D>, interval: Interval, inside: bool) -> Answer<Clearance> {
+        let resolution = self.lattice.resolution;
+        let lower = (interval.lower - spot.margin).max(0.0) * resolution;
+        let upper = (interval.upper + spot.margin) * resolution;
+        let clearance = Clearance { lower, upper, inside };
+        if upper < f64::INFINITY { Answer::Known(clearance) } else { Answer::Saturated(clearance) }
+    }
+
+    /// Distance to the extracted surface in cells, and a value whose sign is that of the side; `None` where nothing is
+    /// maintained.
+    fn to_surface(&self, spot: &Spot<D>, nearby: &mut Nearby<'_, D>) -> Option<(Interval, f64)> {
+        let lower_sq = |i: usize| nearby.surface_sq(self, i);
+        let mut interval = Interval { lower: spot.lower_bound(lower_sq)?, upper: f64::INFINITY };
+        if interval.lower < 1.0 {
+            let found = self.to_elements_around(spot);
+            if found <= 1.0 {
+                interval = Interval { lower: found, upper: found };
+            } else {
+                interval = Interval { lower: 1.0, upper: found };
+            }
+        }
+        if interval.upper > interval.lower {
+            interval.upper = interval.upper.min(self.to_elements_found(spot, nearby));
+            let apart = interval.upper - interval.lower;
+            if apart > APART && interval.upper <= FURTHEST {
+                interval.upper = self.search_elements(spot, interval.upper);
+                interval.lower = interval.upper;
+            }
+            // Both are true of one distance, but for rounding.
+            interval.upper = interval.upper.max(interval.lower);
+        }
+        Some((interval, nearby.signed(spot, f64::from(self.max_distance))))
+    }
+
+    /// Distance to the unknown in cells.
+    fn to_unknown(&self, spot: &Spot<D>, nearby: &Nearby<'_, D>) -> Interval {
+        let mut interval = Interval { lower: 0.0, upper: f64::INFINITY };
+        if let Some(lower) = spot.lower_bound(|i| nearby.unknown_sq(self, i)) {
+            interval.lower = lower;
+            for i in 0..1 << D {
+                let at_node = nearby.unknown_at(i).map_or(f64::INFINITY, |sq| f64::from(sq).sqrt());
+                interval.upper = interval.upper.min(at_node * (1.0 + 1e-6) + spot.from_node(i));
+            }
+        }
+        if interval.lower < 1.0 {
+            let found = self.to_unknown_cells_around(spot);
+            if found <= 1.0 {
+                return Interval { lower: found, upper: found };
+            }
+            interval = Interval { lower: 1.0, upper: interval.upper.min(found) };
+        }
+        interval
+    }
+}

@@ -1,0 +1,420 @@
+//! Is a path free, all of it?
+
+use super::Curve;
+use super::demand::{Cause, Demand, Verdict};
+use crate::field::{Clearance, ClearanceField};
+
+/// What a check of a path found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PathCheck {
+    /// Every point of the path keeps what was demanded.
+    Certified(PathClearance),
+    /// Not all of it does, as far as the field knows.
+    Violated(PathViolation),
+}
+
+impl PathCheck {
+    /// Whether the whole path is certified.
+    pub fn is_certified(&self) -> bool {
+        matches!(self, Self::Certified(_))
+    }
+}
+
+/// The least clearance along a path, at least and at most (metres).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathClearance {
+    /// No point of the path has less; at least what was demanded. Shorter steps, which a larger demand makes, narrow it.
+    pub lower: f64,
+    /// Some point of the path has no more; infinite where nothing is near.
+    pub upper: f64,
+    /// The parameter of that point: for [`Waypoints`](super::Waypoints) its arc length (metres).
+    pub at: f64,
+}
+
+/// The first part of a path that is not certified, in parameters of the curve: for [`Waypoints`](super::Waypoints) arc
+/// lengths (metres).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathViolation {
+    /// The path is certified up to here; 0: not even its start.
+    pub from: f64,
+    /// The first place beyond that was looked at and is certified again; the end of the path where there is none.
+    pub to: f64,
+    /// The first cause on the way from `from` to `to` that decides: undecided only where all of it is.
+    pub cause: Cause,
+}
+
+/// Checks every point of a path by conservative advancement *(Mirtich 1996, section 2.3)*: where a distance of `c` is
+/// certified and `m` demanded, the next `c - m` metres are free. Each step is as long as that, so the cost is one question
+/// to the field per step: few in the open, `1 / tolerance` a metre at most.
+///
+/// Never certifies a path that comes nearer than demanded to the surface (or to unknown space where that is an obstacle),
+/// anywhere between the places looked at.
+///
+/// ```
+/// use portolan::plan::{Cause, Demand, PathCheck, Waypoints, check_path};
+/// # use portolan::{Answer, field::{Clearance, ClearanceField, UnknownSpace}};
+/// # struct Wall;
+/// # impl<const D: usize> ClearanceField<D> for Wall {
+/// #     fn clearance(&self, p: [f64; D], _: UnknownSpace) -> Answer<Clearance> {
+/// #         let d = 4.0 - p[0];
+/// #         Answer::Known(Clearance { lower: d.abs(), upper: d.abs(), inside: d < 0.0 })
+/// #     }
+/// #     fn distance_and_gradient(&self, p: [f64; D]) -> Answer<(f64, [f64; D])> {
+/// #         Answer::Known((4.0 - p[0], std::array::from_fn(|k| if k == 0 { -1.0 } else { 0.0 })))
+/// #     }
+/// #     fn resolution(&self) -> f64 { 0.05 }
+/// # }
+/// # let field = &Wall;
+/// // A field that knows of a wall at x = 4 m; a robot of 30 cm.
+/// let path = Waypoints::new(vec![[0.0, 0.0], [3.5, 0.0], [3.5, 2.0]])?;
+/// let PathCheck::Certified(least) = check_path(field, &path, &Demand::new(0.3)) else { panic!("free") };
+/// assert!(least.lower <= 0.5 && least.upper >= 0.5);
+///
+/// // The same in space, through the wall.
+/// let path = Waypoints::new(vec![[0.0, 0.0, 1.0], [5.0, 0.0, 1.0]])?;
+/// let PathCheck::Violated(first) = check_path(field, &path, &Demand::new(0.3)) else { panic!("a wall") };
+/// assert!(first.from > 3.69 && first.from <= 3.7 && first.cause == Cause::TooNear);
+/// # Ok::<(), portolan::plan::PlanError>(())
+/// ```
+pub fn check_path<const D: usize>(
+    field: &(impl ClearanceField<D> + ?Sized),
+    path: &(impl Curve<D> + ?Sized),
+    demand: &Demand,
+) -> PathCheck {
+    let mut walk = Walk { field, path, demand, end: path.end(), queries: demand.max_queries };
+    match walk.free() {
+        Ok(least) => PathCheck::Certified(least),
+        Err(stop) => PathCheck::Violated(walk.violation(stop)),
+    }
+}
+
+/// A check on its way.
+pub(super) struct Walk<'a, F: ?Sized, C: ?Sized> {
+    pub(super) field: &'a F,
+    pub(super) path: &'a C,
+    pub(super) demand: &'a Demand,
+    /// No further than this parameter.
+    pub(super) end: f64,
+    /// Questions that are left.
+    pub(super) queries: usize,
+}
+
+/// Where certified space ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stop {
+    pub(super) at: f64,
+    pub(super) cause: Cause,
+    reach: f64,
+}
+
+impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
+    /// Goes on in certified steps.
+    pub(super) fn free<const D: usize>(&mut self) -> Result<PathClearance, Stop>
+    where
+        F: ClearanceField<D>,
+        C: Curve<D>,
+    {
+        let tolerance = self.demand.tolerance_in(self.field);
+        let mut least = PathClearance { lower: f64::INFINITY, upper: f64::INFINITY, at: 0.0 };
+        let mut t = 0.0;
+        // Clearance where the step began, and its length.
+        let mut step: Option<(f64, f64)> = None;
+        loop {
+            let (found, room) = match self.look(t) {
+                Verdict::Free(found) => (found, self.room(t, found)),
+                Verdict::Refused { cause, reach } => return Err(Stop { at: t, cause, reach }),
+            };
+            if let Some((lower, length)) = step.filter(|s| s.1.is_finite()) {
+                // Clearance falls and rises no faster than one goes: the lowest point of both slopes.
+                least.lower = least.lower.min(0.5 * (lower + found.lower - length));
+            }
+            least.lower = least.lower.min(found.lower);
+            if found.upper < least.upper {
+                (least.upper, least.at) = (found.upper, t);
+            }
+            if t >= self.end {
+                return Ok(least);
+            }
+            let undecided = Stop { at: t, cause: Cause::Undecided, reach: 0.0 };
+            if room < tolerance {
+                return Err(undecided);
+            }
+            step = Some((found.lower, room));
+            t = self.ahead(t, room).ok_or(undecided)?;
+        }
+    }
+
+    /// Where what is not certified ends, and why it is not.
+    pub(super) fn violation<const D: usize>(&mut self, stop: Stop) -> PathViolation
+    where
+        F: ClearanceField<D>,
+        C: Curve<D>,
+    {
+        let tolerance = self.demand.tolerance_in(self.field);
+        let mut found = PathViolation { from: stop.at, to: self.end, cause: stop.cause };
+        let Stop { at: mut t, mut cause, mut reach } = stop;
+        while t < self.end && self.queries > 0 {
+            // In unknown space there is nothing to be found by looking closely.
+            let least = match cause {
+                Cause::Unknown | Cause::Outside => tolerance.max(0.25 * self.field.resolution()),
+                Cause::TooNear | Cause::Undecided => tolerance,
+            };
+            let Some(next) = self.ahead(t, reach.max(least)) else { break };
+            t = next;
+            match self.look(t) {
+                Verdict::Free(clearance) if self.room(t, clearance) >= tolerance => {
+                    found.to = t;
+                    break;
+                }
+                Verdict::Free(_) => (cause, reach) = (Cause::Undecided, 0.0),
+                Verdict::Refused { cause: c, reach: r } => (cause, reach) = (c, r),
+            }
+            if found.cause == Cause::Undecided {
+                found.cause = cause;
+            }
+        }
+        found
+    }
+
+    fn look<const D: usize>(&mut self, t: f64) -> Verdict
+    where
+        F: ClearanceField<D>,
+        C: Curve<D>,
+    {
+        match self.queries.checked_sub(1) {
+            Some(left) => {
+                self.queries = left;
+                self.demand.at(self.field, self.path.point(t))
+            }
+            None => Verdict::Refused { cause: Cause::Undecided, reach: 0.0 },
+        }
+    }
+
+    /// How far one may go from a free place, less what rounding may have added to points and parameters.
+    fn room<const D: usize>(&self, t: f64, found: Clearance) -> f64
+    where
+        C: Curve<D>,
+    {
+        let scale = self.path.point(t).iter().fold(t.abs(), |m, v| m.max(v.abs()));
+        (found.lower - self.demand.clearance) * (1.0 - 1e-9) - 16.0 * f64::EPSILON * scale
+    }
+
+    /// `None` where the parameter does not move.
+    fn ahead<const D: usize>(&self, t: f64, length: f64) -> Option<f64>
+    where
+        C: Curve<D>,
+    {
+        let next = self.path.advance(t, length).min(self.end);
+        (next > t).then_some(next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::UnknownSpace;
+    use crate::plan::testing::{Scene, point, scenes};
+    use crate::plan::{SpeedLimited, Spline, Waypoints};
+    use proptest::prelude::*;
+
+    /// Compares a check with many places of the path, whose clearance is known.
+    pub(crate) fn is_true<const D: usize>(scene: &Scene<D>, path: &impl Curve<D>, demand: &Demand) -> bool {
+        const SAMPLES: u32 = 4000;
+        let truth = |t: f64| scene.truth(path.point(t), demand.unknown);
+        let free_from = |from: f64, to: f64, least: f64| {
+            for i in 0..=SAMPLES {
+                let t = from + (to - from) * f64::from(i) / f64::from(SAMPLES);
+                let d = truth(t);
+                assert!(d.is_some_and(|d| d >= least), "{d:?} at {t} of {to}, demanded {demand:?}");
+            }
+        };
+        match check_path(scene, path, demand) {
+            PathCheck::Certified(least) => {
+                assert!(least.lower >= demand.clearance);
+                // Rounding of coordinates of up to five metres.
+                free_from(0.0, path.end(), least.lower - 1e-14);
+                assert!(truth(least.at).is_some_and(|d| d <= least.upper));
+                true
+            }
+            PathCheck::Violated(found) => {
+                assert!(found.from <= found.to && (0.0..=path.end()).contains(&found.to));
+                if found.from > 0.0 {
+                    free_from(0.0, found.from, demand.clearance - 1e-14);
+                }
+                let outside = !scene.bounds.grown(-1e-9).contains(path.point(found.from));
+                let ahead = path.advance(found.from, 1e-9);
+                let room = [found.from, ahead].map(|t| truth(t).map_or(0.0, |d| d - demand.clearance));
+                // It stops only where bounds that are off by the slack might be short of the demand by the tolerance.
+                let most = 2.0 * scene.slack + demand.tolerance + 1e-6;
+                assert!(
+                    outside || room[0] <= most || scene.most <= demand.clearance + most,
+                    "{room:?} {found:?}"
+                );
+                // The cause is that of some place of the part.
+                let some = |of: &dyn Fn(f64, Option<f64>) -> bool| {
+                    (0..=SAMPLES).any(|i| {
+                        let t = found.from + (found.to - found.from) * f64::from(i) / f64::from(SAMPLES);
+                        of(t, truth(t))
+                    })
+                };
+                let surface = |t: f64| scene.signed(path.point(t));
+                // Samples miss the very place by half their distance.
+                let apart = 10.0 / f64::from(SAMPLES) + 2.0 * demand.tolerance;
+                match found.cause {
+                    Cause::TooNear => assert!(some(&|t, _| surface(t) < demand.clearance + apart)),
+                    Cause::Unknown => {
+                        assert!(some(&|_, d| d.is_none_or(|d| d < demand.clearance + apart)));
+                    }
+                    Cause::Outside => {
+                        let beyond = |t, _| !scene.bounds.grown(-apart).contains(path.point(t));
+                        assert!(some(&beyond));
+                    }
+                    Cause::Undecided => {}
+                }
+                false
+            }
+        }
+    }
+
+    fn demand(clearance: f64, optimistic: bool) -> Demand {
+        let demand = Demand::new(clearance);
+        if optimistic { demand.optimistic() } else { demand }
+    }
+
+    fn legs_and_splines<const D: usize>(scene: &Scene<D>, points: &[[f64; 3]], demand: &Demand) {
+        let points: Vec<[f64; D]> = points.iter().map(|p| point(*p)).collect();
+        is_true(scene, &Waypoints::new(points.clone()).unwrap(), demand);
+        if points.len() > 1 {
+            is_true(scene, &Spline::catmull_rom(&points).unwrap(), demand);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_certified_is_free_2d(
+            scene in scenes::<2>(), p in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 1..5),
+            clearance in prop_oneof![Just(0.0), 0.0..0.6f64], optimistic in any::<bool>(),
+        ) {
+            legs_and_splines(&scene, &p, &demand(clearance, optimistic));
+        }
+        #[test]
+        fn what_is_certified_is_free_3d(
+            scene in scenes::<3>(), p in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 1..5),
+            clearance in prop_oneof![Just(0.0), 0.0..0.6f64], optimistic in any::<bool>(),
+        ) {
+            legs_and_splines(&scene, &p, &demand(clearance, optimistic));
+        }
+    }
+
+    #[test]
+    fn passes_between_balls_where_there_is_room_and_not_where_there_is_none() {
+        // A gap of 0.6 m between two balls of one metre.
+        let mut scene = Scene::<3>::empty();
+        scene.balls = vec![([0.0, 1.3, 0.0], 1.0), ([0.0, -1.3, 0.0], 1.0)];
+        let through = Waypoints::new(vec![[-3.0, 0.0, 0.0], [3.0, 0.0, 0.0]]).unwrap();
+        assert!(is_true(&scene, &through, &Demand::new(0.298)));
+        assert!(!is_true(&scene, &through, &Demand::new(0.301)));
+        let PathCheck::Violated(found) = check_path(&scene, &through, &Demand::new(0.4)) else { panic!() };
+        // Where sqrt(x^2 + 1.3^2) - 1 is 0.4.
+        let half = (1.4f64 * 1.4 - 1.3 * 1.3).sqrt();
+        assert_eq!(found.cause, Cause::TooNear);
+        assert!(
+            (found.from - (3.0 - half)).abs() < 5e-3 && (found.to - (3.0 + half)).abs() < 5e-3,
+            "{found:?}"
+        );
+        // Around them on a circle, as a function with a promise.
+        let circle = |t: f64| [2.5 * t.cos(), 2.5 * t.sin(), 0.0];
+        let circle = SpeedLimited::new(circle, std::f64::consts::TAU, 2.5).unwrap();
+        assert!(
+            is_true(&scene, &circle, &Demand::new(0.19)) && !is_true(&scene, &circle, &Demand::new(0.21))
+        );
+    }
+
+    #[test]
+    fn the_first_cause_is_named() {
+        let mut scene = Scene::<2>::empty();
+        scene.balls = vec![([3.0, 0.0], 0.5)];
+        scene.hole = crate::geom::Aabb::new([0.0, -1.0], [1.0, 1.0]);
+        let path = Waypoints::new(vec![[-2.0, 0.0], [4.0, 0.0]]).unwrap();
+        let cause = |demand: Demand| match check_path(&scene, &path, &demand) {
+            PathCheck::Violated(found) => (found.cause, (found.from * 10.0).round() / 10.0),
+            PathCheck::Certified(_) => panic!("a ball is in the way"),
+        };
+        assert_eq!(cause(Demand::new(0.2)), (Cause::Unknown, 1.8));
+        assert_eq!(cause(Demand::new(0.2).optimistic()), (Cause::TooNear, 4.3));
+        let out = Waypoints::new(vec![[-2.0, 2.0], [-2.0, 9.0], [-2.0, 2.0]]).unwrap();
+        for (clearance, cause) in [(0.2, Cause::Unknown), (0.0, Cause::Outside)] {
+            let PathCheck::Violated(found) = check_path(&scene, &out, &Demand::new(clearance)) else {
+                panic!()
+            };
+            assert_eq!(found.cause, cause);
+            let off = [found.from - (3.0 - clearance), found.to - (11.0 + clearance)];
+            assert!(off.iter().all(|o| o.abs() < 0.02), "{found:?}");
+        }
+        // Beyond what is maintained nothing is known.
+        scene.most = 0.1;
+        let short = Waypoints::new(vec![[-2.0, 2.0], [-1.0, 2.0]]).unwrap();
+        let PathCheck::Violated(found) = check_path(&scene, &short, &Demand::new(0.2)) else { panic!() };
+        assert_eq!((found.cause, found.from, found.to), (Cause::Undecided, 0.0, 1.0));
+    }
+
+    #[test]
+    fn along_a_wall_at_the_limit_the_check_ends() {
+        // A ball so large that it is a wall, 0.3 m away, over ten kilometres.
+        let mut scene = Scene::<2>::empty();
+        scene.bounds = crate::geom::Aabb::new([-1e9; 2], [1e9; 2]);
+        let circle = |r: f64| SpeedLimited::new(move |t: f64| [r * t.cos(), r * t.sin()], 6.0, r).unwrap();
+        scene.balls = vec![([0.0; 2], 100.0)];
+        assert!(is_true(&scene, &circle(100.3), &Demand::new(0.2985)));
+        assert!(!is_true(&scene, &circle(100.3), &Demand::new(0.2995)));
+        let few = Demand { max_queries: 100, ..Demand::new(0.2985) };
+        let PathCheck::Violated(found) = check_path(&scene, &circle(100.3), &few) else { panic!() };
+        assert_eq!((found.cause, found.to), (Cause::Undecided, 6.0));
+        assert!(found.from > 0.0);
+    }
+
+    #[test]
+    fn nonsense_is_refused_and_ends() {
+        let scene = Scene::<2>::empty();
+        let path = Waypoints::new(vec![[0.0, 0.0], [1.0, 0.0]]).unwrap();
+        for clearance in [f64::NAN, -0.1, f64::INFINITY] {
+            let PathCheck::Violated(found) = check_path(&scene, &path, &Demand::new(clearance)) else {
+                panic!()
+            };
+            // Less than infinite clearance is known everywhere: to the end of the map.
+            let cause = if clearance > 0.0 { Cause::Unknown } else { Cause::Undecided };
+            assert_eq!((found.cause, found.from), (cause, 0.0));
+        }
+        let strange = Demand { tolerance: f64::NAN, ..Demand::new(0.1) };
+        assert!(check_path(&scene, &path, &strange).is_certified());
+        let point = Waypoints::new(vec![[1.0, 1.0]]).unwrap();
+        assert!(check_path(&scene, &point, &Demand::new(0.1)).is_certified());
+        // A path that leaves the map for the end of the world.
+        let far = Waypoints::new(vec![[0.0, 0.0], [1e150, 0.0]]).unwrap();
+        let PathCheck::Violated(found) = check_path(&scene, &far, &Demand::new(0.1)) else { panic!() };
+        assert_eq!((found.cause, found.to), (Cause::Unknown, 1e150));
+        // No field can say anything of what is no place, and none is asked.
+        let lost = SpeedLimited::new(|t: f64| [t, (0.5 - t).sqrt()], 1.0, 2.0).unwrap();
+        let near = Scene::<2> { most: 0.3, ..scene };
+        let PathCheck::Violated(found) = check_path(&near, &lost, &Demand::new(0.1)) else { panic!() };
+        assert_eq!((found.cause, found.to), (Cause::Outside, 1.0));
+        // Rounding leaves no room to move at 1e17 m.
+        let rim = Scene::<2> {
+            bounds: crate::geom::Aabb::new([-1e18; 2], [1e18; 2]),
+            balls: vec![([1e17, 0.0], 1.0)],
+            ..near
+        };
+        let path = Waypoints::new(vec![[1e17, 64.0], [1e17, 1e17]]).unwrap();
+        assert!(!check_path(&rim, &path, &Demand::new(0.1)).is_certified());
+    }
+
+    #[test]
+    fn unknown_space_counts_as_the_demand_says() {
+        let mut scene = Scene::<3>::empty();
+        scene.hole = crate::geom::Aabb::new([0.0; 3], [1.0; 3]);
+        let path = Waypoints::new(vec![[-1.0, 0.5, 0.5], [2.0, 0.5, 0.5]]).unwrap();
+        assert!(check_path(&scene, &path, &Demand::new(0.1).optimistic()).is_certified());
+        assert!(!check_path(&scene, &path, &Demand::new(0.1)).is_certified());
+        assert_eq!(Demand::new(0.1).unknown, UnknownSpace::Pessimistic);
+    }
+}

@@ -1,0 +1,97 @@
+//! Is a body free at a pose?
+
+use super::demand::{Cause, Demand, Verdict};
+use super::{Body, Sphere};
+use crate::field::ClearanceField;
+use crate::geom::Pose;
+
+/// What a check of a body at a pose found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BodyCheck {
+    /// Every sphere keeps what was demanded.
+    Free(BodyClearance),
+    /// Not all of them do, as far as the field knows.
+    Refused {
+        /// The first sphere that does not.
+        sphere: usize,
+        /// Why not.
+        cause: Cause,
+    },
+}
+
+impl BodyCheck {
+    /// Whether the body is certified to be free.
+    pub fn is_free(&self) -> bool {
+        matches!(self, Self::Free(_))
+    }
+}
+
+/// Between the body's surface and the nearest obstacle, at least and at most (metres).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyClearance {
+    /// At least so much; at least what was demanded.
+    pub lower: f64,
+    /// At most so much; infinite where nothing is near, or the body has no sphere.
+    pub upper: f64,
+    /// The sphere of the least lower bound.
+    pub sphere: usize,
+}
+
+impl BodyClearance {
+    pub(super) const NOTHING: Self = Self { lower: f64::INFINITY, upper: f64::INFINITY, sphere: 0 };
+
+    /// With the clearance of one sphere's surface.
+    pub(super) fn include(&mut self, sphere: usize, lower: f64, upper: f64) {
+        if lower < self.lower {
+            (self.lower, self.sphere) = (lower, sphere);
+        }
+        self.upper = self.upper.min(upper);
+    }
+}
+
+/// Checks a body at a pose: the centre of every sphere must have the demanded clearance beyond its radius. A sphere lies
+/// in free space, all of it, if that is certified: the demand may be 0. O(spheres).
+///
+/// ```
+/// use portolan::geom::Pose;
+/// use portolan::plan::{Body, BodyCheck, Cause, Demand, check_pose};
+/// # use portolan::{Answer, field::{Clearance, ClearanceField, UnknownSpace}};
+/// # struct Wall;
+/// # impl<const D: usize> ClearanceField<D> for Wall {
+/// #     fn clearance(&self, p: [f64; D], _: UnknownSpace) -> Answer<Clearance> {
+/// #         let d = 4.0 - p[0];
+/// #         Answer::Known(Clearance { lower: d.abs(), upper: d.abs(), inside: d < 0.0 })
+/// #     }
+/// #     fn distance_and_gradient(&self, p: [f64; D]) -> Answer<(f64, [f64; D])> {
+/// #         Answer::Known((4.0 - p[0], std::array::from_fn(|k| if k == 0 { -1.0 } else { 0.0 })))
+/// #     }
+/// #     fn resolution(&self) -> f64 { 0.05 }
+/// # }
+/// # let field = &Wall;
+/// // A field that knows of a wall at x = 4 m; a robot with a long nose.
+/// let robot = Body::of(&[([0.0, 0.0], 0.3), ([0.5, 0.0], 0.1)])?;
+/// let facing = |theta| check_pose(field, &robot, &Pose::<2>::new(3.5, 0.0, theta), &Demand::new(0.05));
+/// assert!(facing(std::f64::consts::PI).is_free());
+/// assert_eq!(facing(0.0), BodyCheck::Refused { sphere: 1, cause: Cause::TooNear });
+///
+/// // The same in space.
+/// let drone = Body::of(&[([0.0, 0.0, 0.0], 0.4)])?;
+/// let hovering = Pose::<3> { translation: [3.5, 0.0, 1.0], ..Pose::IDENTITY };
+/// assert!(check_pose(field, &drone, &hovering, &Demand::new(0.05)).is_free());
+/// # Ok::<(), portolan::plan::PlanError>(())
+/// ```
+pub fn check_pose<const D: usize>(
+    field: &(impl ClearanceField<D> + ?Sized),
+    body: &Body<D>,
+    world_from_body: &Pose<D>,
+    demand: &Demand,
+) -> BodyCheck {
+    let mut free = BodyClearance::NOTHING;
+    for (sphere, &Sphere { center, radius }) in body.spheres().iter().enumerate() {
+        match demand.beyond(radius).at(field, world_from_body.transform_point(center)) {
+            Verdict::Free(found) => free.include(sphere, found.lower - radius, found.upper - radius),
+            Verdict::Refused { cause, .. } => return BodyCheck::Refused { sphere, cause },
+        }
+    }
+    BodyCheck::Free(free)
+}
