@@ -164,7 +164,7 @@ impl<const D: usize> SparseEsdf<D> {
     /// The `2^D` values from `base` on, clamped to the largest distance, and whether one of them was; `None` where one
     /// is unknown.
     #[inline]
-    fn corners(&self, base: [i32; D]) -> Option<([f32; 8], bool)> {
+    pub(in crate::field) fn corners(&self, base: [i32; D]) -> Option<([f32; 8], bool)> {
         let mut corners = [0.0; 8];
         let key = BlockKey::of_cell(base);
         let inside = (0..D).all(|k| (base[k] & 7) < BLOCK_EDGE as i32 - 1);
@@ -186,7 +186,7 @@ impl<const D: usize> SparseEsdf<D> {
     }
 
     #[inline]
-    pub(super) fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
+    pub(in crate::field) fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
         Some(&self.bricks[self.slot(key)?].distance)
     }
 
