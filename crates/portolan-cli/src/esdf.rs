@@ -43,23 +43,19 @@ impl EsdfArg {
     }
 }
 
-/// The field of a map of the plane, as far as the method reaches (509 cells where it is accurate).
-pub(crate) fn plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg) -> SparseEsdf<2> {
+/// The field of a map of the plane, as far as the method reaches (509 cells where it is accurate), with distances to
+/// unknown cells where they are wanted.
+pub(crate) fn plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg, unknown: bool) -> SparseEsdf<2> {
     let grid = tsdf.grid();
     let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
     let min_weight = EsdfSettings::of(tsdf).min_weight;
-    let how = SparseEsdfSettings {
-        min_weight,
-        max_distance,
-        method: method.method(),
-        ..SparseEsdfSettings::default()
-    };
+    let how = SparseEsdfSettings { min_weight, max_distance, method: method.method(), unknown };
     SparseEsdf::of_tsdf(tsdf, &how)
 }
 
 /// The cells of a map of the plane.
 pub(crate) fn dense_plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg) -> DenseEsdf<2> {
-    plane_esdf(tsdf, method).dense(tsdf.grid())
+    plane_esdf(tsdf, method, false).dense(tsdf.grid())
 }
 
 /// The status plane of a file, where there is something to say that NaN does not.

@@ -96,6 +96,22 @@ fn queries_answer_with_distance_and_gradient() {
     assert_eq!(rows[1][2], "known");
     assert!(number(1, 3) < 0.2 && (number(1, 4) - 0.5).abs() < 0.06 && (number(1, 7) - 1.0).abs() < 0.1);
     assert!(number(2, 4) < 0.0 && rows[2][2] == "known");
+    for row in [1, 2] {
+        // Certified to within a tenth of a cell here, beside a straight wall; without the sign of the side.
+        let (distance, lower, upper) = (number(row, 4).abs(), number(row, 5), number(row, 6));
+        assert!(lower <= upper && upper - lower < 0.005, "{lower} {upper}");
+        assert!(lower - 0.01 < distance && distance < upper + 0.01, "{distance} not near {lower} to {upper}");
+    }
+    let seeded = succeed(["query", arg(&out), "--points", arg(&points), "--esdf", "seeded"]);
+    assert_eq!(seeded.lines().nth(1).unwrap().split(',').skip(5).take(2).collect::<String>(), "");
+    // Near the pillar's corner, beside what was never seen inside of it, the nearest unknown cell counts as well.
+    std::fs::write(&points, "2.2,2\n").unwrap();
+    let lower = |unknown: &str| {
+        let text = succeed(["query", arg(&out), "--points", arg(&points), "--unknown", unknown]);
+        text.lines().nth(1).unwrap().split(',').nth(5).unwrap().parse::<f64>().unwrap()
+    };
+    assert!(lower("pessimistic") <= lower("optimistic") && lower("pessimistic") > 0.2);
+    std::fs::write(&points, "x,y\n0.5,2.0\n-0.06,2\n3,2\n100,100\n").unwrap();
     assert_eq!(rows[3][2..], ["unknown", "", "", "", "", "", ""]);
     assert_eq!(rows[4][2..], ["outside", "", "", "", "", "", ""]);
     assert_eq!(rows.len(), 5);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Esdf, SparseEsdf};
+use portolan::field::{Clearance, ClearanceField, Esdf, SparseEsdf, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map::{MapRepr, OccupancySweep, SparseOccupancy};
 use portolan::store::Store;
@@ -15,6 +15,7 @@ use portolan_io::{
 };
 use serde_json::{Value, json};
 
+use super::convert::UnknownArg;
 use crate::arguments::length;
 use crate::error::bad_call;
 use crate::esdf::{EsdfArg, plane_esdf};
@@ -24,6 +25,11 @@ use crate::space::esdf_settings;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echo 1.5,2.0 | portolan query intel --points -")]
+/// Answers at points: x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz]
+///
+/// `status` is known, unknown, saturated or outside and is about the distance, which is interpolated. `lower` and `upper`
+/// hold the exact distance to the extracted surface without its sign, whatever `distance` says: certified, for a
+/// map.portolan with signed distances; other files give none. Saturated: nothing is nearer than `lower`; no `upper`.
 pub(crate) struct Args {
     /// A folder that `map` wrote, a map.portolan, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot
     map: PathBuf,
@@ -36,6 +42,10 @@ pub(crate) struct Args {
     /// How the distances of a map.portolan are made; only accurate ones have bounds [default: accurate]
     #[arg(long, value_enum)]
     esdf: Option<EsdfArg>,
+    /// What lower and upper are about: the surface alone (optimistic), or the surface and unknown space, whichever is
+    /// nearer (pessimistic) [default: optimistic, as the distance is]
+    #[arg(long, value_enum)]
+    unknown: Option<UnknownArg>,
     #[command(flatten)]
     output: Output,
 }
@@ -45,6 +55,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let source = open(&args.map)?;
     if args.esdf.is_some() && !matches!(source, Source::SpaceMap(_) | Source::Map(_)) {
         return Err(bad_call(format!("--esdf is for a map.portolan; this is {}", source.describe())));
+    }
+    if args.unknown.is_some() && !matches!(source, Source::SpaceMap(_) | Source::Map(_)) {
+        return Err(bad_call(format!("--unknown is for a map.portolan; this is {}", source.describe())));
     }
     if args.max_distance.is_some() && !matches!(source, Source::SpaceMap(_)) {
         return Err(bad_call(format!("--max-distance is for maps of space; this is {}", source.describe())));
@@ -115,6 +128,7 @@ enum Fields {
 /// Answers to occupancy and distance of one map.
 struct Field<const D: usize> {
     distance: Option<Distance<D>>,
+    clearance: Option<Certified<D>>,
     occupancy: Occupancy<D>,
     /// For maps that are turned against the world.
     world_from_field: Pose<D>,
@@ -124,8 +138,17 @@ type Occupancy<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<f64>>;
 /// Distance and gradient.
 type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>;
 
-fn sparse<const D: usize>(esdf: SparseEsdf<D>) -> Distance<D> {
-    Box::new(move |p| esdf.distance_and_gradient(p))
+/// Certified bounds of the distance.
+type Certified<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<Clearance>>;
+
+/// What a field in bricks answers. Only the accurate method certifies.
+fn sparse<const D: usize>(esdf: SparseEsdf<D>, args: &Args) -> (Distance<D>, Option<Certified<D>>) {
+    let unknown = args.unknown.map_or(UnknownSpace::Optimistic, UnknownArg::space);
+    let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
+    // Bricks are shared.
+    let same = esdf.clone();
+    let certified = certifies.then(|| -> Certified<D> { Box::new(move |p| same.clearance(p, unknown)) });
+    (Box::new(move |p| esdf.distance_and_gradient(p)), certified)
 }
 
 fn dense<const D: usize>(esdf: Esdf<D>) -> Distance<D> {
@@ -135,7 +158,7 @@ fn dense<const D: usize>(esdf: Esdf<D>) -> Distance<D> {
 impl Fields {
     fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
-            Source::Map(file) => Self::Two(of_map(*file, args.esdf.unwrap_or_default())),
+            Source::Map(file) => Self::Two(of_map(*file, args)),
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
             Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
             Source::Server(map) => Self::Two(of_server(map)),
@@ -150,31 +173,40 @@ impl Fields {
     }
 }
 
-fn of_map(file: MapFile, method: EsdfArg) -> Field<2> {
-    let of_tsdf = file.tsdf.as_ref().map(|t| sparse(plane_esdf(t, method)));
+fn of_map(file: MapFile, args: &Args) -> Field<2> {
+    let of_tsdf = file.tsdf.as_ref().map(|t| {
+        let pessimistic = args.unknown == Some(UnknownArg::Pessimistic);
+        sparse(plane_esdf(t, args.esdf.unwrap_or_default(), pessimistic), args)
+    });
     let of_grid = || {
         let map = file.grid.as_ref()?;
         let occupied = |i: usize| map.store().at(i).map(|v| v.0 > 0);
         Some(Esdf::from_mask(*map.store().grid(), occupied))
     };
-    let distance = of_tsdf.or_else(|| of_grid().map(dense));
+    let (distance, clearance) = match of_tsdf {
+        Some((distance, clearance)) => (Some(distance), clearance),
+        None => (of_grid().map(dense), None),
+    };
     let occupancy: Occupancy<2> = match (file.grid, file.tree, file.tsdf) {
         (Some(map), ..) => Box::new(move |p| map.probability(p)),
         (_, Some(map), _) => Box::new(move |p| map.probability(p)),
         (.., Some(map)) => Box::new(move |p| map.occupancy(p).map_or(Answer::Unknown, Answer::Known)),
         _ => Box::new(|_| Answer::Outside),
     };
-    Field { distance, occupancy, world_from_field: Pose::IDENTITY }
+    Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY }
 }
 
 fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
     let saved = file.header.settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
     let max_distance = args.max_distance.or(saved).unwrap_or(1.0);
-    let distance = file.tsdf.as_ref().map(|map| {
+    let field = file.tsdf.as_ref().map(|map| {
         let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
         how.method = args.esdf.unwrap_or_default().method();
-        sparse(SparseEsdf::of(&map.store, &how))
+        how.unknown = args.unknown == Some(UnknownArg::Pessimistic);
+        sparse(SparseEsdf::of(&map.store, &how), args)
     });
+    let (distance, clearance) =
+        field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
     let occupancy: Occupancy<3> = match (file.occupancy, file.tsdf) {
         (Some(map), _) => {
             let map = SparseOccupancy::from_store(map.store, map.model, OccupancySweep::Auto)?;
@@ -189,7 +221,7 @@ fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
         }),
         (None, None) => Box::new(|_| Answer::Outside),
     };
-    Ok(Field { distance, occupancy, world_from_field: Pose::IDENTITY })
+    Ok(Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY })
 }
 
 fn of_esdf<const D: usize>(file: EsdfBin<D>) -> anyhow::Result<Field<D>> {
@@ -205,7 +237,7 @@ fn of_esdf<const D: usize>(file: EsdfBin<D>) -> anyhow::Result<Field<D>> {
         Answer::Known(answer) if is_saturated(&esdf, status.as_deref(), p) => Answer::Saturated(answer),
         answer => answer,
     });
-    Ok(Field { distance: Some(distance), occupancy, world_from_field: Pose::IDENTITY })
+    Ok(Field { distance: Some(distance), clearance: None, occupancy, world_from_field: Pose::IDENTITY })
 }
 
 fn of_server(map: MapServerMap) -> Field<2> {
@@ -216,7 +248,7 @@ fn of_server(map: MapServerMap) -> Field<2> {
         Some(i) if map.occupancy[i].is_nan() => Answer::Unknown,
         Some(i) => Answer::Known(f64::from(map.occupancy[i])),
     });
-    Field { distance, occupancy, world_from_field }
+    Field { distance, clearance: None, occupancy, world_from_field }
 }
 
 /// Occupancy alone: a tree holds no distances.
@@ -228,7 +260,7 @@ fn of_octomap(file: OctomapTree) -> Field<3> {
             None => Answer::Outside,
             Some(cell) => tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(logistic(v.0))),
         });
-    Field { distance: None, occupancy, world_from_field: Pose::IDENTITY }
+    Field { distance: None, clearance: None, occupancy, world_from_field: Pose::IDENTITY }
 }
 
 /// P(occupied) of log odds.
@@ -278,6 +310,16 @@ impl<const D: usize> Field<D> {
             }
             Answer::Unknown => {}
             Answer::Outside => row.status = AnswerStatus::Outside,
+        }
+        if matches!(row.status, AnswerStatus::Known | AnswerStatus::Saturated)
+            && let Some(clearance) = &self.clearance
+        {
+            let bounds = match clearance(p) {
+                Answer::Known(c) | Answer::Saturated(c) => Some(c),
+                Answer::Unknown | Answer::Outside => None,
+            };
+            row.lower = bounds.map(|c| c.lower);
+            row.upper = bounds.map(|c| c.upper).filter(|u| u.is_finite());
         }
         row
     }
