@@ -102,6 +102,15 @@ pub(crate) fn bounds(text: &str) -> Result<Bounds, String> {
     }
 }
 
+/// `low:high` in metres.
+pub(crate) fn heights(text: &str) -> Result<[f64; 2], String> {
+    let (low, high) = text.split_once(':').ok_or("must be two heights LOW:HIGH in metres")?;
+    match [number(low)?, number(high)?] {
+        [low, high] if low <= high && low.is_finite() && high.is_finite() => Ok([low, high]),
+        _ => Err("must be finite heights, the lower one first".to_owned()),
+    }
+}
+
 /// `x,y,z` in metres.
 pub(crate) fn point3(text: &str) -> Result<[f64; 3], String> {
     match numbers(text)?[..] {
@@ -195,6 +204,8 @@ mod tests {
         for bad in ["1,2,3", "1,2,1,3", "1,2,nan,3", "a,b,c,d"] {
             assert!(bounds(bad).is_err(), "{bad}");
         }
+        assert_eq!(heights("-0.1:1.5"), Ok([-0.1, 1.5]));
+        assert!(["1", "2:1", "nan:1", "0:inf", ":"].iter().all(|bad| heights(bad).is_err()));
         assert_eq!(bytes("4G"), Ok(4 << 30));
         assert_eq!(bytes("1.5k"), Ok(1536));
         assert_eq!(bytes("1000"), Ok(1000));

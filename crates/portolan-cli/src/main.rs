@@ -5,6 +5,7 @@
 mod arguments;
 mod commands;
 mod error;
+mod esdf;
 mod experiment;
 mod json;
 mod log;

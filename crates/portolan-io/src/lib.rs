@@ -14,6 +14,8 @@
 //! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
+//! | costs of Nav2, as a map_server map | | [`write_costmap`] |
+//! | numpy `.npy`, `.npz` | [`read_npy`], [`read_npz`] | [`write_npy`], [`write_npz`] |
 //! | OctoMap `.bt`, `.ot` | [`OctomapTree`] | [`write_octomap_bt`], [`write_octomap_ot`] |
 //! | PGM | [`Pgm`] | [`Pgm::write`] |
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
@@ -33,6 +35,7 @@
 mod bytes;
 mod carmen;
 mod container;
+mod costmap;
 mod detect;
 mod error;
 mod esdf_bin;
@@ -42,6 +45,7 @@ mod log_writer;
 mod map_file;
 mod map_server;
 mod mesh;
+mod numpy;
 mod octomap;
 mod pcd;
 mod pgm;
@@ -63,6 +67,7 @@ pub use carmen::{
     detect_no_return,
 };
 pub use container::{Chunk, Container, ContainerWriter};
+pub use costmap::write_costmap;
 pub use detect::{FileKind, detect};
 pub use error::IoError;
 pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
@@ -75,6 +80,7 @@ pub use map_file::{
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{MeshCounts, MeshFormat, mesh_counts, write_glb, write_obj, write_ply_mesh};
+pub use numpy::{NpyArray, NpyValues, read_npy, read_npz, write_npy, write_npz};
 pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
 pub use pcd::{read_pcd, write_pcd};
 pub use pgm::Pgm;

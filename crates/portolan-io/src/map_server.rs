@@ -167,12 +167,29 @@ fn cell(value: u16, white: u16, info: &MapServerInfo) -> (MapCell, f32) {
 /// [`IoError::Unwritable`] where the lengths differ or the resolution is not positive, else as
 /// [`write_atomic`].
 pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell]) -> Result<(), IoError> {
-    let yaml = yaml.as_ref();
+    let grey = |c: &MapCell| match c {
+        MapCell::Free => 254,
+        MapCell::Unknown => 205,
+        MapCell::Occupied => 0,
+    };
+    let pixels: Vec<u16> = cells.iter().map(grey).collect();
+    write_pair(yaml.as_ref(), grid, &pixels, MapMode::Trinary, 0.65, 0.196)
+}
+
+/// Writes the yaml file and the image of pixels up to 255, one per cell of `grid`, x fastest, y up.
+pub(crate) fn write_pair(
+    yaml: &Path,
+    grid: &Grid<2>,
+    pixels: &[u16],
+    mode: MapMode,
+    occupied_thresh: f64,
+    free_thresh: f64,
+) -> Result<(), IoError> {
     let [width, height] = grid.shape;
     let [x, y] = grid.lattice.origin;
     let resolution = grid.lattice.resolution;
-    if grid.checked_len() != Some(cells.len()) || cells.is_empty() {
-        let value = format!("{width} x {height} for {} cells", cells.len());
+    if grid.checked_len() != Some(pixels.len()) || pixels.is_empty() {
+        let value = format!("{width} x {height} for {} cells", pixels.len());
         return Err(IoError::unwritable(
             yaml,
             "the map size",
@@ -184,12 +201,7 @@ pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell
         let value = format!("{resolution} at {x} {y}");
         return Err(IoError::unwritable(yaml, "the resolution", value, "give finite values, above zero"));
     }
-    let grey = |c: &MapCell| match c {
-        MapCell::Free => 254,
-        MapCell::Unknown => 205,
-        MapCell::Occupied => 0,
-    };
-    let pixels = cells.chunks(width).rev().flatten().map(grey).collect();
+    let pixels = pixels.chunks(width).rev().flatten().copied().collect();
     let image_path = yaml.with_extension("pgm");
     let name = image_path.file_name().unwrap_or_default().to_string_lossy().replace('\'', "''");
     if name.chars().any(char::is_control) {
@@ -201,9 +213,14 @@ pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell
         ));
     }
     Pgm { width, height, max_value: 255, pixels }.write(&image_path)?;
+    let mode = match mode {
+        MapMode::Trinary => "trinary",
+        MapMode::Scale => "scale",
+        MapMode::Raw => "raw",
+    };
     write_atomic(yaml, |w| {
-        writeln!(w, "image: '{name}'\nmode: trinary\nresolution: {resolution}\norigin: [{x}, {y}, 0.0]")?;
-        writeln!(w, "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196")
+        writeln!(w, "image: '{name}'\nmode: {mode}\nresolution: {resolution}\norigin: [{x}, {y}, 0.0]")?;
+        writeln!(w, "negate: 0\noccupied_thresh: {occupied_thresh}\nfree_thresh: {free_thresh}")
     })
 }
 

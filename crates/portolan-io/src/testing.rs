@@ -72,3 +72,35 @@ pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
     .unwrap();
     None
 }
+
+/// A Python with a package.
+pub(crate) struct Python(PathBuf);
+
+/// The Python of `PORTOLAN_PYTHON`, else `python3`, if it has the package. Without it a loud line says so: the files are
+/// tested against their description all the same.
+pub(crate) fn python(package: &str) -> Option<Python> {
+    let named = std::env::var_os("PORTOLAN_PYTHON").map(PathBuf::from);
+    let python = Python(named.unwrap_or_else(|| "python3".into()));
+    if python.run(&format!("import {package}"), &[]).is_ok() {
+        return Some(python);
+    }
+    let shown = python.0.display();
+    writeln!(
+        std::io::stderr(),
+        "NOT COMPARED: {shown} has no {package} (set PORTOLAN_PYTHON to a Python that has)"
+    )
+    .unwrap();
+    None
+}
+
+impl Python {
+    /// Runs a script; what it wrote on its error output where it failed.
+    pub(crate) fn run(&self, script: &str, arguments: &[&Path]) -> Result<(), String> {
+        let ran = std::process::Command::new(&self.0).arg("-c").arg(script).args(arguments).output();
+        match ran {
+            Ok(output) if output.status.success() => Ok(()),
+            Ok(output) => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+            Err(e) => Err(e.to_string()),
+        }
+    }
+}

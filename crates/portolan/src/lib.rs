@@ -41,6 +41,7 @@ pub mod cell;
 pub mod field;
 pub mod gallery;
 pub mod geom;
+pub mod handover;
 pub mod map;
 pub mod radiance;
 pub mod scan;

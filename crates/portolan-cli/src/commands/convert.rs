@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::cell::{DistancePlanes, LogOdds8, LogOddsValue, OccupancyModel};
-use portolan::field::{Esdf, EsdfSettings, esdf_from_tsdf};
+use portolan::field::{DenseEsdf, Esdf};
 use portolan::geom::{Grid, Pose};
 use portolan::map::{OccupancyGrid, Tsdf, TsdfConfig};
 use portolan::store::Dense;
@@ -14,22 +14,47 @@ use portolan_io::{
 };
 use serde_json::json;
 
+use self::arrays::ArrayArgs;
+use self::costs::CostArgs;
+use self::field::Field;
 use super::query::esdf_of_server;
+use crate::arguments::{Bounds, bounds, length};
+use crate::error::bad_call;
+use crate::esdf::{EsdfArg, status_plane};
 use crate::mapping::{cells_for_map_server, polylines, write_contour};
 use crate::output::Output;
 use crate::source::{Source, open};
 
+mod arrays;
+mod costs;
+mod field;
 mod space;
 
+pub(crate) use arrays::UnknownArg;
+
 #[derive(clap::Args)]
-#[command(
-    after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  portolan convert intel intel.yaml"
-)]
+#[command(after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  \
+                  portolan convert intel intel.npz --layout casadi --unknown pessimistic\n  \
+                  portolan convert intel costs.yaml --inflate 0.55 --inscribed 0.22\n  \
+                  portolan convert kitchen floor.yaml --z 0.1:1.2 --unknown pessimistic")]
 pub(crate) struct Args {
     /// map.portolan or its folder, map_server yaml, esdf.bin, GeoJSON contour, or OctoMap .bt or .ot
     input: PathBuf,
-    /// File to write: .portolan, .yaml (with its .pgm), .bin, .geojson, .svg, .bt, .ot, .ply, .glb or .obj
+    /// File to write: .portolan, .yaml (with its .pgm), .bin, .npz, .npy, .geojson, .svg, .bt, .ot, .ply, .glb or .obj
     out: PathBuf,
+    /// Distance fields of maps: how they are made [default: as the map was made, else accurate]
+    #[arg(long, value_enum)]
+    esdf: Option<EsdfArg>,
+    /// Distance fields of maps of space: up to here (metres) [default: as the map was made]
+    #[arg(long, value_name = "M", value_parser = length)]
+    max_distance: Option<f64>,
+    /// This box of a distance field only: x0,y0,x1,y1, in space x0,y0,z0,x1,y1,z1 (metres)
+    #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
+    bounds: Option<Bounds>,
+    #[command(flatten)]
+    arrays: ArrayArgs,
+    #[command(flatten)]
+    costs: CostArgs,
     #[command(flatten)]
     output: Output,
 }
@@ -40,6 +65,7 @@ enum Target {
     Portolan,
     MapServer,
     Esdf,
+    Arrays,
     Contour,
     OctomapBt,
     OctomapOt,
@@ -51,7 +77,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let target = target(&args.out);
     let source = open(&args.input)?;
     let Some(target) = target else { return Err(not_possible(args, &source)) };
+    args.check(target, &source)?;
     let done = match &source {
+        _ if args.takes_field(target, &source) => match Field::of(&source, args)? {
+            Some(field) => write_field_as(&field, target, args)?,
+            None => false,
+        },
         Source::Map(file) => convert_map(file, target, args)?,
         Source::Server(map) => convert_server(map, target, args)?,
         Source::Esdf(EsdfFile::Two(field)) => {
@@ -99,6 +130,7 @@ fn target(out: &Path) -> Option<Target> {
         "portolan" => Some(Target::Portolan),
         "yaml" | "yml" | "pgm" => Some(Target::MapServer),
         "bin" => Some(Target::Esdf),
+        "npz" | "npy" => Some(Target::Arrays),
         "geojson" | "json" | "svg" => Some(Target::Contour),
         "bt" => Some(Target::OctomapBt),
         "ot" => Some(Target::OctomapOt),
@@ -110,14 +142,18 @@ fn target(out: &Path) -> Option<Target> {
 /// Says what the input could be turned into.
 fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
     let possible = match source {
-        Source::Map(_) => ".yaml, .bin (esdf), .geojson, .svg or .portolan, as far as its maps go",
-        Source::Server(_) => ".bin (esdf), .geojson, .svg, .portolan or .yaml",
-        Source::Esdf(EsdfFile::Two(_)) => ".yaml, .geojson, .svg or .bin",
-        Source::Esdf(EsdfFile::Three(_)) => ".bin: it is in space",
+        Source::Map(_) => {
+            ".yaml, .bin (esdf), .npz, .npy, .geojson, .svg or .portolan, as far as its maps go"
+        }
+        Source::Server(_) => ".bin (esdf), .npz, .npy, .geojson, .svg, .portolan or .yaml",
+        Source::Esdf(EsdfFile::Two(_)) => ".yaml, .npz, .npy, .geojson, .svg or .bin",
+        Source::Esdf(EsdfFile::Three(_)) => ".bin, .npz, .npy, or with --z .yaml: it is in space",
         Source::Contour(_) => ".geojson or .svg",
         Source::Image(_) => "nothing without its yaml file",
         Source::Octomap(_) => ".bt or .ot",
-        Source::SpaceMap(_) => ".ply, .glb, .obj, .bt, .ot, .bin (esdf) or .portolan, as far as its maps go",
+        Source::SpaceMap(_) => {
+            ".ply, .glb, .obj, .bt, .ot, .bin (esdf), .npz, .npy, with --z .yaml, or .portolan, as far as its maps go"
+        }
         Source::Log(_) | Source::SpaceLog(_) => "nothing here: `portolan map` makes maps of logs",
     };
     let (input, out) = (args.input.display(), args.out.display());
@@ -140,18 +176,14 @@ fn convert_map(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<bo
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
             write_map_server(yaml(&args.out), &grid, &cells)?;
         }
-        (Target::Esdf, Some(tsdf)) => {
-            let EsdfSettings { min_weight, band_cells } = EsdfSettings::of(tsdf);
-            write_field(&esdf_from_tsdf(tsdf, min_weight, band_cells), args)?;
-        }
         (Target::Contour, Some(tsdf)) => {
             return write_lines(&marching_squares(tsdf, &ContourSettings::of(tsdf)), args);
         }
-        (Target::OctomapBt | Target::OctomapOt | Target::Mesh, _) => return Ok(false),
-        (Target::Esdf | Target::Contour, None) => {
+        (Target::Contour, None) => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
             return convert_esdf(&esdf_of_cells(grid, &cells), target, args);
         }
+        _ => return Ok(false),
     }
     Ok(true)
 }
@@ -170,7 +202,6 @@ fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Re
     match target {
         Target::Portolan => as_map_file(map, args)?.write(&args.out)?,
         Target::MapServer => write_map_server(yaml(&args.out), &map.grid, &map.cells)?,
-        Target::Esdf => write_field(&esdf_of_server(map), args)?,
         Target::Contour => {
             let mut contour = contour_of(&esdf_of_server(map))?;
             let world_from_grid: Pose<2> = map.world_from_grid();
@@ -179,7 +210,7 @@ fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Re
             }
             return write_lines(&contour, args);
         }
-        Target::OctomapBt | Target::OctomapOt | Target::Mesh => return Ok(false),
+        _ => return Ok(false),
     }
     Ok(true)
 }
@@ -196,8 +227,6 @@ fn convert_octomap(file: &OctomapTree, target: Target, args: &Args) -> anyhow::R
 
 fn convert_esdf(esdf: &Esdf<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match target {
-        Target::Portolan | Target::OctomapBt | Target::OctomapOt | Target::Mesh => return Ok(false),
-        Target::Esdf => write_field(esdf, args)?,
         Target::MapServer => {
             let cell = |d: &f32| match d {
                 d if d.is_nan() => MapCell::Unknown,
@@ -208,6 +237,7 @@ fn convert_esdf(esdf: &Esdf<2>, target: Target, args: &Args) -> anyhow::Result<b
             write_map_server(yaml(&args.out), esdf.grid(), &cells)?;
         }
         Target::Contour => return write_lines(&contour_of(esdf)?, args),
+        _ => return Ok(false),
     }
     Ok(true)
 }
@@ -220,8 +250,61 @@ fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> Esdf<2> {
     })
 }
 
-fn write_field(esdf: &Esdf<2>, args: &Args) -> anyhow::Result<()> {
-    Ok(write_esdf(&args.out, esdf.grid(), esdf.samples(), None)?)
+/// Writes a distance field as `esdf.bin`, arrays or a costmap.
+fn write_field_as(field: &Field, target: Target, args: &Args) -> anyhow::Result<bool> {
+    match (target, field) {
+        (Target::Arrays, _) => args.arrays.write(field, &args.out)?,
+        (Target::MapServer, _) => {
+            args.costs.write(field, args.arrays.unknown.map(UnknownArg::space), &yaml(&args.out))?;
+        }
+        (_, Field::Two(field)) => write_dense(field, args)?,
+        (_, Field::Three(field)) => write_dense(field, args)?,
+    }
+    Ok(true)
+}
+
+fn write_dense<const D: usize>(field: &DenseEsdf<D>, args: &Args) -> anyhow::Result<()> {
+    // In space the status has always been written.
+    let status = if D == 3 { Some(&field.status[..]) } else { status_plane(field) };
+    Ok(write_esdf(&args.out, &field.grid, &field.distances, status)?)
+}
+
+impl Args {
+    /// Whether what is written is made of a distance field, whatever the source is.
+    fn takes_field(&self, target: Target, source: &Source) -> bool {
+        match target {
+            Target::Arrays => true,
+            Target::MapServer => self.costs.asked(),
+            // A whole file stays as it is.
+            Target::Esdf => self.bounds.is_some() || !matches!(source, Source::Esdf(_)),
+            _ => false,
+        }
+    }
+
+    /// Refuses options that would change nothing.
+    fn check(&self, target: Target, source: &Source) -> anyhow::Result<()> {
+        let out = self.out.display();
+        if self.arrays.asked() && target != Target::Arrays {
+            return Err(bad_call(format!("options of arrays are for .npz and .npy, not for {out}")));
+        }
+        if self.costs.asked() && target != Target::MapServer {
+            return Err(bad_call(format!("options of costmaps are for .yaml, not for {out}")));
+        }
+        if !self.takes_field(target, source) {
+            let given = [
+                ("--esdf", self.esdf.is_some()),
+                ("--max-distance", self.max_distance.is_some()),
+                ("--bounds", self.bounds.is_some()),
+                ("--unknown", self.arrays.unknown.is_some()),
+            ];
+            if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
+                return Err(bad_call(format!(
+                    "{option} is for distance fields; {out} is not made of one here"
+                )));
+            }
+        }
+        Ok(())
+    }
 }
 
 fn write_lines(contour: &Contour, args: &Args) -> anyhow::Result<bool> {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use portolan::gallery::{ErrorSummary, Gallery};
+use portolan::gallery::Gallery;
 use portolan::geom::{Grid, Pose};
 use portolan::map::SweepKind;
 use portolan::scan::{RangeLimits, Scan, ScanStats};
@@ -19,6 +19,7 @@ use portolan_sim::{LapConfig, Lidar, SEED};
 use self::found::Found;
 use super::gallery;
 use crate::arguments::ForgettingArgs;
+use crate::esdf::EsdfArg;
 use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::json;
 use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, fuse};
@@ -136,7 +137,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         scene,
         drift: &drift,
         forgetting: forgetting.as_ref(),
-        esdf_against_contour: against_contour(&gallery),
         seconds: run.total(),
         warnings: found.warnings(),
     };
@@ -172,20 +172,6 @@ fn write_ghost(folder: &Path, forgetting: Option<&Forgetting>) -> anyhow::Result
     let picture = pictures::ghost(forgetting);
     write_atomic(png, |w| w.write_all(&picture))?;
     Ok(&NAMES)
-}
-
-/// The ESDF against the contour: distances at free points beside every eighth cell centre, off it so that the
-/// interpolation is measured too.
-fn against_contour(gallery: &Gallery) -> Option<ErrorSummary> {
-    let (field, contour) = (&gallery.distance, &gallery.contour);
-    let grid = field.grid();
-    let errors = (0..grid.len()).step_by(8).filter(|&i| field.samples()[i] > 0.0).filter_map(|i| {
-        let [x, y] = grid.lattice.center(grid.cell(i));
-        let p = [x + 0.3 * grid.lattice.resolution, y - 0.2 * grid.lattice.resolution];
-        let d = field.distance(p).known().filter(|d| *d > 0.0)?;
-        Some(d - contour.nearest_distance(p)?)
-    });
-    ErrorSummary::of(errors.collect())
 }
 
 /// Files written and seconds spent.
@@ -231,6 +217,7 @@ fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
         hold_out: None,
         bounds: None,
         maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
+        esdf: EsdfArg::default(),
     }
 }
 

@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::{bounds, bytes, length};
 use crate::error::bad_call;
+use crate::esdf::EsdfArg;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen, with_outlier};
 use crate::output::Output;
@@ -126,6 +127,7 @@ impl Args {
             hold_out: None,
             bounds: self.bounds,
             maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
+            esdf: EsdfArg::default(),
         }
     }
 }
@@ -221,6 +223,16 @@ pub(crate) fn document(gallery: &Gallery, log: &str, scans: usize) -> Value {
     let measured: Vec<_> =
         cloud.measured.iter().map(|&(n, s)| json!({ "points": n, "seconds": s })).collect();
     let finite = |v: f64| v.is_finite().then_some(v);
+    let fields: Vec<_> = gallery
+        .fields
+        .iter()
+        .map(|f| {
+            json!({
+                "method": f.name(), "seconds": f.seconds, "gradient_norm": finite(f.gradient),
+                "against_contour": error(f.against_contour), "against_truth": error(f.against_truth),
+            })
+        })
+        .collect();
     json!({
         "log": log,
         "scans": scans,
@@ -232,20 +244,22 @@ pub(crate) fn document(gallery: &Gallery, log: &str, scans: usize) -> Value {
         "never_win": never,
         "tree_crossovers": trees,
         "cloud_crossover": { "points": cloud.points, "measured": measured },
-        "gradient_norm": { "tsdf": finite(gallery.tsdf_gradient), "esdf": finite(gallery.esdf_gradient) },
+        "gradient_norm": { "tsdf": finite(gallery.tsdf_gradient), "esdf": finite(gallery.fields[0].gradient) },
+        "fields": fields,
+    })
+}
+
+fn error(error: Option<ErrorSummary>) -> Option<Value> {
+    error.map(|e| {
+        json!({
+            "count": e.count, "median": e.median, "p95": e.p95, "p99": e.p99, "bias": e.bias,
+            "worst_over": e.worst_over, "worst_under": e.worst_under,
+        })
     })
 }
 
 fn row(row: &Row) -> Value {
     let cost = |cost: Option<Cost>| cost.map(|c| json!({ "seconds": c.seconds, "by": c.by }));
-    let error = |error: Option<ErrorSummary>| {
-        error.map(|e| {
-            json!({
-                "count": e.count, "median": e.median, "p95": e.p95, "p99": e.p99, "bias": e.bias,
-                "worst_over": e.worst_over, "worst_under": e.worst_under,
-            })
-        })
-    };
     json!({
         "name": row.name, "memory_bytes": row.memory_bytes, "derived": row.derived,
         "update": cost(row.update), "occupancy": cost(row.occupancy), "distance": cost(row.distance),

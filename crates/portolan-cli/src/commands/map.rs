@@ -12,6 +12,7 @@ use portolan::sweep::WeightModel;
 
 use crate::arguments::{Bounds, ForgettingArgs, body, bounds, box3, bytes, length, share};
 use crate::error::bad_call;
+use crate::esdf::EsdfArg;
 use crate::log::{LimitArgs, LogArgs};
 use crate::mapping::MapKind;
 use crate::output::Output;
@@ -101,6 +102,10 @@ pub(crate) struct Args {
     /// x,y,z,radius (metres); may be given several times
     #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true)]
     self_filter: Vec<Body>,
+    /// How the esdf is made: distances to the extracted surface, from the chapter's seeds, or between cells [default:
+    /// accurate]
+    #[arg(long, value_enum)]
+    esdf: Option<EsdfArg>,
     /// In space: distances of the esdf are kept up to here (metres); default 1
     #[arg(long, value_name = "M", value_parser = length)]
     max_distance: Option<f64>,

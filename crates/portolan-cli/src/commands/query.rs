@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Esdf, EsdfSettings, SparseEsdf, esdf_from_tsdf};
+use portolan::field::{Esdf, SparseEsdf};
 use portolan::geom::Pose;
 use portolan::map::{MapRepr, OccupancySweep, SparseOccupancy};
 use portolan::store::Store;
@@ -17,6 +17,7 @@ use serde_json::{Value, json};
 
 use crate::arguments::length;
 use crate::error::bad_call;
+use crate::esdf::{EsdfArg, plane_esdf};
 use crate::output::Output;
 use crate::source::{Source, open};
 use crate::space::esdf_settings;
@@ -32,6 +33,9 @@ pub(crate) struct Args {
     /// Maps of space: distances are found up to here (metres) [default: as the map was made]
     #[arg(long, value_name = "M", value_parser = length)]
     max_distance: Option<f64>,
+    /// How the distances of a map.portolan are made; only accurate ones have bounds [default: accurate]
+    #[arg(long, value_enum)]
+    esdf: Option<EsdfArg>,
     #[command(flatten)]
     output: Output,
 }
@@ -39,6 +43,9 @@ pub(crate) struct Args {
 /// Answers at all points.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let source = open(&args.map)?;
+    if args.esdf.is_some() && !matches!(source, Source::SpaceMap(_) | Source::Map(_)) {
+        return Err(bad_call(format!("--esdf is for a map.portolan; this is {}", source.describe())));
+    }
     if args.max_distance.is_some() && !matches!(source, Source::SpaceMap(_)) {
         return Err(bad_call(format!("--max-distance is for maps of space; this is {}", source.describe())));
     }
@@ -117,6 +124,10 @@ type Occupancy<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<f64>>;
 /// Distance and gradient.
 type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>;
 
+fn sparse<const D: usize>(esdf: SparseEsdf<D>) -> Distance<D> {
+    Box::new(move |p| esdf.distance_and_gradient(p))
+}
+
 fn dense<const D: usize>(esdf: Esdf<D>) -> Distance<D> {
     Box::new(move |p| esdf.distance_and_gradient(p))
 }
@@ -124,11 +135,11 @@ fn dense<const D: usize>(esdf: Esdf<D>) -> Distance<D> {
 impl Fields {
     fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
-            Source::Map(file) => Self::Two(of_map(*file)),
+            Source::Map(file) => Self::Two(of_map(*file, args.esdf.unwrap_or_default())),
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
             Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
             Source::Server(map) => Self::Two(of_server(map)),
-            Source::SpaceMap(file) => Self::Three(of_space_map(*file, args.max_distance)?),
+            Source::SpaceMap(file) => Self::Three(of_space_map(*file, args)?),
             Source::Octomap(file) => Self::Three(of_octomap(*file)),
             other => bail!(
                 "{}: is {}; give a map.portolan or its folder, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot",
@@ -139,17 +150,14 @@ impl Fields {
     }
 }
 
-fn of_map(file: MapFile) -> Field<2> {
-    let of_tsdf = file.tsdf.as_ref().map(|t| {
-        let EsdfSettings { min_weight, band_cells } = EsdfSettings::of(t);
-        esdf_from_tsdf(t, min_weight, band_cells)
-    });
+fn of_map(file: MapFile, method: EsdfArg) -> Field<2> {
+    let of_tsdf = file.tsdf.as_ref().map(|t| sparse(plane_esdf(t, method)));
     let of_grid = || {
         let map = file.grid.as_ref()?;
         let occupied = |i: usize| map.store().at(i).map(|v| v.0 > 0);
         Some(Esdf::from_mask(*map.store().grid(), occupied))
     };
-    let distance = of_tsdf.or_else(of_grid).map(dense);
+    let distance = of_tsdf.or_else(|| of_grid().map(dense));
     let occupancy: Occupancy<2> = match (file.grid, file.tree, file.tsdf) {
         (Some(map), ..) => Box::new(move |p| map.probability(p)),
         (_, Some(map), _) => Box::new(move |p| map.probability(p)),
@@ -159,13 +167,13 @@ fn of_map(file: MapFile) -> Field<2> {
     Field { distance, occupancy, world_from_field: Pose::IDENTITY }
 }
 
-fn of_space_map(file: SpaceMapFile, max_distance: Option<f64>) -> anyhow::Result<Field<3>> {
+fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
     let saved = file.header.settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
-    let max_distance = max_distance.or(saved).unwrap_or(1.0);
-    let distance = file.tsdf.as_ref().map(|map| -> Distance<3> {
-        let how = esdf_settings(map.weights, map.carve_weight, max_distance);
-        let esdf = SparseEsdf::of(&map.store, &how);
-        Box::new(move |p| esdf.distance_and_gradient(p))
+    let max_distance = args.max_distance.or(saved).unwrap_or(1.0);
+    let distance = file.tsdf.as_ref().map(|map| {
+        let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
+        how.method = args.esdf.unwrap_or_default().method();
+        sparse(SparseEsdf::of(&map.store, &how))
     });
     let occupancy: Occupancy<3> = match (file.occupancy, file.tsdf) {
         (Some(map), _) => {

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use portolan::cell::LogOddsValue;
-use portolan::field::{Esdf, EsdfSettings, esdf_from_tsdf};
+use portolan::field::Esdf;
 use portolan::geom::Grid;
 use portolan::map::{DerivedField, Quadtree};
 use portolan::surface::{Contour, ContourSettings, DoubledLength, ThinWalls};
@@ -16,6 +16,7 @@ use portolan_io::{
 };
 
 use super::{MapKind, Settings};
+use crate::esdf::{dense_plane_esdf, status_plane};
 use crate::picture;
 use crate::stale::remove_stale;
 
@@ -29,6 +30,8 @@ pub(crate) struct Derived {
     pub(crate) doubled: DoubledLength,
     pub(crate) thin: ThinWalls,
     pub(crate) esdf: Option<Esdf<2>>,
+    /// What its cells are worth, where the reach of the method ends within the map.
+    pub(crate) esdf_status: Option<Vec<u8>>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
 }
 
@@ -49,8 +52,9 @@ impl Derived {
         }
         if settings.wants(MapKind::Esdf) {
             let start = Instant::now();
-            let EsdfSettings { min_weight, band_cells } = EsdfSettings::of(tsdf);
-            derived.esdf = Some(esdf_from_tsdf(tsdf, min_weight, band_cells));
+            let dense = dense_plane_esdf(tsdf, settings.esdf);
+            derived.esdf_status = status_plane(&dense).map(<[u8]>::to_vec);
+            derived.esdf = Esdf::from_samples(dense.grid, dense.distances).ok();
             derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
         }
         derived
@@ -82,7 +86,8 @@ impl Artefacts<'_> {
         let mut seconds = BTreeMap::new();
         let start = Instant::now();
         if let Some(esdf) = &self.derived.esdf {
-            write_esdf(folder.join("esdf.bin"), esdf.grid(), esdf.samples(), None)?;
+            let status = self.derived.esdf_status.as_deref();
+            write_esdf(folder.join("esdf.bin"), esdf.grid(), esdf.samples(), status)?;
             written.push("esdf.bin");
         }
         if let Some(contour) = &self.derived.contour {

@@ -9,6 +9,7 @@ use portolan_io::{MapFile, sweep_word, weights_word};
 use serde_json::{Map, Value, json};
 
 use super::Maps;
+use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::saved::check_agree;
 
@@ -45,6 +46,7 @@ pub(crate) struct Settings {
     pub(crate) hold_out: Option<u64>,
     pub(crate) bounds: Option<Aabb<2>>,
     pub(crate) maps: Vec<MapKind>,
+    pub(crate) esdf: EsdfArg,
 }
 
 impl Settings {
@@ -109,6 +111,7 @@ impl Settings {
             "hold_out": self.hold_out,
             "bounds": self.bounds.map(|b| [b.min[0], b.min[1], b.max[0], b.max[1]]),
             "maps": self.maps.iter().map(|&m| map_word(m)).collect::<Vec<_>>(),
+            "esdf": self.esdf.word(),
         }))
     }
 

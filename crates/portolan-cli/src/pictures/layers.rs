@@ -158,7 +158,7 @@ fn weight(canvas: &mut Canvas, view: &View, scene: &Scene) {
 }
 
 fn esdf(canvas: &mut Canvas, view: &View, scene: &Scene) {
-    let field = &scene.gallery.distance;
+    let field = scene.gallery.distance();
     canvas.fill_rect(view.rect(), color::UNKNOWN);
     pixel_raster(canvas, view, |p| match field.distance(p).known() {
         Some(d) => color::signed_distance(d, FAR).over(color::PAPER),
@@ -185,7 +185,7 @@ fn esdf(canvas: &mut Canvas, view: &View, scene: &Scene) {
 fn esdf_error(canvas: &mut Canvas, view: &View, scene: &Scene) {
     canvas.fill_rect(view.rect(), color::UNKNOWN);
     let Some(world) = scene.world else { return };
-    let field = &scene.gallery.distance;
+    let field = scene.gallery.distance();
     cell_raster(canvas, view, field.grid(), |i| {
         let p = field.grid().lattice.center(field.grid().cell(i));
         let d = f64::from(field.samples()[i]);

@@ -44,6 +44,17 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
             row
         })
         .collect();
+    let fields: Vec<Vec<String>> = gallery
+        .fields
+        .iter()
+        .map(|field| {
+            let mut row = vec![field.name().to_owned()];
+            row.extend(cells(field.against_contour));
+            row.extend(cells(field.against_truth).into_iter().take(2));
+            row.push(format!("{:.3}", field.gradient));
+            row
+        })
+        .collect();
     let picture = figure(
         &pictures::figure(Layer::EsdfError, &facts.scene),
         "wide",
@@ -56,6 +67,9 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
          compared with the true world (millimetres):</p>{}\
          <p>Too large is the direction that hurts a robot. Where a surface was never seen no map can know of it, and all of \
          them overestimate there; that is in the column too.</p>\
+         <p>Three ways to make distances of one map, against the exact distance to the extracted contour and against the world \
+         (millimetres). The accurate one measures to the contour's segments; what is left is the interpolation between cells. The \
+         text's seeds take a cell's offset to the surface to be at right angles to the way there. A mask knows whole cells.</p>{}\
          <p>Surfaces, and answers to \"is this point occupied?\" (millimetres; positive bias: in front of the true face; \
          wrong answers among points further than half a cell from any face):</p>{}\
          <p>Maps of bits stand a whole cell in front of the faces here: the faces of this apartment lie on the borders of \
@@ -71,8 +85,22 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
          <b>{:.3}</b> for the ESDF, <b>{:.3}</b> for the raw TSDF, which is constant beyond 15 cm: a planner on it stands \
          still.</p>{picture}",
         table(&header, &distances, &[]),
+        table(
+            &[
+                "distances",
+                "contour: median",
+                "99 %",
+                "too large",
+                "too small",
+                "world: median",
+                "99 %",
+                "‖∇d‖"
+            ],
+            &fields,
+            &[]
+        ),
         table(&["surface from", "median", "bias", "99 %", "occupancy wrong"], &surfaces, &[]),
-        gallery.esdf_gradient,
+        gallery.fields[0].gradient,
         gallery.tsdf_gradient,
     );
     Some(Section {

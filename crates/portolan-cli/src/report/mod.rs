@@ -12,8 +12,6 @@ mod memory;
 mod page;
 mod pictures;
 
-use portolan::gallery::ErrorSummary;
-
 use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::pictures::Scene;
 
@@ -23,8 +21,6 @@ pub(crate) struct Facts<'a> {
     pub(crate) drift: &'a Drift,
     /// `None`: left out.
     pub(crate) forgetting: Option<&'a Forgetting>,
-    /// The ESDF against the contour it was made with, which is what the text compares it with.
-    pub(crate) esdf_against_contour: Option<ErrorSummary>,
     /// Seconds that the whole run took up to here.
     pub(crate) seconds: f64,
     /// What should be known before the maps are trusted.

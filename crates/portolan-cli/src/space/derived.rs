@@ -57,7 +57,8 @@ impl Derived {
                     .push(format!("the esdf was not made: it needs {needed} more than --memory leaves"));
                 return derived;
             }
-            let how = esdf_settings(settings.weights, settings.carve_weight, settings.max_distance);
+            let mut how = esdf_settings(settings.weights, settings.carve_weight, settings.max_distance);
+            how.method = settings.esdf.method();
             derived.esdf = Some(SparseEsdf::of(&tsdf.store, &how));
             derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
         }

@@ -9,6 +9,7 @@ use portolan_io::weights_word;
 use serde_json::{Map, Value, json};
 
 use super::SpaceMaps;
+use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::mapping::{MapKind, map_word};
 use crate::saved::check_agree;
@@ -33,6 +34,7 @@ pub(crate) struct Settings {
     pub(crate) bounds: Option<Aabb<3>>,
     pub(crate) max_distance: f64,
     pub(crate) maps: Vec<MapKind>,
+    pub(crate) esdf: EsdfArg,
 }
 
 impl Settings {
@@ -102,6 +104,7 @@ impl Settings {
             "bounds": self.bounds.map(|b| [b.min, b.max].concat()),
             "max_distance": self.max_distance,
             "maps": self.maps.iter().map(|&m| map_word(m)).collect::<Vec<_>>(),
+            "esdf": self.esdf.word(),
         }))
     }
 

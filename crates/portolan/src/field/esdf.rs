@@ -1,6 +1,6 @@
 //! The Euclidean signed distance field: `(d, grad d)` anywhere, in constant time.
 
-use super::squared_distance_transform;
+use super::{SparseEsdf, SparseEsdfSettings, squared_distance_transform};
 use crate::answer::Answer;
 use crate::geom::{Grid, interpolate, vector};
 use crate::map::{Abilities, DerivedField, Tsdf};
@@ -92,6 +92,16 @@ pub fn esdf_from_tsdf<const D: usize>(tsdf: &Tsdf<D>, min_weight: f32, band_cell
 }
 
 impl<const D: usize> Esdf<D> {
+    /// The field of a dense map by any method, as an array: what [`SparseEsdf::of_tsdf`] finds, clamped to the largest
+    /// distance beyond it. O(cells) and the transform.
+    ///
+    /// # Panics
+    /// Where `max_distance` is not positive.
+    pub fn of_tsdf(tsdf: &Tsdf<D>, settings: &SparseEsdfSettings) -> Self {
+        let dense = SparseEsdf::of_tsdf(tsdf, settings).dense(tsdf.grid());
+        Self { grid: dense.grid, distance: dense.distances }
+    }
+
     /// A field of given samples, x fastest, NaN where nothing is known.
     ///
     /// # Errors

@@ -5,11 +5,15 @@ mod distance_transform;
 mod elements;
 mod envelope;
 mod esdf;
+mod mask;
+mod smooth;
 mod sparse;
 
 pub use clearance::{Clearance, ClearanceField, UnknownSpace};
 pub use distance_transform::squared_distance_transform;
 pub use esdf::{Esdf, EsdfError, EsdfSettings, esdf_from_tsdf};
+pub use mask::{MaskCell, MaskError, MaskTransform};
+pub use smooth::{FieldSlots, Interpolation, Smooth, Status};
 pub use sparse::{DenseEsdf, EsdfMethod, EsdfUpdate, SparseEsdf, SparseEsdfSettings};
 
 /// A Euclidean signed distance field of the plane.

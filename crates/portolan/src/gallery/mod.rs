@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod crossover;
+mod fields;
 mod probes;
 mod row;
 mod run;
@@ -11,6 +12,7 @@ mod table;
 
 pub use accuracy::{ErrorSummary, Truth};
 pub use crossover::{CloudCrossover, TreeCrossover};
+pub use fields::MeasuredField;
 pub use probes::Clock;
 pub use row::{Cost, LEVEL, Row, Winner, Workload};
 pub use run::{Gallery, GallerySettings, run};

@@ -2,10 +2,11 @@
 
 use super::accuracy::{ErrorSummary, Truth};
 use super::crossover::{CloudCrossover, TreeCrossover, cloud_crossover};
+use super::fields::{MeasuredField, against_contour, fields_of};
 use super::probes::{Clock, points, seconds_of, seconds_per_probe};
 use super::row::{Cost, Row, Winner, winners};
 use crate::cell::OccupancyModel;
-use crate::field::{Esdf2, EsdfSettings, esdf_from_tsdf};
+use crate::field::{Esdf2, EsdfSettings};
 use crate::geom::{Aabb, Grid, Pose, vector};
 use crate::map::{
     Cloud, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config, inner_only_node_bytes,
@@ -25,7 +26,7 @@ pub struct GallerySettings {
     pub model: OccupancyModel,
     /// Contour extraction.
     pub contour: ContourSettings,
-    /// The distance transform.
+    /// The distance transforms.
     pub esdf: EsdfSettings,
     /// Number of probes for direct answers; searches get a fiftieth.
     pub probes: usize,
@@ -49,20 +50,25 @@ pub struct Gallery {
     pub cloud_crossover: CloudCrossover,
     /// Median gradient norm of the raw TSDF (central differences) over observed free probes.
     pub tsdf_gradient: f64,
-    /// Median gradient norm of the ESDF over the same probes.
-    pub esdf_gradient: f64,
+    /// Distance fields of the TSDF by every method, the accurate one first: the one of the rows.
+    pub fields: [MeasuredField; 3],
     /// The grid, for pictures.
     pub occupancy: OccupancyGrid<2>,
     /// The tree on the grid's own lattice, for pictures.
     pub tree: Quadtree,
     /// The TSDF with carving, for pictures.
     pub tsdf: Tsdf2,
-    /// The ESDF, for pictures.
-    pub distance: Esdf2,
     /// The contour, for pictures.
     pub contour: Contour,
     /// The cloud, for pictures.
     pub cloud: Cloud<2>,
+}
+
+impl Gallery {
+    /// The accurate distance field.
+    pub fn distance(&self) -> &Esdf2 {
+        &self.fields[0].field
+    }
 }
 
 /// Runs the whole comparison. Scans are fused one after the other on the calling thread.
@@ -94,8 +100,8 @@ pub fn run(
     let mut cloud = Cloud::new();
     let cloud_update = fuse_all(clock, log, |at, scan| cloud.integrate(at, scan));
     let (cloud_build, ()) = seconds_of(clock, || cloud.rebuild());
-    let (min_weight, band) = (settings.esdf.min_weight, settings.esdf.band_cells);
-    let (esdf_build, distance) = seconds_of(clock, || esdf_from_tsdf(&tsdf, min_weight, band));
+    let min_weight = settings.esdf.min_weight;
+    let mut fields = fields_of(clock, &tsdf, &settings.esdf);
     let (contour_build, contour) = seconds_of(clock, || marching_squares(&tsdf, &settings.contour));
 
     let everywhere = points(&grid.aabb(), settings.probes);
@@ -178,15 +184,16 @@ pub fn run(
             ..Default::default()
         });
     }
+    let distance = &fields[0].field;
     let observed = |i: usize| !distance.samples()[i].is_nan();
     let (zero_build, zero) =
         seconds_of(clock, || level_set(&grid, distance.samples(), observed, Ambiguity::Decide));
-    let esdf_occupancy = |p| crate::map::DerivedField::occupancy(&distance, p);
+    let esdf_occupancy = |p| crate::map::DerivedField::occupancy(distance, p);
     rows.push(Row {
         name: "ESDF, f32".into(),
-        memory_bytes: crate::map::DerivedField::memory_bytes(&distance),
+        memory_bytes: crate::map::DerivedField::memory_bytes(distance),
         derived: true,
-        update: Cost::by(esdf_build, "full rebuild"),
+        update: Cost::by(fields[0].seconds, "full rebuild"),
         occupancy: Cost::by(
             seconds_per_probe(clock, &everywhere, |p| esdf_occupancy(p).unwrap_or(0.0)),
             "sign of d",
@@ -198,7 +205,7 @@ pub fn run(
         occupancy_wrong: asker.wrong(esdf_occupancy),
         distance_error: asker.distance_error(|p| distance.distance(p).known()),
         surface_error: asker.surface_error(&zero),
-        note: "the chapter's seeding".into(),
+        note: "distances to the contour's segments".into(),
     });
     rows.push(Row {
         name: "extracted contour".into(),
@@ -232,7 +239,13 @@ pub fn run(
     let esdf_seconds =
         rows.iter().find(|r| r.name.starts_with("ESDF")).and_then(|r| r.distance).map_or(0.0, |c| c.seconds);
     let cloud_crossover = cloud_crossover(clock, cloud.points(), few, esdf_seconds);
-    let (tsdf_gradient, esdf_gradient) = gradients(&tsdf, &distance, &asker.free);
+    for measured in &mut fields {
+        measured.against_contour = against_contour(&measured.field, &contour, &asker.free);
+        measured.against_truth = asker.distance_error(|p| measured.field.distance(p).known());
+        let norms = asker.free.iter().filter_map(|&p| measured.field.gradient(p).known().map(vector::norm));
+        measured.gradient = median(norms.collect());
+    }
+    let tsdf_gradient = gradient(&tsdf, &asker.free);
     let (winners, never_win) = winners(&rows);
     let trees = tree_crossovers(settings, &grid, &contour, &tree, &chapter_tree);
     Ok(Gallery {
@@ -242,11 +255,10 @@ pub fn run(
         trees,
         cloud_crossover,
         tsdf_gradient,
-        esdf_gradient,
+        fields,
         occupancy,
         tree,
         tsdf,
-        distance,
         contour,
         cloud,
     })
@@ -345,29 +357,24 @@ impl Asker<'_> {
     }
 }
 
-/// Median gradient norms over probes where both fields have one.
-fn gradients(tsdf: &Tsdf2, esdf: &Esdf2, probes: &[[f64; 2]]) -> (f64, f64) {
+/// Median gradient norm over probes around which the map was observed.
+fn gradient(tsdf: &Tsdf2, probes: &[[f64; 2]]) -> f64 {
     let h = tsdf.config().resolution;
     let value =
         |p: [f64; 2]| tsdf.grid().index_of(p).and_then(|i| tsdf.store().at(i)).map(|c| f64::from(c.distance));
-    let (mut raw, mut euclidean) = (Vec::new(), Vec::new());
-    for &p in probes {
-        let slope = |k: usize| {
-            let (mut low, mut high) = (p, p);
-            low[k] -= h;
-            high[k] += h;
-            Some((value(high)? - value(low)?) / (2.0 * h))
-        };
-        if let (Some(x), Some(y), Some(g)) = (slope(0), slope(1), esdf.gradient(p).known()) {
-            raw.push(x.hypot(y));
-            euclidean.push(vector::norm(g));
-        }
-    }
-    let median = |mut v: Vec<f64>| {
-        v.sort_by(f64::total_cmp);
-        v.get(v.len() / 2).copied().unwrap_or(f64::NAN)
+    let slope = |p: [f64; 2], k: usize| {
+        let (mut low, mut high) = (p, p);
+        low[k] -= h;
+        high[k] += h;
+        Some((value(high)? - value(low)?) / (2.0 * h))
     };
-    (median(raw), median(euclidean))
+    median(probes.iter().filter_map(|&p| Some(slope(p, 0)?.hypot(slope(p, 1)?))).collect())
+}
+
+/// NaN of nothing.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn tree_crossovers(

@@ -55,23 +55,7 @@ impl std::fmt::Display for Gallery {
                 millimetres(row.surface_error),
             ]);
         }
-        let width = |c: usize| lines.iter().map(|l| l[c].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..header.len()).map(width).collect();
-        for (n, line) in lines.iter().enumerate() {
-            let mut text = String::new();
-            for (c, cell) in line.iter().enumerate() {
-                let w = widths[c];
-                if c == 0 {
-                    write!(text, "{cell:w$}")?
-                } else {
-                    write!(text, "  {cell:>w$}")?
-                };
-            }
-            writeln!(f, "{}", text.trim_end())?;
-            if n == 0 {
-                writeln!(f, "{}", "-".repeat(widths.iter().sum::<usize>() + 2 * (header.len() - 1)))?;
-            }
-        }
+        aligned(f, &lines)?;
         writeln!(
             f,
             "\n\"+\": on top of the TSDF it is derived from; its update is a full rebuild. \"-\": cannot answer."
@@ -102,8 +86,53 @@ impl std::fmt::Display for Gallery {
         }
         writeln!(
             f,
-            "median gradient norm at observed free points: TSDF {:.3}, ESDF {:.3}",
-            self.tsdf_gradient, self.esdf_gradient
-        )
+            "median gradient norm of the raw TSDF at observed free points: {:.3}\n",
+            self.tsdf_gradient
+        )?;
+        let header = [
+            "distance field",
+            "rebuild",
+            "off the contour",
+            "99 %",
+            "too large by",
+            "off the world",
+            "gradient",
+        ];
+        let mm = |v: Option<f64>| v.map_or("-".into(), |v| format!("{:.2} mm", 1e3 * v));
+        let mut lines = vec![header.map(String::from)];
+        lines.extend(self.fields.iter().map(|field| {
+            [
+                field.name().into(),
+                format!("{} ms", format_ms(field.seconds)),
+                mm(field.against_contour.map(|e| e.median)),
+                mm(field.against_contour.map(|e| e.p99)),
+                mm(field.against_contour.map(|e| e.worst_over)),
+                mm(field.against_truth.map(|e| e.median)),
+                format!("{:.3}", field.gradient),
+            ]
+        }));
+        aligned(f, &lines)
     }
+}
+
+/// Columns under their headers; the first to the left, the others to the right.
+fn aligned<const N: usize>(f: &mut std::fmt::Formatter<'_>, lines: &[[String; N]]) -> std::fmt::Result {
+    let width = |c: usize| lines.iter().map(|l| l[c].chars().count()).max().unwrap_or(0);
+    let widths: [usize; N] = std::array::from_fn(width);
+    for (n, line) in lines.iter().enumerate() {
+        let mut text = String::new();
+        for (c, cell) in line.iter().enumerate() {
+            let w = widths[c];
+            if c == 0 {
+                write!(text, "{cell:w$}")?
+            } else {
+                write!(text, "  {cell:>w$}")?
+            };
+        }
+        writeln!(f, "{}", text.trim_end())?;
+        if n == 0 {
+            writeln!(f, "{}", "-".repeat(widths.iter().sum::<usize>() + 2 * (N - 1)))?;
+        }
+    }
+    Ok(())
 }

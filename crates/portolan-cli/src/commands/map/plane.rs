@@ -12,6 +12,7 @@ use super::common::{CARVE_WEIGHT, Watch, start_threads, three_cells, title};
 use super::{Args, SweepArg};
 use crate::arguments::Bounds;
 use crate::error::bad_call;
+use crate::esdf::EsdfArg;
 use crate::json;
 use crate::log::{self, Selection};
 use crate::mapping::{
@@ -165,6 +166,7 @@ impl Args {
             hold_out: self.hold_out.or(saved.number("hold_out").map(|n| n as u64)),
             bounds,
             maps,
+            esdf: self.esdf.or(saved.0.and_then(EsdfArg::of_settings)).unwrap_or_default(),
         }
     }
 

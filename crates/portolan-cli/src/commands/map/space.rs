@@ -13,6 +13,7 @@ use super::common::{CARVE_WEIGHT, Watch, start_threads, three_cells, title};
 use super::{Args, SweepArg};
 use crate::arguments::Bounds;
 use crate::error::bad_call;
+use crate::esdf::EsdfArg;
 use crate::json;
 use crate::log::{self, Selection};
 use crate::mapping::MapKind;
@@ -215,6 +216,7 @@ impl Args {
             bounds,
             max_distance: self.max_distance.or(saved.number("max_distance")).unwrap_or(1.0),
             maps,
+            esdf: self.esdf.or(saved.0.and_then(EsdfArg::of_settings)).unwrap_or_default(),
         })
     }
 

@@ -177,7 +177,7 @@ impl<const D: usize> SparseEsdf<D> {
     /// The `2^D` values from `base` on, clamped to the largest distance, and whether one of them was; `None` where one
     /// is unknown.
     #[inline]
-    fn corners(&self, base: [i32; D]) -> Option<([f32; 8], bool)> {
+    pub(in crate::field) fn corners(&self, base: [i32; D]) -> Option<([f32; 8], bool)> {
         let mut corners = [0.0; 8];
         let key = BlockKey::of_cell(base);
         let inside = (0..D).all(|k| (base[k] & 7) < BLOCK_EDGE as i32 - 1);
@@ -199,9 +199,14 @@ impl<const D: usize> SparseEsdf<D> {
     }
 
     #[inline]
-    pub(super) fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
-        let slot = self.slot(key)?;
-        Some(self.bricks[slot].distance.get_or_init(|| self.measured(slot, &mut Refine::new())))
+    pub(in crate::field) fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
+        Some(self.plane(self.slot(key)?))
+    }
+
+    /// Signed distances of the brick in a slot, measured if nobody has read them yet.
+    #[inline]
+    pub(super) fn plane(&self, slot: usize) -> &[f32] {
+        self.bricks[slot].distance.get_or_init(|| self.measured(slot, &mut Refine::new()))
     }
 
     #[inline]

@@ -1,0 +1,237 @@
+//! Fields as numpy arrays in the layout of who takes them.
+
+use std::path::Path;
+
+use anyhow::bail;
+use portolan::field::{DenseEsdf, UnknownSpace};
+use portolan::handover::{CuroboGrid, CuroboVersion, Filled, Gpmp2Field, KnotGrid, c_order, f16_from_f32};
+use portolan_io::{NpyArray, NpyValues, write_npy, write_npz};
+
+use super::field::Field;
+use crate::arguments::length;
+use crate::error::bad_call;
+
+/// Who takes the arrays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Layout {
+    /// distance, status, origin, resolution, shape: indexed [x, y, z]
+    #[default]
+    Plain,
+    /// data: a row for every y, a column for every x, a matrix for every z; origin is the centre of cell 0
+    Gpmp2,
+    /// values for `interpolant`, the first axis fastest, and the knots x, y, z (acados too)
+    Casadi,
+    /// feature_tensor, dims, pose, voxel_size of cuRobo from 0.8 on: x slowest, half precision
+    Curobo,
+    /// The same up to 0.7, which is positive inside of obstacles
+    Curobo07,
+}
+
+/// Order of a plain array in memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Order {
+    /// The last axis fastest
+    #[default]
+    C,
+    /// The first axis fastest (Fortran), which is portolan's own
+    F,
+}
+
+/// What unknown space is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum UnknownArg {
+    /// Free
+    Optimistic,
+    /// An obstacle
+    Pessimistic,
+}
+
+impl UnknownArg {
+    /// The library's word.
+    pub(crate) fn space(self) -> UnknownSpace {
+        match self {
+            Self::Optimistic => UnknownSpace::Optimistic,
+            Self::Pessimistic => UnknownSpace::Pessimistic,
+        }
+    }
+}
+
+/// Precision of distances.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Precision {
+    F16,
+    F32,
+    F64,
+}
+
+/// Options of .npz and .npy.
+#[derive(Clone, Copy, Debug, clap::Args)]
+#[command(next_help_heading = "Arrays (.npz, .npy)")]
+pub(crate) struct ArrayArgs {
+    /// Who takes the arrays
+    #[arg(long, value_enum, default_value_t)]
+    layout: Layout,
+    /// Order in memory, for --layout plain [default: c]
+    #[arg(long, value_enum)]
+    order: Option<Order>,
+    /// What unknown cells become: free or an obstacle, without a step at the border. Plain arrays keep NaN without it;
+    /// all others have no word for unknown
+    #[arg(long, value_enum)]
+    pub(super) unknown: Option<UnknownArg>,
+    /// No distance beyond this (metres) [default: the largest there is]
+    #[arg(long, value_name = "M", value_parser = length)]
+    far: Option<f64>,
+    /// Precision of the distances [default: f32; gpmp2 and casadi f64, curobo f16]
+    #[arg(long, value_enum)]
+    precision: Option<Precision>,
+}
+
+impl ArrayArgs {
+    /// Whether one of them was given.
+    pub(super) fn asked(&self) -> bool {
+        let Self { layout, order, unknown: _, far, precision } = self;
+        *layout != Layout::Plain || order.is_some() || far.is_some() || precision.is_some()
+    }
+
+    /// Writes the field as .npz, or its main array as .npy.
+    pub(super) fn write(&self, field: &Field, out: &Path) -> anyhow::Result<()> {
+        let arrays = match field {
+            Field::Two(field) => self.arrays(field)?,
+            Field::Three(field) => match self.layout {
+                Layout::Curobo | Layout::Curobo07 => self.curobo(&self.filled(field)?),
+                _ => self.arrays(field)?,
+            },
+        };
+        let Some((_, main)) = arrays.first() else { bail!("there is no array") };
+        if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
+            write_npy(out, main)?;
+        } else {
+            let list: Vec<_> = arrays.iter().map(|(name, array)| (*name, array)).collect();
+            write_npz(out, &list)?;
+        }
+        Ok(())
+    }
+
+    /// The arrays with their names, the main one first.
+    fn arrays<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
+        if self.order.is_some() && self.layout != Layout::Plain {
+            return Err(bad_call("--order is for --layout plain; the others have theirs"));
+        }
+        let mut arrays = match self.layout {
+            Layout::Plain => return self.plain(field),
+            Layout::Gpmp2 => {
+                let given = Gpmp2Field::of(&self.filled(field)?);
+                let shape = [given.layers, given.rows, given.columns];
+                let data = self.distances(&given.values, Precision::F64);
+                vec![
+                    ("data", NpyArray::c(&shape[3 - D..], data)),
+                    ("origin", NpyArray::vector(&given.origin)),
+                    ("cell_size", NpyArray::number(given.cell_size)),
+                ]
+            }
+            Layout::Casadi => {
+                let given = KnotGrid::of(&self.filled(field)?);
+                let values = self.distances(&given.values, Precision::F64);
+                let mut arrays = vec![("values", NpyArray::c([given.values.len()], values))];
+                let knots = given.knots.iter().map(|k| NpyArray::vector(k));
+                arrays.extend(["x", "y", "z"].into_iter().zip(knots));
+                arrays
+            }
+            Layout::Curobo | Layout::Curobo07 => {
+                bail!("cuRobo's grids are in space; the map is in the plane")
+            }
+        };
+        arrays.extend(self.words());
+        Ok(arrays)
+    }
+
+    fn plain<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
+        let distances = match self.unknown {
+            None => {
+                let far = self.far.map_or(f32::INFINITY, |far| far as f32);
+                field.distances.iter().map(|d| d.clamp(-far, far)).collect()
+            }
+            Some(_) => self.filled(field)?.values,
+        };
+        let shape = field.grid.shape;
+        let as_doubles = |values: &[f32]| values.iter().map(|d| f64::from(*d)).collect::<Vec<_>>();
+        let (distance, status) = match self.order.unwrap_or_default() {
+            Order::C => (
+                NpyArray::c(shape, self.distances(&as_doubles(&c_order(&distances, shape)), Precision::F32)),
+                NpyArray::c(shape, NpyValues::U8(c_order(&field.status, shape))),
+            ),
+            Order::F => (
+                NpyArray::fortran(shape, self.distances(&as_doubles(&distances), Precision::F32)),
+                NpyArray::fortran(shape, NpyValues::U8(field.status.clone())),
+            ),
+        };
+        let mut arrays = vec![
+            ("distance", distance),
+            ("status", status),
+            ("origin", NpyArray::vector(&field.grid.lattice.origin)),
+            ("resolution", NpyArray::number(field.grid.lattice.resolution)),
+            ("shape", NpyArray::c([D], NpyValues::I64(shape.iter().map(|n| *n as i64).collect()))),
+            ("order", NpyArray::text(if self.order == Some(Order::F) { "F" } else { "C" })),
+        ];
+        arrays.extend(self.words());
+        Ok(arrays)
+    }
+
+    fn curobo(&self, field: &Filled<3>) -> Vec<(&'static str, NpyArray)> {
+        let version =
+            if self.layout == Layout::Curobo07 { CuroboVersion::UpTo07 } else { CuroboVersion::From08 };
+        let grid = CuroboGrid::of(field, version);
+        let values: Vec<f64> = grid.values.iter().map(|d| f64::from(*d)).collect();
+        let mut arrays = vec![
+            ("feature_tensor", NpyArray::c(grid.shape, self.distances(&values, Precision::F16))),
+            ("dims", NpyArray::vector(&grid.dims)),
+            ("pose", NpyArray::vector(&grid.pose)),
+            ("voxel_size", NpyArray::number(grid.voxel_size)),
+        ];
+        arrays.extend(self.words());
+        arrays
+    }
+
+    /// What the arrays are, for who opens them later.
+    fn words(&self) -> [(&'static str, NpyArray); 2] {
+        let layout = match self.layout {
+            Layout::Plain => "plain",
+            Layout::Gpmp2 => "gpmp2",
+            Layout::Casadi => "casadi",
+            Layout::Curobo => "curobo",
+            Layout::Curobo07 => "curobo07",
+        };
+        let unknown = match self.unknown {
+            None => "nan",
+            Some(UnknownArg::Optimistic) => "optimistic",
+            Some(UnknownArg::Pessimistic) => "pessimistic",
+        };
+        [("layout", NpyArray::text(layout)), ("unknown", NpyArray::text(unknown))]
+    }
+
+    /// The field without unknown. What unknown is has to be said where there is any.
+    fn filled<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Filled<D>> {
+        let unknown = field.distances.iter().filter(|d| d.is_nan()).count();
+        let space = match self.unknown {
+            Some(unknown) => unknown.space(),
+            None if unknown == 0 => UnknownSpace::Pessimistic,
+            None => {
+                return Err(bad_call(format!(
+                    "{unknown} cells are unknown, which this layout has no word for; say --unknown optimistic (free) or \
+                     --unknown pessimistic (an obstacle)"
+                )));
+            }
+        };
+        let largest = field.distances.iter().filter(|d| d.is_finite()).fold(0.0f32, |m, d| m.max(d.abs()));
+        let far = self.far.unwrap_or(f64::from(largest).max(field.grid.lattice.resolution));
+        Ok(Filled::new(&field.grid, &field.distances, space, far)?)
+    }
+
+    fn distances(&self, values: &[f64], usual: Precision) -> NpyValues {
+        match self.precision.unwrap_or(usual) {
+            Precision::F16 => NpyValues::F16(values.iter().map(|d| f16_from_f32(*d as f32)).collect()),
+            Precision::F32 => NpyValues::F32(values.iter().map(|d| *d as f32).collect()),
+            Precision::F64 => NpyValues::F64(values.to_vec()),
+        }
+    }
+}

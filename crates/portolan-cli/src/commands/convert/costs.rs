@@ -1,0 +1,113 @@
+//! Costmaps of Nav2.
+
+use std::path::Path;
+
+use anyhow::bail;
+use portolan::cell::DistancePlanes;
+use portolan::field::{DenseEsdf, UnknownSpace};
+use portolan::geom::Grid;
+use portolan::handover::{Inflation, lowest_between};
+use portolan::map::{Tsdf, TsdfConfig};
+use portolan::store::Dense;
+use portolan_io::{MapMode, write_costmap};
+
+use super::field::Field;
+use crate::arguments::{heights, length_or_zero};
+use crate::error::bad_call;
+use crate::esdf::{EsdfArg, dense_plane_esdf};
+
+/// How costs become pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Mode {
+    /// Percents as Nav2 publishes them, 255 unknown
+    Raw,
+    /// Occupied (lethal and inscribed), free, unknown
+    Trinary,
+    /// Shades of grey; no unknown
+    Scale,
+}
+
+/// Options of costmaps.
+#[derive(Clone, Copy, Debug, clap::Args)]
+#[command(next_help_heading = "Costmaps of Nav2 (.yaml with its .pgm)")]
+pub(crate) struct CostArgs {
+    /// Inflation radius (metres): costs decay with the distance up to here; makes a costmap
+    #[arg(long, value_name = "M", value_parser = length_or_zero)]
+    inflate: Option<f64>,
+    /// Inscribed radius of the robot (metres): cost 253 up to here [default: 0]
+    #[arg(long, value_name = "M", value_parser = length_or_zero, requires = "inflate")]
+    inscribed: Option<f64>,
+    /// cost_scaling_factor: how fast costs decay (1/m) [default: 3]
+    #[arg(long, value_name = "K", value_parser = length_or_zero, requires = "inflate")]
+    scaling: Option<f64>,
+    /// mode of map_server [default: raw with --inflate, else trinary]
+    #[arg(long, value_enum)]
+    mode: Option<Mode>,
+    /// Maps of space: obstacles between these heights LOW:HIGH (metres) count, and distances are made in the plane
+    #[arg(long, value_name = "LOW:HIGH", value_parser = heights, allow_hyphen_values = true)]
+    z: Option<[f64; 2]>,
+}
+
+impl CostArgs {
+    /// Whether a costmap is wanted.
+    pub(super) fn asked(&self) -> bool {
+        self.inflate.is_some() || self.mode.is_some() || self.z.is_some()
+    }
+
+    /// Writes the costs of a field of the plane, or of a layer of one of space.
+    pub(super) fn write(
+        &self,
+        field: &Field,
+        unknown: Option<UnknownSpace>,
+        yaml: &Path,
+    ) -> anyhow::Result<()> {
+        let how = Inflation {
+            inflation_radius: self.inflate.unwrap_or(0.0),
+            inscribed_radius: self.inscribed.unwrap_or(0.0),
+            cost_scaling_factor: self.scaling.unwrap_or(Inflation::default().cost_scaling_factor),
+        };
+        let how = how.validate().map_err(|e| bad_call(e.to_string()))?;
+        let (grid, costs) = match (field, self.z) {
+            (Field::Two(_), Some(_)) => return Err(bad_call("--z is for maps of space")),
+            (Field::Three(_), None) => {
+                return Err(bad_call("a costmap is in the plane: say with --z LOW:HIGH which heights count"));
+            }
+            (Field::Two(field), None) => (field.grid, how.costs(&field.distances)),
+            (Field::Three(field), Some(heights)) => {
+                let Some(unknown) = unknown else {
+                    return Err(bad_call(
+                        "what is a column of which a part is unknown? say --unknown optimistic (what is known of it) or \
+                         --unknown pessimistic (unknown)",
+                    ));
+                };
+                let layer = in_the_plane(field, heights, unknown)?;
+                (layer.grid, how.costs(&layer.distances))
+            }
+        };
+        let mode = match self.mode {
+            Some(Mode::Raw) => MapMode::Raw,
+            Some(Mode::Scale) => MapMode::Scale,
+            Some(Mode::Trinary) => MapMode::Trinary,
+            None if self.inflate.is_some() => MapMode::Raw,
+            None => MapMode::Trinary,
+        };
+        Ok(write_costmap(yaml, &grid, &costs, mode)?)
+    }
+}
+
+/// Distances in the plane to what stands between two heights.
+fn in_the_plane(
+    field: &DenseEsdf<3>,
+    heights: [f64; 2],
+    unknown: UnknownSpace,
+) -> anyhow::Result<DenseEsdf<2>> {
+    let (grid, lowest): (Grid<2>, _) = lowest_between(&field.grid, &field.distances, heights, unknown)?;
+    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
+    let (distances, weights) = lowest.iter().map(known).unzip();
+    let planes = DistancePlanes::from_parts(distances, weights);
+    let Some(store) = planes.and_then(|p| Dense::from_planes(grid, p)) else {
+        bail!("the distance field has values that are not finite")
+    };
+    let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
+    Ok(dense_plane_esdf(&tsdf, EsdfArg::Accurate))
+}

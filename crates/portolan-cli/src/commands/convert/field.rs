@@ -1,0 +1,142 @@
+//! The distance field of anything that has one, as arrays.
+
+use anyhow::bail;
+use portolan::field::{DenseEsdf, Esdf, SparseEsdf};
+use portolan::geom::{Aabb, Grid};
+use portolan_io::{EsdfBin, EsdfFile};
+use serde_json::Value;
+
+use super::{Args, esdf_of_cells, esdf_of_server};
+use crate::arguments::Bounds;
+use crate::error::bad_call;
+use crate::esdf::{EsdfArg, dense_plane_esdf, known_where_finite};
+use crate::mapping::cells_for_map_server;
+use crate::source::Source;
+use crate::space::{dense_esdf, esdf_settings};
+
+/// A field in the plane or in space.
+pub(super) enum Field {
+    Two(DenseEsdf<2>),
+    Three(DenseEsdf<3>),
+}
+
+impl Field {
+    /// The field of a source, the asked box of it; `None`: it has none.
+    pub(super) fn of(source: &Source, args: &Args) -> anyhow::Result<Option<Self>> {
+        Ok(Some(match source {
+            Source::Map(file) => match &file.tsdf {
+                Some(tsdf) => {
+                    let method =
+                        args.esdf.or(EsdfArg::of_settings(&file.header.settings)).unwrap_or_default();
+                    Self::Two(in_plane(dense_plane_esdf(tsdf, method), args)?)
+                }
+                None => {
+                    let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(None) };
+                    Self::Two(in_plane(of_samples(esdf_of_cells(grid, &cells)), args)?)
+                }
+            },
+            Source::Server(map) => {
+                if map.yaw != 0.0 {
+                    bail!(
+                        "{}: the map is turned by yaw {} rad, which {} cannot hold; turn the image and set yaw to 0",
+                        args.input.display(),
+                        map.yaw,
+                        args.out.display()
+                    );
+                }
+                Self::Two(in_plane(of_samples(esdf_of_server(map)), args)?)
+            }
+            Source::Esdf(EsdfFile::Two(field)) => Self::Two(in_plane(of_file(field), args)?),
+            Source::Esdf(EsdfFile::Three(field)) => {
+                let dense = of_file(field);
+                Self::Three(match space_bounds(args)? {
+                    Some(bounds) => cropped(dense, &bounds, args)?,
+                    None => dense,
+                })
+            }
+            Source::SpaceMap(file) => {
+                let Some(map) = &file.tsdf else { return Ok(None) };
+                let settings = &file.header.settings;
+                let saved = settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
+                let mut how =
+                    esdf_settings(map.weights, map.carve_weight, args.max_distance.or(saved).unwrap_or(1.0));
+                how.method = args.esdf.or(EsdfArg::of_settings(settings)).unwrap_or_default().method();
+                match dense_esdf(&SparseEsdf::of(&map.store, &how), space_bounds(args)?.as_ref()) {
+                    Ok(dense) => Self::Three(dense),
+                    Err(why) => {
+                        bail!("{}: {}", args.input.display(), why.replace("--dense", "--bounds"))
+                    }
+                }
+            }
+            _ => return Ok(None),
+        }))
+    }
+}
+
+fn of_samples(esdf: Esdf<2>) -> DenseEsdf<2> {
+    known_where_finite(*esdf.grid(), esdf.samples().to_vec())
+}
+
+/// A file's field: what its status calls unknown is.
+fn of_file<const D: usize>(file: &EsdfBin<D>) -> DenseEsdf<D> {
+    let mut dense = known_where_finite(file.grid, file.distances.clone());
+    for (i, &status) in file.status.iter().flatten().enumerate() {
+        if status == EsdfBin::<D>::UNKNOWN {
+            dense.distances[i] = f32::NAN;
+        }
+        dense.status[i] = if dense.distances[i].is_nan() { EsdfBin::<D>::UNKNOWN } else { status };
+    }
+    dense
+}
+
+fn in_plane(dense: DenseEsdf<2>, args: &Args) -> anyhow::Result<DenseEsdf<2>> {
+    match args.bounds {
+        None => Ok(dense),
+        Some(Bounds::Plane(bounds)) => cropped(dense, &bounds, args),
+        Some(Bounds::Space(_)) => {
+            Err(bad_call("--bounds of a map of the plane has four numbers x0,y0,x1,y1"))
+        }
+    }
+}
+
+fn space_bounds(args: &Args) -> anyhow::Result<Option<Aabb<3>>> {
+    match args.bounds {
+        None => Ok(None),
+        Some(Bounds::Space(bounds)) => Ok(Some(bounds)),
+        Some(Bounds::Plane(_)) => {
+            Err(bad_call("--bounds of a map of space has six numbers x0,y0,z0,x1,y1,z1"))
+        }
+    }
+}
+
+/// The cells that a box touches, not those that only begin where it ends.
+fn cropped<const D: usize>(
+    dense: DenseEsdf<D>,
+    bounds: &Aabb<D>,
+    args: &Args,
+) -> anyhow::Result<DenseEsdf<D>> {
+    let Grid { lattice, shape } = dense.grid;
+    let cells = |v: f64, k: usize| (v - lattice.origin[k]) / lattice.resolution;
+    // A millionth of a cell: a box of multiples of the resolution shall not gain a cell by rounding.
+    let first: [usize; D] = std::array::from_fn(|k| {
+        (cells(bounds.min[k], k) + 1e-6).floor().clamp(0.0, shape[k] as f64) as usize
+    });
+    let end: [usize; D] =
+        std::array::from_fn(|k| (cells(bounds.max[k], k) - 1e-6).ceil().clamp(0.0, shape[k] as f64) as usize);
+    if (0..D).any(|k| first[k] >= end[k]) {
+        bail!("{}: no cell of the map lies in --bounds", args.input.display());
+    }
+    let grid = Grid::new(
+        lattice.corner(first.map(|v| v as i32)),
+        lattice.resolution,
+        std::array::from_fn(|k| end[k] - first[k]),
+    );
+    let strides = dense.grid.strides();
+    let from = |i: usize| {
+        let cell = grid.cell(i);
+        (0..D).map(|k| (first[k] + cell[k] as usize) * strides[k]).sum::<usize>()
+    };
+    let (distances, status) =
+        (0..grid.len()).map(from).map(|i| (dense.distances[i], dense.status[i])).unzip();
+    Ok(DenseEsdf { grid, distances, status })
+}

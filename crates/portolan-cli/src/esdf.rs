@@ -1,0 +1,74 @@
+//! How distance fields are made of maps.
+
+use portolan::field::{DenseEsdf, EsdfMethod, EsdfSettings, SparseEsdf, SparseEsdfSettings};
+use portolan::geom::{Grid, vector};
+use portolan::map::Tsdf;
+use serde_json::{Map, Value};
+
+/// What distances are measured to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum EsdfArg {
+    /// The extracted surface
+    #[default]
+    Accurate,
+    /// The chapter's seeds: cells near the surface with their own estimates
+    Seeded,
+    /// The nearest cell of the other sign
+    Mask,
+}
+
+impl EsdfArg {
+    /// The library's word.
+    pub(crate) fn method(self) -> EsdfMethod {
+        match self {
+            Self::Accurate => EsdfMethod::Accurate,
+            Self::Seeded => EsdfMethod::Seeded { band_cells: 1.5 },
+            Self::Mask => EsdfMethod::Mask,
+        }
+    }
+
+    /// The word in files and on the command line.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Accurate => "accurate",
+            Self::Seeded => "seeded",
+            Self::Mask => "mask",
+        }
+    }
+
+    /// What a map was made with.
+    pub(crate) fn of_settings(settings: &Map<String, Value>) -> Option<Self> {
+        let word = settings.get("esdf").and_then(Value::as_str)?;
+        [Self::Accurate, Self::Seeded, Self::Mask].into_iter().find(|method| method.word() == word)
+    }
+}
+
+/// The field of a map of the plane, as far as the method reaches (509 cells where it is accurate).
+pub(crate) fn plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg) -> SparseEsdf<2> {
+    let grid = tsdf.grid();
+    let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
+    let min_weight = EsdfSettings::of(tsdf).min_weight;
+    let how = SparseEsdfSettings {
+        min_weight,
+        max_distance,
+        method: method.method(),
+        ..SparseEsdfSettings::default()
+    };
+    SparseEsdf::of_tsdf(tsdf, &how)
+}
+
+/// The cells of a map of the plane.
+pub(crate) fn dense_plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg) -> DenseEsdf<2> {
+    plane_esdf(tsdf, method).dense(tsdf.grid())
+}
+
+/// The status plane of a file, where there is something to say that NaN does not.
+pub(crate) fn status_plane<const D: usize>(dense: &DenseEsdf<D>) -> Option<&[u8]> {
+    dense.status.contains(&2).then_some(&dense.status[..])
+}
+
+/// A field of samples that are known where they are numbers.
+pub(crate) fn known_where_finite<const D: usize>(grid: Grid<D>, distances: Vec<f32>) -> DenseEsdf<D> {
+    let status = distances.iter().map(|d| u8::from(!d.is_nan())).collect();
+    DenseEsdf { grid, distances, status }
+}

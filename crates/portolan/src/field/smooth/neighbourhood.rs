@@ -1,0 +1,162 @@
+//! The samples around a point, of dense fields and of fields in bricks.
+
+use super::cubic::{Neighbourhood, Smooth, complete, cubic};
+use crate::answer::Answer;
+use crate::field::{Esdf, SparseEsdf};
+use crate::geom::{BLOCK_EDGE, BlockKey, vector};
+
+/// The point's cell (the lower one of the two centres beside it, along every axis) and its place in it, or why there is
+/// none.
+type Place<const D: usize> = Answer<([i32; D], [f64; D])>;
+
+impl<const D: usize> Esdf<D> {
+    /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centres around a point, for
+    /// optimisers that take the jumps of [`Esdf::gradient`] ill. O(1).
+    ///
+    /// Cubic through the samples; linear and quadratic fields are reproduced, and between samples it may pass them by an
+    /// eighth of their second difference. Unknown where [`Esdf::distance`] is: where one of the `2^D` centres next to the
+    /// point is. Others that are missing, at the border of the map or of what is known, are replaced by the straight line
+    /// through the two next to them: within a cell of what is unknown, and only there, value and gradient may jump, by
+    /// less than the second difference of the samples.
+    pub fn smooth(&self, p_world: impl Into<[f64; D]>) -> Answer<Smooth<D>> {
+        let p = p_world.into();
+        let Some((base, fraction)) = self.grid().interpolation(p) else {
+            return if self.grid().aabb().contains(p) { Answer::Unknown } else { Answer::Outside };
+        };
+        let samples = self.neighbourhood(base);
+        smooth::<D, true>(samples, &fraction, None, self.grid().lattice.resolution).unwrap_or(Answer::Unknown)
+    }
+
+    #[inline(always)]
+    pub(super) fn neighbourhood(&self, base: [i32; D]) -> Neighbourhood {
+        let (shape, strides) = (self.grid().shape, self.grid().strides());
+        let mut samples = [f32::NAN; 64];
+        let inside = (0..D).all(|k| base[k] >= 1 && base[k] as usize + 2 < shape[k]);
+        if inside {
+            let first: usize = (0..D).map(|k| (base[k] as usize - 1) * strides[k]).sum();
+            for (row, to) in samples.as_chunks_mut::<4>().0.iter_mut().enumerate().take(1 << (2 * (D - 1))) {
+                let at = first + (1..D).map(|k| (row >> (2 * (k - 1)) & 3) * strides[k]).sum::<usize>();
+                if let Some(four) = self.samples().get(at..at + 4) {
+                    to.copy_from_slice(four);
+                }
+            }
+        } else {
+            for (i, to) in samples.iter_mut().enumerate().take(1 << (2 * D)) {
+                let cell = std::array::from_fn(|k| base[k] - 1 + (i >> (2 * k) & 3) as i32);
+                *to = self.grid().index(cell).and_then(|at| self.samples().get(at)).map_or(f32::NAN, |v| *v);
+            }
+        }
+        samples
+    }
+}
+
+impl<const D: usize> SparseEsdf<D> {
+    /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centres around a point, for
+    /// optimisers that take the jumps of [`SparseEsdf::gradient`] ill. O(1): a look into up to `2^D` bricks.
+    ///
+    /// As [`Esdf::smooth`]. Saturated where one of the `4^D` is beyond the largest distance, which it then stands for.
+    pub fn smooth(&self, p_world: impl Into<[f64; D]>) -> Answer<Smooth<D>> {
+        let p = p_world.into();
+        match self.place(p) {
+            Answer::Known((base, fraction)) => {
+                let samples = self.neighbourhood(base);
+                smooth::<D, true>(samples, &fraction, Some(self.max_distance()), self.lattice().resolution)
+                    .unwrap_or_else(|| self.nothing(p))
+            }
+            _ => Answer::Outside,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn place(&self, p: [f64; D]) -> Place<D> {
+        let lattice = self.lattice();
+        let shifted: [f64; D] = std::array::from_fn(|k| p[k] - 0.5 * lattice.resolution);
+        let Some(base) = lattice.cell_of(shifted) else { return Answer::Outside };
+        let cells = lattice.to_cells(p);
+        let fraction = std::array::from_fn(|k| (cells[k] - 0.5 - f64::from(base[k])).clamp(0.0, 1.0));
+        Answer::Known((base, fraction))
+    }
+
+    /// What there is to say about a point that cannot be interpolated: it belongs to the cell that holds it.
+    pub(super) fn nothing<T>(&self, p: [f64; D]) -> Answer<T> {
+        self.lattice().cell_of(p).map_or(Answer::Outside, |cell| match self.cell(cell) {
+            Answer::Outside => Answer::Outside,
+            _ => Answer::Unknown,
+        })
+    }
+
+    #[inline(always)]
+    pub(super) fn neighbourhood(&self, base: [i32; D]) -> Neighbourhood {
+        let mut samples = [f32::NAN; 64];
+        // At the ends of what indices can hold nothing lies beside.
+        let first: [i32; D] = std::array::from_fn(|k| base[k].saturating_sub(1));
+        let key = BlockKey::of_cell(first);
+        let inside = (0..D).all(|k| (first[k] & 7) <= BLOCK_EDGE as i32 - 4);
+        let rows = samples.as_chunks_mut::<4>().0.iter_mut().enumerate().take(1 << (2 * (D - 1)));
+        if inside {
+            let Some(brick) = self.brick(key) else { return samples };
+            let at = BlockKey::offset(first);
+            for (row, to) in rows {
+                let at = at + (1..D).map(|k| (row >> (2 * (k - 1)) & 3) << (3 * k)).sum::<usize>();
+                if let Some(four) = brick.get(at..at + 4) {
+                    to.copy_from_slice(four);
+                }
+            }
+            return samples;
+        }
+        let mut bricks: [Option<&[f32]>; 8] = [None; 8];
+        for (n, brick) in bricks.iter_mut().enumerate().take(1 << D) {
+            // Bricks that no sample lies in are not looked for.
+            let needed = (0..D).all(|k| n >> k & 1 == 0 || (first[k] & 7) > BLOCK_EDGE as i32 - 4);
+            if needed {
+                *brick = self.brick(BlockKey(std::array::from_fn(|k| key.0[k] + (n >> k & 1) as i32)));
+            }
+        }
+        for (row, to) in rows {
+            let (mut n, mut at) = (0, 0);
+            for k in 1..D {
+                let cell = (first[k] & 7) as usize + (row >> (2 * (k - 1)) & 3);
+                n |= (cell >> 3) << k;
+                at |= (cell & 7) << (3 * k);
+            }
+            for (x, to) in to.iter_mut().enumerate() {
+                let cell = (first[0] & 7) as usize + x;
+                if let Some(brick) = bricks[n | cell >> 3] {
+                    *to = brick.get(at | cell & 7).copied().unwrap_or(f32::NAN);
+                }
+            }
+        }
+        samples
+    }
+}
+
+/// The answer at a place in a neighbourhood, in metres; `None`: unknown. Samples beyond `largest` stand for it.
+#[inline(always)]
+pub(super) fn smooth<const D: usize, const HESSIAN: bool>(
+    mut samples: Neighbourhood,
+    fraction: &[f64; D],
+    largest: Option<f32>,
+    resolution: f64,
+) -> Option<Answer<Smooth<D>>> {
+    let used = &samples[..1 << (2 * D)];
+    let mut odd = false;
+    used.iter().for_each(|v| odd |= !v.is_finite());
+    let mut saturated = false;
+    if odd {
+        if let Some(largest) = largest {
+            saturated = used.iter().any(|v| v.is_infinite());
+            samples = samples.map(|v| v.clamp(-largest, largest));
+        }
+        if !complete::<D>(&mut samples) {
+            return None;
+        }
+    }
+    let Smooth { distance, gradient, hessian } = cubic::<D, HESSIAN>(&samples, fraction);
+    let scale = 1.0 / resolution;
+    let answer = Smooth {
+        distance,
+        gradient: vector::scale(gradient, scale),
+        hessian: hessian.map(|row| vector::scale(row, scale * scale)),
+    };
+    Some(if saturated { Answer::Saturated(answer) } else { Answer::Known(answer) })
+}

@@ -1,0 +1,81 @@
+//! Distances to sets of cells, and values that spread into what is unknown.
+
+use crate::geom::Grid;
+
+/// Distance of every cell's centre to the nearest cell of a set, as boxes, in cells, up to `reach`: one pass along each
+/// axis of `min over k of f(q + k) + (max(0, |k| - 1/2))^2`. O(cells x reach) at worst; a search ends where it cannot
+/// find less.
+pub(super) fn distance_to_boxes<const D: usize>(
+    shape: [usize; D],
+    in_set: impl Fn(usize) -> bool,
+    reach: f64,
+) -> Vec<f32> {
+    let cells: usize = shape.iter().product();
+    // A reach beyond the array's diagonal says no more than one at it, and its square stays finite.
+    let most = reach.min(shape.iter().map(|&n| n as f64).sum::<f64>());
+    let most_sq = (most * most) as f32;
+    let mut sq: Vec<f32> = (0..cells).map(|i| if in_set(i) { 0.0 } else { most_sq }).collect();
+    let (mut line, mut stride) = (Vec::new(), 1);
+    for n in shape {
+        for start in (0..cells).filter(|i| (i / stride) % n == 0) {
+            line.clear();
+            line.extend((0..n).map(|q| sq[start + q * stride]));
+            if line.iter().all(|v| *v == most_sq) {
+                continue;
+            }
+            for q in 0..n {
+                let mut best = line[q];
+                for k in 1..n {
+                    let gap = k as f32 - 0.5;
+                    let cost = gap * gap;
+                    if cost >= best {
+                        break;
+                    }
+                    if q >= k {
+                        best = best.min(line[q - k] + cost);
+                    }
+                    if q + k < n {
+                        best = best.min(line[q + k] + cost);
+                    }
+                }
+                sq[start + q * stride] = best;
+            }
+        }
+        stride *= n;
+    }
+    sq.iter().map(|v| if *v < most_sq { v.sqrt() } else { reach as f32 }).collect()
+}
+
+/// Gives every NaN the smallest sum of a neighbour's value and the way from there (metres), no more than `most`: sweeps
+/// forward and backward until nothing changes (Rosenfeld & Pfaltz 1966, with Euclidean steps).
+pub(super) fn extended<const D: usize>(values: &mut [f32], grid: &Grid<D>, most: f32) {
+    // Half of the 3^D - 1 neighbours: those that lie before a cell in memory.
+    let before: Vec<([i32; D], f32)> = (0..3usize.pow(D as u32) / 2)
+        .map(|code| {
+            let offset: [i32; D] = std::array::from_fn(|k| (code / 3usize.pow(k as u32) % 3) as i32 - 1);
+            let steps: i32 = offset.iter().map(|o| o * o).sum();
+            (offset, (f64::from(steps).sqrt() * grid.lattice.resolution) as f32)
+        })
+        .collect();
+    let unknown: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_nan()).collect();
+    unknown.iter().for_each(|&i| values[i] = most);
+    let mut settle = |i: usize, side: i32| {
+        let cell = grid.cell(i);
+        let neighbours = before.iter().filter_map(|(offset, step)| {
+            let at = grid.index(std::array::from_fn(|k| cell[k] + side * offset[k]))?;
+            Some(values[at] + step)
+        });
+        let best = neighbours.fold(values[i], f32::min);
+        let lower = best < values[i];
+        values[i] = best;
+        lower
+    };
+    // Two sweeps do for what is convex; winding corridors of unknown take a few more.
+    for _ in 0..8 {
+        let forward = unknown.iter().fold(false, |any, &i| settle(i, 1) | any);
+        let backward = unknown.iter().rev().fold(false, |any, &i| settle(i, -1) | any);
+        if !(forward || backward) {
+            break;
+        }
+    }
+}
