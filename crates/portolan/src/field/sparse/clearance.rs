@@ -112,7 +112,7 @@ impl<const D: usize> SparseEsdf<D> {
             // Both are true of one distance, but for rounding.
             interval.upper = interval.upper.max(interval.lower);
         }
-        Some((interval, nearby.signed(self, spot, f64::from(self.max_distance))))
+        Some((interval, nearby.signed(spot, f64::from(self.max_distance))))
     }
 
     /// Distance to the unknown in cells.

@@ -81,30 +81,25 @@ impl<const D: usize> Spot<D> {
 /// The bricks of the nodes around a point.
 pub(super) struct Nearby<'f, const D: usize> {
     bricks: [Option<&'f EsdfBrick>; 8],
-    slots: [Option<usize>; 8],
+    distances: [&'f [f32]; 8],
     places: [usize; 8],
 }
 
 impl<'f, const D: usize> Nearby<'f, D> {
     pub(super) fn of(field: &'f SparseEsdf<D>, spot: &Spot<D>) -> Self {
-        let mut nearby = Self { slots: [None; 8], places: [0; 8], bricks: [None; 8] };
+        let mut nearby = Self { bricks: [None; 8], distances: [&[]; 8], places: [0; 8] };
         let mut last = None;
         for i in 0..1 << D {
             let (node, key) = (spot.node(i), BlockKey::of_cell(spot.node(i)));
             nearby.places[i] = BlockKey::offset(node);
-            nearby.slots[i] = match last {
-                Some((of, slot)) if of == key => slot,
-                _ => field.slot(key),
+            let (brick, distances) = match last {
+                Some((of, found)) if of == key => found,
+                _ => (field.slot(key).map(|slot| &field.bricks[slot]), field.brick(key).unwrap_or(&[])),
             };
-            last = Some((key, nearby.slots[i]));
-            nearby.bricks[i] = nearby.slots[i].map(|slot| &field.bricks[slot]);
+            (nearby.bricks[i], nearby.distances[i]) = (brick, distances);
+            last = Some((key, (brick, distances)));
         }
         nearby
-    }
-
-    /// Signed distance (metres) of node `i`, which is measured if nobody has read it yet.
-    fn distance(&self, field: &'f SparseEsdf<D>, i: usize) -> Option<f32> {
-        Some(field.plane(self.slots[i]?)[self.places[i]])
     }
 
     /// A lower bound of node `i`'s squared distance to the surface, in squared cells.
@@ -115,11 +110,8 @@ impl<'f, const D: usize> Nearby<'f, D> {
         let power = f64::from(brick.nearest.as_ref()?.power[at]).min(reach * reach + quarter);
         // Sums of squares in f32, and their heights.
         let certified = power * (1.0 - 1e-6) - quarter - 4e-6;
-        if certified >= 1.0 {
-            return Some(certified);
-        }
         // Up to one cell, a node's own distance is exact; in f32.
-        let found = f64::from(self.distance(field, i)?.abs()) / field.lattice.resolution;
+        let found = f64::from(self.distances[i][at].abs()) / field.lattice.resolution;
         let exact = if found.is_nan() { 0.0 } else { (found.min(1.0).min(reach) - 1e-5).max(0.0) };
         Some(certified.max(exact * exact))
     }
@@ -141,9 +133,9 @@ impl<'f, const D: usize> Nearby<'f, D> {
     }
 
     /// Signed distance (metres) between the nodes that know one: of the side where the point lies.
-    pub(super) fn signed(&self, field: &SparseEsdf<D>, spot: &Spot<D>, max_distance: f64) -> f64 {
+    pub(super) fn signed(&self, spot: &Spot<D>, max_distance: f64) -> f64 {
         let known = (0..1 << D).filter_map(|i| {
-            let value = f64::from(self.distance(field, i)?);
+            let value = f64::from(*self.distances[i].get(self.places[i])?);
             (!value.is_nan()).then(|| spot.weight(i) * value.clamp(-max_distance, max_distance))
         });
         known.sum()
@@ -153,8 +145,8 @@ impl<'f, const D: usize> Nearby<'f, D> {
 impl<const D: usize> SparseEsdf<D> {
     /// Whether a cell was observed.
     pub(super) fn observes(&self, cell: [i32; D]) -> bool {
-        self.slot(BlockKey::of_cell(cell))
-            .is_some_and(|slot| self.bricks[slot].sides.observed(BlockKey::offset(cell)))
+        let brick = self.slot(BlockKey::of_cell(cell)).map(|slot| &self.bricks[slot]);
+        brick.is_some_and(|brick| brick.sides.observed(BlockKey::offset(cell)))
     }
 
     /// The answer about a cell that was not observed.
@@ -172,7 +164,7 @@ impl<const D: usize> SparseEsdf<D> {
                 std::array::from_fn(|k| spot.base[k] + (n / 3usize.pow(k as u32) % 3) as i32 - 1);
             let key = BlockKey::of_cell(cell);
             let brick = match last {
-                Some((of, slot)) if of == key => slot,
+                Some((of, brick)) if of == key => brick,
                 _ => self.surface.brick_elements(key),
             };
             last = Some((key, brick));
