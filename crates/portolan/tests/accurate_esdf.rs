@@ -5,8 +5,8 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use portolan::field::{SparseEsdf, SparseEsdfSettings};
-use portolan::geom::{Lattice, block_cells};
+use portolan::field::{EsdfMethod, SparseEsdf, SparseEsdfSettings};
+use portolan::geom::{Lattice, block_cells, vector};
 use portolan::map::SweepKind;
 use portolan::surface::{ContourSettings, MeshSettings, NearestSurface, marching_cubes, marching_squares};
 use scenes::{Random, Segments, Spoiled, room};
@@ -87,4 +87,70 @@ fn nodes_of_the_apartment_are_exact() {
     let settings = SparseEsdfSettings { min_weight: settings.min_weight, ..Default::default() };
     let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
     Errors::of(&esdf, 1, |p| segments.distance(p)).assert_exact("apartment", 0.999);
+}
+
+/// Probes in observed free space, more than 5 cm from the contour; errors in metres against the contour and against the
+/// true walls, and lengths of gradients, by each method.
+#[test]
+fn distances_of_the_apartment_by_every_method() {
+    let tsdf = common::tsdf(SweepKind::CellCentre, true, &common::apartment().log);
+    let settings = ContourSettings::of(&tsdf);
+    let segments = Segments::of(&marching_squares(&tsdf, &settings), 0.1);
+    let min_weight = settings.min_weight;
+    let methods = [EsdfMethod::Accurate, EsdfMethod::Seeded { band_cells: 1.5 }, EsdfMethod::Mask];
+    let mut medians = Vec::new();
+    for method in methods {
+        let settings = SparseEsdfSettings { min_weight, method, max_distance: 5.0, ..Default::default() };
+        let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
+        let (mut contour, mut walls, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
+        for p in common::points(100_000) {
+            let exact = segments.distance(p).unwrap();
+            let free = tsdf.signed_distance(p).known().is_some_and(|d| d > 0.0);
+            if let (true, Some((d, slope))) = (free && exact > 0.05, esdf.distance_and_gradient(p).known()) {
+                contour.push((d - exact).abs());
+                walls.push((d - common::apartment().world.signed_distance(p)).abs());
+                slopes.push(vector::norm(slope));
+            }
+        }
+        let n = contour.len();
+        let [c, c99] = [0.5, 0.99].map(|q| 1e3 * common::quantile(&mut contour, q));
+        let [w, s] = [1e3 * common::quantile(&mut walls, 0.5), common::quantile(&mut slopes, 0.5)];
+        println!(
+            "{method:?}: {n} probes, contour {c:.3} mm (p99 {c99:.2}), walls {w:.2} mm, gradient {s:.4}"
+        );
+        medians.push([c, w, s]);
+    }
+    let [contour, walls, slope] = medians[0];
+    assert!(contour <= 0.25 && walls <= 5.0 && slope >= 0.995);
+    assert!(medians[1..].iter().all(|m| m[0] > 10.0 * contour));
+}
+
+/// The same against the mesh, in the room.
+#[test]
+fn distances_in_space_by_every_method() {
+    let store = room(112, [0; 3], Lattice::new([0.0; 3], 0.05), Spoiled::Noisy);
+    let nearest = NearestSurface::of_mesh(&marching_cubes(&store, None, &MeshSettings::default()));
+    let mut random = Random(2);
+    let probes: Vec<[f64; 3]> = (0..60_000).map(|_| std::array::from_fn(|_| 5.6 * random.unit())).collect();
+    let mut medians = Vec::new();
+    for method in [EsdfMethod::Accurate, EsdfMethod::Seeded { band_cells: 1.5 }, EsdfMethod::Mask] {
+        let settings = SparseEsdfSettings { method, max_distance: 2.0, ..Default::default() };
+        let esdf = SparseEsdf::of(&store, &settings);
+        let (mut errors, mut slopes) = (Vec::new(), Vec::new());
+        for &p in &probes {
+            let exact = nearest.distance(p).unwrap();
+            if let Some((d, slope)) =
+                esdf.distance_and_gradient(p).known().filter(|(d, _)| *d > 0.0 && exact > 0.05)
+            {
+                errors.push((d - exact).abs());
+                slopes.push(vector::norm(slope));
+            }
+        }
+        let [e, e99] = [0.5, 0.99].map(|q| 1e3 * common::quantile(&mut errors, q));
+        let s = common::quantile(&mut slopes, 0.5);
+        println!("{method:?}: {} probes, mesh {e:.3} mm (p99 {e99:.2}), gradient {s:.4}", errors.len());
+        medians.push([e, s]);
+    }
+    assert!(medians[0][1] >= 0.995);
+    assert!(medians[1..].iter().all(|m| m[0] > 10.0 * medians[0][0]));
 }

@@ -7,12 +7,13 @@ mod scenes;
 
 use common::quantile;
 use portolan::Answer;
-use portolan::field::{Clearance, ClearanceField, SparseEsdf, SparseEsdfSettings, UnknownSpace};
-use portolan::geom::{BlockKey, Lattice, block_cells, vector};
-use portolan::map::SweepKind;
-use portolan::store::Store;
+use portolan::cell::SignedDistance;
+use portolan::field::{Clearance, ClearanceField, EsdfMethod, SparseEsdf, SparseEsdfSettings, UnknownSpace};
+use portolan::geom::{BlockKey, Grid, Lattice, block_cells, vector};
+use portolan::map::{SweepKind, Tsdf2, TsdfConfig};
+use portolan::store::{Bricks, Store};
 use portolan::surface::{ContourSettings, MeshSettings, NearestSurface, marching_cubes, marching_squares};
-use scenes::{Random, Segments, Spoiled, room};
+use scenes::{Random, Segments, Spoiled, bricks, room};
 
 /// Points where bounds are likely to fail, and everywhere else: in the bricks of a field, at nodes, on the faces of cells,
 /// on the surface's corners and simplices, and close to all of these.
@@ -163,3 +164,118 @@ fn bounds_hold_in_the_apartment() {
     let simplices: Vec<_> = contour.ends().collect();
     no_bound_is_violated("apartment", &esdf, &simplices, |p| segments.distance(p));
 }
+
+/// Distance to the unknown against a look at every cell, and the pessimistic answer against the nearer of both.
+fn unknown_cells_are_bounded<const D: usize>(
+    shape: i32,
+    points: usize,
+    surface: impl Fn(&Bricks<SignedDistance, D>) -> Box<dyn Fn([f64; D]) -> Option<f64>>,
+) {
+    let (r, first) = (0.1, [-13; D]);
+    let mut random = Random(8);
+    let mut holes = Random(11);
+    let lattice = Lattice::new([500_000.0; D], r);
+    let store = bricks(lattice, first, shape, |p| {
+        if holes.next().is_multiple_of(4000) {
+            f64::NAN
+        } else {
+            0.1 * (p[0] - 0.3 * p[1] - 6.3).clamp(-3.0, 3.0)
+        }
+    });
+    let exact = surface(&store);
+    let settings = SparseEsdfSettings { max_distance: 0.9, unknown: true, ..Default::default() };
+    let esdf = SparseEsdf::of(&store, &settings);
+    // Unknown cells in and around the box, further than any answer.
+    let all = shape + 24;
+    let cells = (0..all.pow(D as u32))
+        .map(|n| -> [i32; D] { std::array::from_fn(|k| first[k] - 12 + n / all.pow(k as u32) % all) });
+    let unknown: Vec<_> = cells.filter(|c| store.cell(*c).is_none()).collect();
+    let (mut known, mut pessimistic) = (0, 0);
+    for n in 0..points {
+        let at: [f64; D] = std::array::from_fn(|k| {
+            let cells = (random.unit() * f64::from(shape) * 2.0).floor() / 2.0;
+            let off = if n % 3 == 0 { 0.0 } else { 0.5 * random.unit() };
+            f64::from(first[k]) + cells + off
+        });
+        let p = at.map(|v| 500_000.0 + r * v);
+        let to = |c: &[i32; D]| {
+            (0..D)
+                .map(|k| (f64::from(c[k]) - at[k]).max(at[k] - f64::from(c[k]) - 1.0).max(0.0).powi(2))
+                .sum::<f64>()
+        };
+        let want = r * unknown.iter().map(to).fold(f64::INFINITY, f64::min).sqrt();
+        match esdf.unknown_distance(p) {
+            Answer::Known(c) => {
+                // World coordinates of half a million metres in f64.
+                assert!(c.lower <= want + 1e-9 && want <= c.upper + 1e-9, "{c:?} {want}");
+                assert!(want >= 0.999 * r || c.upper - c.lower < 1e-3 * r);
+                assert!(c.upper - c.lower < 1.8 * r, "{c:?} {want}");
+                known += 1;
+            }
+            Answer::Saturated(c) => assert!(c.lower <= want && want > 0.9 - 2.0 * r, "{c:?} {want}"),
+            other => panic!("{other:?}"),
+        }
+        let both = want.min(exact(p).unwrap());
+        match esdf.clearance(p, UnknownSpace::Pessimistic) {
+            Answer::Known(c) => {
+                assert!(c.lower <= both + 1e-9 && both <= c.upper + 1e-9, "{c:?} {both}");
+                pessimistic += 1;
+            }
+            Answer::Saturated(c) => assert!(c.lower <= both),
+            Answer::Unknown => assert!(want < 1e-9),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(known > points / 4 && pessimistic > points / 4, "{known} {pessimistic}");
+}
+
+#[test]
+fn unknown_cells_are_bounded_in_the_plane() {
+    // The contour of a plane field is a line.
+    unknown_cells_are_bounded::<2>(40, 20_000, |store| {
+        let cells = store.keys().into_iter().flat_map(|key| (0..64).map(move |i| key.cell(i)));
+        let mut tsdf =
+            Tsdf2::new(TsdfConfig { truncation: 1.0, ..Default::default() }.with_grid(&Grid::new(
+                [500_000.0 - 1.6; 2],
+                0.1,
+                [64; 2],
+            )))
+            .unwrap();
+        for (cell, d) in cells.filter_map(|c| Some((c, store.cell(c)?))) {
+            tsdf.fuse(cell.map(|v| v + 16), d.distance.into(), 1.0);
+        }
+        let segments = Segments::of(&marching_squares(&tsdf, &ContourSettings::default()), 0.2);
+        Box::new(move |p| segments.distance(p))
+    });
+}
+
+#[test]
+fn unknown_cells_are_bounded_in_space() {
+    unknown_cells_are_bounded::<3>(28, 2_000, |store| {
+        let nearest = NearestSurface::of_mesh(&marching_cubes(store, None, &MeshSettings::default()));
+        Box::new(move |p| nearest.distance(p))
+    });
+}
+
+#[test]
+fn nothing_near_and_nothing_at_all() {
+    let store = bricks(Lattice::new([0.0; 3], 0.1), [0; 3], 16, |_| 0.3);
+    let esdf = SparseEsdf::of(&store, &SparseEsdfSettings { unknown: true, ..Default::default() });
+    let ask = |p: [f64; 3]| UNKNOWN.map(|u| esdf.clearance(p, u));
+    let free = ask([0.83; 3]);
+    assert!(
+        matches!(free[1], Answer::Saturated(c) if c.lower > 0.99 && c.upper == f64::INFINITY && !c.inside)
+    );
+    assert!(matches!(free[0], Answer::Known(c) if c.lower <= 0.77 && c.upper >= 0.77));
+    assert_eq!(ask([-5.0; 3]), [Answer::Outside; 2]);
+    for p in [[f64::NAN; 3], [f64::INFINITY; 3], [1e300; 3], [-1e12, 0.0, 0.0]] {
+        assert_eq!(ask(p), [Answer::Outside; 2]);
+        assert_eq!(esdf.unknown_distance(p), Answer::Outside);
+    }
+    assert_eq!(ask([-0.2; 3])[0], Answer::Unknown);
+    let seeded = SparseEsdfSettings { method: EsdfMethod::Mask, ..Default::default() };
+    let seeded = SparseEsdf::of(&store, &seeded);
+    assert_eq!(UNKNOWN.map(|u| seeded.clearance([0.83; 3], u)), [Answer::Unknown; 2]);
+}
+
+const UNKNOWN: [UnknownSpace; 2] = [UnknownSpace::Pessimistic, UnknownSpace::Optimistic];

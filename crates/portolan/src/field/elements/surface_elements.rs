@@ -113,6 +113,7 @@ impl<const D: usize> SurfaceElements<D> {
 }
 
 impl<const D: usize> Crossings<D> for SurfaceElements<D> {
+    #[cfg(test)]
     fn keys(&self) -> Vec<BlockKey<D>> {
         let mut keys: Vec<_> = self.crossings.keys().copied().collect();
         keys.sort_unstable();

@@ -200,8 +200,13 @@ impl<const D: usize> SparseEsdf<D> {
 
     #[inline]
     pub(in crate::field) fn brick(&self, key: BlockKey<D>) -> Option<&[f32]> {
-        let slot = self.slot(key)?;
-        Some(self.bricks[slot].distance.get_or_init(|| self.measured(slot, &mut Refine::new())))
+        Some(self.plane(self.slot(key)?))
+    }
+
+    /// Signed distances of the brick in a slot, measured if nobody has read them yet.
+    #[inline]
+    pub(super) fn plane(&self, slot: usize) -> &[f32] {
+        self.bricks[slot].distance.get_or_init(|| self.measured(slot, &mut Refine::new()))
     }
 
     #[inline]
