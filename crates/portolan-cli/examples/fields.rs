@@ -1,4 +1,4 @@
-//! Distance transforms and queries, timed on raw arrays: prints one JSON line. `bench/edt.py` and `bench/queries.py` set it
+//! Distance transforms and queries, timed on raw arrays: prints one JSON line. `bench/distance_transform.py` and `bench/queries.py` set it
 //! beside other libraries.
 //!
 //! ```text

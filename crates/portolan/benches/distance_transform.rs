@@ -1,7 +1,7 @@
 //! Distance transforms of masks; items are cells.
 //!
 //! `rooms`: walls, floor, ceiling and pillars. `hall`: all is free but the outermost cells, where no early exit helps.
-//! `bench/edt.py` sets the same beside other libraries.
+//! `bench/distance_transform.py` sets the same beside other libraries.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

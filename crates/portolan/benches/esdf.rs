@@ -31,8 +31,11 @@ static BAND: LazyLock<Bricks<SignedDistance, 3>> = LazyLock::new(|| floor(CELLS,
 /// Walls at the ends of x; neither floor nor ceiling.
 static HALL: LazyLock<Bricks<SignedDistance, 3>> =
     LazyLock::new(|| floor([1000, 320, 64], false, |[x, _, _]| (x - 0.12).min(49.88 - x)));
-static FIELD: LazyLock<SparseEsdf<3>> =
-    LazyLock::new(|| SparseEsdf::of(&CARVED, &SparseEsdfSettings::default()));
+static FIELD: LazyLock<SparseEsdf<3>> = LazyLock::new(|| {
+    let field = SparseEsdf::of(&CARVED, &SparseEsdfSettings::default());
+    field.measure();
+    field
+});
 static PROBES: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
     let at = |i: u32, a: f64| (0.5 + f64::from(i) * a).fract();
     (1..=10_000)
@@ -141,6 +144,19 @@ fn mask_carved_1m(bencher: Bencher) {
     by(bencher, &CARVED, 1.0, EsdfMethod::Mask, 1);
 }
 
+/// Distances of all cells to the segments and triangles, which are otherwise measured when they are read.
+#[divan::bench(args = [1, 2], max_time = 5)]
+fn measure_carved_1m(bencher: Bencher, threads: usize) {
+    let settings = SparseEsdfSettings::default();
+    let pool = pool(threads);
+    bencher.counter(cells(&CARVED)).with_inputs(|| SparseEsdf::of(&CARVED, &settings)).bench_local_values(
+        |esdf| {
+            pool.install(|| esdf.measure());
+            esdf
+        },
+    );
+}
+
 /// A walk with a depth camera of 640 x 480 pixels through the simulated Building: the map before one more frame and
 /// after it.
 static WALK: LazyLock<[SparseTsdf; 2]> = LazyLock::new(|| {
@@ -161,16 +177,31 @@ static WALK: LazyLock<[SparseTsdf; 2]> = LazyLock::new(|| {
 /// The field follows one depth frame at 5 cm; items are cells solved again.
 #[divan::bench(args = [(1.0, 1), (1.0, 2), (2.0, 1), (2.0, 2)], max_time = 5)]
 fn one_depth_frame(bencher: Bencher, (max_distance, threads): (f64, usize)) {
+    follow(bencher, max_distance, threads, false);
+}
+
+/// The same, and all distances measured that are not what they were.
+#[divan::bench(args = [(1.0, 1), (1.0, 2)], max_time = 5)]
+fn one_depth_frame_measured(bencher: Bencher, (max_distance, threads): (f64, usize)) {
+    follow(bencher, max_distance, threads, true);
+}
+
+fn follow(bencher: Bencher, max_distance: f64, threads: usize, measure: bool) {
     let [before, after] = &*WALK;
     let min_weight = 0.5 * SparseTsdfConfig::default().weights.typical_low();
     let settings = SparseEsdfSettings { min_weight, max_distance, ..Default::default() };
     let esdf = SparseEsdf::of(before.store(), &settings);
+    esdf.measure();
     let update = esdf.clone().update(after.store());
-    println!("{update:?} of {} bricks", esdf.keys().len());
     let pool = pool(threads);
     bencher.counter(ItemsCount::new(512 * update.solved)).with_inputs(|| esdf.clone()).bench_local_values(
         |mut esdf| {
-            pool.install(|| esdf.update(after.store()));
+            pool.install(|| {
+                esdf.update(after.store());
+                if measure {
+                    esdf.measure();
+                }
+            });
             esdf
         },
     );

@@ -12,14 +12,13 @@ pub(super) enum Known {
     Unknown,
 }
 
-/// Cell `i` of a brick, with this least weight.
+/// A cell of this distance and weight, with this least weight.
 #[inline(always)]
-pub(super) fn known(brick: &DistanceBrick, i: usize, min_weight: f32) -> Known {
-    let weight = brick.weights()[i];
+pub(super) fn known(distance: f32, weight: f32, min_weight: f32) -> Known {
     // False for NaN, too.
     if !(weight > 0.0 && weight >= min_weight) {
         Known::Unknown
-    } else if brick.distances()[i] > 0.0 {
+    } else if distance > 0.0 {
         Known::Free
     } else {
         Known::Occupied
@@ -47,6 +46,9 @@ impl<'a, const D: usize> Reader<'a, D> {
         if key != self.key {
             (self.key, self.brick) = (key, self.store.brick(key));
         }
-        self.brick.map_or(Known::Unknown, |brick| known(brick, BlockKey::offset(cell), self.min_weight))
+        self.brick.map_or(Known::Unknown, |brick| {
+            let i = BlockKey::offset(cell);
+            known(brick.distances()[i], brick.weights()[i], self.min_weight)
+        })
     }
 }

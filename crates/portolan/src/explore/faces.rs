@@ -38,76 +38,127 @@ impl BrickFrontier {
         min_weight: f32,
     ) -> Self {
         let Some(brick) = store.brick(key) else { return Self::default() };
-        let neighbours: [[Option<&DistanceBrick>; 2]; D] = std::array::from_fn(|k| {
-            [-1, 1].map(|step| {
+        let (free, unknown) = masks(brick, min_weight);
+        if free == NO_CELLS {
+            return Self::default();
+        }
+        // Cells whose neighbour through a face is unknown, face by face.
+        let mut faces = [NO_CELLS; 6];
+        for k in 0..D {
+            for (side, step) in [-1, 1].into_iter().enumerate() {
                 let mut at = key;
                 at.0[k] += step;
-                store.brick(at)
-            })
-        });
-        let mut cells = Vec::new();
-        let unknown = |brick: Option<&DistanceBrick>, i| {
-            brick.is_none_or(|b| known(b, i, min_weight) == Known::Unknown)
-        };
-        for i in 0..block_cells::<D>() {
-            if known(brick, i, min_weight) != Known::Free {
-                continue;
-            }
-            let mut faces = 0;
-            for k in 0..D {
-                let stride = BLOCK_EDGE.pow(k as u32);
-                let around = (BLOCK_EDGE - 1) * stride;
-                let place = i / stride % BLOCK_EDGE;
-                let below = if place > 0 {
-                    unknown(Some(brick), i - stride)
-                } else {
-                    unknown(neighbours[k][0], i + around)
-                };
-                let above = if place + 1 < BLOCK_EDGE {
-                    unknown(Some(brick), i + stride)
-                } else {
-                    unknown(neighbours[k][1], i - around)
-                };
-                faces |= (u8::from(below) | u8::from(above) << 1) << (2 * k);
-            }
-            if faces != 0 {
-                cells.push(FrontierCell { offset: i as u16, faces, group: NONE });
+                let beyond = store.brick(at).map_or([!0; WORDS], |b| masks(b, min_weight).1);
+                faces[2 * k + side] = shifted::<D>(&unknown, &beyond, k, step);
             }
         }
+        let open: Cells = std::array::from_fn(|w| free[w] & faces.iter().fold(0, |any, face| any | face[w]));
+        let mut cells = Vec::with_capacity(open.iter().map(|w| w.count_ones() as usize).sum());
+        for i in each(&open) {
+            let of = |face: &Cells| (face[i >> 6] >> (i & 63) & 1) as u8;
+            let faces = faces.iter().rev().fold(0, |bits, face| bits << 1 | of(face));
+            cells.push(FrontierCell { offset: i as u16, faces, group: NONE });
+        }
         let mut frontier = Self { cells, groups: 0 };
-        frontier.group::<D>();
+        frontier.group::<D>(open);
         frontier
     }
 
-    /// Numbers the groups in the order of their first cells.
-    fn group<const D: usize>(&mut self) {
-        let mut open = Vec::new();
+    /// Numbers the groups in the order of their first cells. `open` are the cells.
+    fn group<const D: usize>(&mut self, mut open: Cells) {
+        let mut front = Vec::new();
         for start in 0..self.cells.len() {
             if self.cells[start].group != NONE {
                 continue;
             }
             let group = self.groups;
             self.groups += 1;
-            self.cells[start].group = group;
-            open.push(start);
-            while let Some(i) = open.pop() {
-                let at = BlockKey([0; D]).cell(usize::from(self.cells[i].offset));
+            let first = usize::from(self.cells[start].offset);
+            open[first >> 6] &= !(1 << (first & 63));
+            front.push((first, start));
+            while let Some((offset, i)) = front.pop() {
+                self.cells[i].group = group;
+                let at = BlockKey([0; D]).cell(offset);
                 for n in 0..3usize.pow(D as u32) {
                     let cell = neighbour(at, n);
                     if cell.iter().any(|&v| v < 0 || v >= BLOCK_EDGE as i32) {
                         continue;
                     }
-                    let offset = BlockKey::offset(cell) as u16;
-                    if let Ok(j) = self.cells.binary_search_by_key(&offset, |c| c.offset)
-                        && self.cells[j].group == NONE
+                    let offset = BlockKey::offset(cell);
+                    let (word, bit) = (&mut open[offset >> 6], 1u64 << (offset & 63));
+                    if *word & bit != 0
+                        && let Ok(j) = self.cells.binary_search_by_key(&(offset as u16), |c| c.offset)
                     {
-                        self.cells[j].group = group;
-                        open.push(j);
+                        *word &= !bit;
+                        front.push((offset, j));
                     }
                 }
             }
         }
     }
+}
+
+/// A bit for each cell of a brick, x from the lowest bit on: a word is a layer of 8 x 8. The plane needs one word.
+type Cells = [u64; WORDS];
+const WORDS: usize = 8;
+const NO_CELLS: Cells = [0; WORDS];
+
+/// Free cells, and unknown ones; in the plane all words but the first are empty.
+fn masks(brick: &DistanceBrick, min_weight: f32) -> (Cells, Cells) {
+    let (mut free, mut unknown) = (NO_CELLS, NO_CELLS);
+    let layers = brick.distances().chunks(64).zip(brick.weights().chunks(64));
+    for ((distances, weights), (free, unknown)) in layers.zip(free.iter_mut().zip(&mut unknown)) {
+        for (i, (distance, weight)) in distances.iter().zip(weights).enumerate() {
+            let known = known(*distance, *weight, min_weight);
+            *free |= u64::from(known == Known::Free) << i;
+            *unknown |= u64::from(known == Known::Unknown) << i;
+        }
+    }
+    (free, unknown)
+}
+
+/// Cells whose neighbour a step along an axis is in a set, which goes on in the next brick with `beyond`.
+fn shifted<const D: usize>(set: &Cells, beyond: &Cells, axis: usize, step: i32) -> Cells {
+    /// The cells with x = 0 of a layer.
+    const FIRST: u64 = 0x0101_0101_0101_0101;
+    let words = block_cells::<D>() / 64;
+    let mut out = NO_CELLS;
+    for w in 0..words {
+        let (here, there) = (set[w], beyond[w]);
+        out[w] = match (axis, step < 0) {
+            (0, true) => (here << 1 & !FIRST) | (there >> 7 & FIRST),
+            (0, false) => (here >> 1 & !(FIRST << 7)) | (there << 7 & (FIRST << 7)),
+            (1, true) => here << 8 | there >> 56,
+            (1, false) => here >> 8 | there << 56,
+            (_, true) => {
+                if w > 0 {
+                    set[w - 1]
+                } else {
+                    beyond[words - 1]
+                }
+            }
+            (_, false) => {
+                if w + 1 < words {
+                    set[w + 1]
+                } else {
+                    beyond[0]
+                }
+            }
+        };
+    }
+    out
+}
+
+/// The cells of a set, ascending.
+fn each(set: &Cells) -> impl Iterator<Item = usize> {
+    set.iter().enumerate().flat_map(|(w, &word)| {
+        let mut left = word;
+        std::iter::from_fn(move || {
+            let i = (left != 0).then(|| left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some(64 * w + i)
+        })
+    })
 }
 
 /// No group yet.

@@ -47,15 +47,17 @@ pub(super) fn join<const D: usize>(
         join_with_neighbours(pieces, &first, *key, &mut sets);
     }
     let mut sums: Vec<Sum<D>> = Vec::new();
-    let mut sum_of = FxHashMap::default();
+    // Where the sum of a set is, by the set's name.
+    let mut sum_of = vec![usize::MAX; groups as usize];
     for key in &keys {
-        for cell in &pieces[key].cells {
-            let root = sets.find(first[key] + u32::from(cell.group));
-            let at = *sum_of.entry(root).or_insert(sums.len());
-            if at == sums.len() {
+        let (piece, first) = (&pieces[key], first[key]);
+        for cell in &piece.cells {
+            let at = &mut sum_of[sets.find(first + u32::from(cell.group)) as usize];
+            if *at == usize::MAX {
+                *at = sums.len();
                 sums.push(Sum::default());
             }
-            sums[at].include(key.cell(usize::from(cell.offset)), cell.faces);
+            sums[*at].include(key.cell(usize::from(cell.offset)), cell.faces);
         }
     }
     sums.retain(|sum| sum.cells.len() >= min_cells.max(1));
@@ -79,8 +81,12 @@ fn join_with_neighbours<const D: usize>(
     if around.iter().all(Option::is_none) {
         return;
     }
-    for cell in &pieces[&key].cells {
+    let (piece, first_here) = (&pieces[&key], first[&key]);
+    for cell in &piece.cells {
         let at = BlockKey([0; D]).cell(usize::from(cell.offset));
+        if at.iter().all(|v| (1..BLOCK_EDGE as i32 - 1).contains(v)) {
+            continue;
+        }
         for n in 0..3usize.pow(D as u32) {
             let next = neighbour(at, n);
             // Which of the bricks around: their numbers count like those of cells.
@@ -89,7 +95,7 @@ fn join_with_neighbours<const D: usize>(
             if let Some((piece, first_there)) = around[brick]
                 && let Some(group) = piece.group_at(BlockKey::offset(next))
             {
-                sets.join(first[&key] + u32::from(cell.group), first_there + u32::from(group));
+                sets.join(first_here + u32::from(cell.group), first_there + u32::from(group));
             }
         }
     }

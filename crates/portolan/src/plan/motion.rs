@@ -39,12 +39,12 @@ impl<const D: usize> Motion<D> {
     }
 
     /// Where it starts.
-    pub fn from(&self) -> &Pose<D> {
+    pub fn start(&self) -> &Pose<D> {
         &self.from
     }
 
     /// Where it ends.
-    pub fn to(&self) -> &Pose<D> {
+    pub fn goal(&self) -> &Pose<D> {
         &self.to
     }
 
@@ -349,7 +349,7 @@ mod tests {
         assert_eq!((sphere, cause), (1, Cause::TooNear));
         // The nose meets the ball after one metre and leaves it after 2.2, beyond the end.
         assert!((from_to[0] - 0.5).abs() < 1e-3 && from_to[1] == 1.0, "{from_to:?}");
-        let at = check_pose(&scene, &body, drive.to(), &Demand::new(0.0));
+        let at = check_pose(&scene, &body, drive.goal(), &Demand::new(0.0));
         assert_eq!(at, crate::plan::BodyCheck::Refused { sphere: 0, cause: Cause::TooNear });
         let nothing = Body::<2>::default();
         assert!(check_motion(&scene, &nothing, &drive, &Demand::new(0.0)).is_free());

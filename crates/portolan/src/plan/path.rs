@@ -51,30 +51,39 @@ pub struct PathViolation {
 /// anywhere between the places looked at.
 ///
 /// ```
+/// use portolan::field::{SparseEsdf, SparseEsdfSettings};
+/// use portolan::map::{Tsdf2, Tsdf2Config, Tsdf3, TsdfConfig};
 /// use portolan::plan::{Cause, Demand, PathCheck, Waypoints, check_path};
-/// # use portolan::{Answer, field::{Clearance, ClearanceField, UnknownSpace}};
-/// # struct Wall;
-/// # impl<const D: usize> ClearanceField<D> for Wall {
-/// #     fn clearance(&self, p: [f64; D], _: UnknownSpace) -> Answer<Clearance> {
-/// #         let d = 4.0 - p[0];
-/// #         Answer::Known(Clearance { lower: d.abs(), upper: d.abs(), inside: d < 0.0 })
-/// #     }
-/// #     fn distance_and_gradient(&self, p: [f64; D]) -> Answer<(f64, [f64; D])> {
-/// #         Answer::Known((4.0 - p[0], std::array::from_fn(|k| if k == 0 { -1.0 } else { 0.0 })))
-/// #     }
-/// #     fn resolution(&self) -> f64 { 0.05 }
-/// # }
-/// # let field = &Wall;
-/// // A field that knows of a wall at x = 4 m; a robot of 30 cm.
-/// let path = Waypoints::new(vec![[0.0, 0.0], [3.5, 0.0], [3.5, 2.0]])?;
-/// let PathCheck::Certified(least) = check_path(field, &path, &Demand::new(0.3)) else { panic!("free") };
-/// assert!(least.lower <= 0.5 && least.upper >= 0.5);
 ///
-/// // The same in space, through the wall.
-/// let path = Waypoints::new(vec![[0.0, 0.0, 1.0], [5.0, 0.0, 1.0]])?;
-/// let PathCheck::Violated(first) = check_path(field, &path, &Demand::new(0.3)) else { panic!("a wall") };
-/// assert!(first.from > 3.69 && first.from <= 3.7 && first.cause == Cause::TooNear);
-/// # Ok::<(), portolan::plan::PlanError>(())
+/// // A wall at x = 4 m; the space before it was seen.
+/// let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [84, 60], resolution: 0.05, ..Default::default() })?;
+/// for i in 0..tsdf.grid().len() {
+///     let cell = tsdf.grid().cell(i);
+///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
+/// }
+/// let settings = SparseEsdfSettings { unknown: true, ..Default::default() };
+/// let field = SparseEsdf::of_tsdf(&tsdf, &settings);
+///
+/// // A robot of 30 cm may drive along it ...
+/// let path = Waypoints::new(vec![[1.0, 1.0], [3.5, 1.0], [3.5, 2.0]])?;
+/// let PathCheck::Certified(least) = check_path(&field, &path, &Demand::new(0.3)) else { panic!("free") };
+/// assert!(least.lower <= 0.5 && least.upper >= 0.4999);
+///
+/// // ... and not into it.
+/// let path = Waypoints::new(vec![[1.0, 1.0], [4.1, 1.0]])?;
+/// let PathCheck::Violated(first) = check_path(&field, &path, &Demand::new(0.3)) else { panic!("a wall") };
+/// assert!((first.from - 2.7).abs() < 5e-3 && first.cause == Cause::TooNear);
+///
+/// // The same in space.
+/// let mut tsdf = Tsdf3::new(TsdfConfig { cells: [44, 20, 20], resolution: 0.1, ..Default::default() })?;
+/// for i in 0..tsdf.grid().len() {
+///     let cell = tsdf.grid().cell(i);
+///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
+/// }
+/// let field = SparseEsdf::of_tsdf(&tsdf, &settings);
+/// let path = Waypoints::new(vec![[1.0, 1.0, 0.5], [3.5, 1.0, 1.5]])?;
+/// assert!(check_path(&field, &path, &Demand::new(0.3)).is_certified());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn check_path<const D: usize>(
     field: &(impl ClearanceField<D> + ?Sized),

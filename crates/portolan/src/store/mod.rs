@@ -3,6 +3,7 @@
 mod arena;
 mod bricks;
 mod dense;
+mod dense_bricks;
 mod tree;
 mod tree_bricks;
 mod tree_build;

@@ -137,10 +137,22 @@ impl<const D: usize> BrickElements<D> {
     /// The cells with surface (places in the brick, ascending), and their simplices.
     pub(crate) fn cells(&self) -> impl Iterator<Item = (usize, &[[[f32; D]; D]])> {
         let places = self.cells.iter().enumerate().flat_map(|(word, &cells)| {
-            (0..64).filter(move |bit| cells >> bit & 1 == 1).map(move |bit| 64 * word + bit)
+            let mut left = cells;
+            std::iter::from_fn(move || {
+                let bit = left.trailing_zeros() as usize;
+                let some = left != 0;
+                left &= left.wrapping_sub(1);
+                some.then_some(64 * word + bit)
+            })
         });
         let ranges = self.starts.windows(2).map(|s| usize::from(s[0])..usize::from(s[1]));
         places.zip(ranges).map(|(at, range)| (at, &self.simplices[range]))
+    }
+
+    /// Cells with surface in a row of the brick (`y + 8 z`), a bit each.
+    #[inline]
+    pub(crate) fn row(&self, row: usize) -> u8 {
+        (self.cells[row >> 3 & 7] >> (8 * (row & 7))) as u8
     }
 
     /// The crossings that its cells use of the neighbour in this octant (0: of the brick itself).

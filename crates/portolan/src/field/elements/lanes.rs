@@ -1,9 +1,12 @@
-//! Distances to simplices, eight at a time.
+//! Distances to simplices, as loops that compilers make vectors of.
+//!
+//! Each loop runs over the numbers of fixed arrays that nothing else refers to, and its body is long: it is neither
+//! unrolled nor guarded against overlap before it becomes one or two steps of whole vectors.
 
-/// Simplices of a block, points of a group.
+/// Simplices of a block.
 pub(super) const LANES: usize = 8;
 
-/// A number per lane.
+/// A number per simplex of a block.
 pub(super) type Lane = [f32; LANES];
 
 /// Eight simplices side by side, and what the distance to each needs.
@@ -19,48 +22,13 @@ pub(super) struct Block<const D: usize> {
     normal: [Lane; D],
 }
 
-#[inline(always)]
-fn each(f: impl Fn(usize) -> f32) -> Lane {
-    let mut lane = [0.0; LANES];
-    for l in 0..LANES {
-        lane[l] = f(l);
-    }
-    lane
-}
-
-#[inline(always)]
-fn dot<const D: usize>(a: &[Lane; D], b: &[Lane; D]) -> Lane {
-    let mut sum = [0.0; LANES];
-    for k in 0..D {
-        for l in 0..LANES {
-            sum[l] += a[k][l] * b[k][l];
-        }
-    }
-    sum
-}
-
-#[inline(always)]
-fn sub<const D: usize>(a: &[Lane; D], b: &[Lane; D]) -> [Lane; D] {
-    let mut out = [[0.0; LANES]; D];
-    for k in 0..D {
-        for l in 0..LANES {
-            out[k][l] = a[k][l] - b[k][l];
-        }
-    }
-    out
-}
-
-/// In space.
-#[inline(always)]
-fn cross<const D: usize>(a: &[Lane; D], b: &[Lane; D]) -> [Lane; D] {
-    let mut out = [[0.0; LANES]; D];
-    for k in 0..D {
-        let (i, j) = ((k + 1) % D, (k + 2) % D);
-        for l in 0..LANES {
-            out[k][l] = a[i][l] * b[j][l] - a[j][l] * b[i][l];
-        }
-    }
-    out
+/// One simplex of a block.
+struct One<const D: usize> {
+    corners: [[f32; D]; D],
+    sides: [[f32; D]; D],
+    inverse_sq: [f32; D],
+    outward: [[f32; D]; D],
+    normal: [f32; D],
 }
 
 /// Sides of a segment or a triangle.
@@ -68,86 +36,104 @@ const fn sides<const D: usize>() -> usize {
     if D == 2 { 1 } else { 3 }
 }
 
-impl<const D: usize> Block<D> {
-    pub(super) const EMPTY: Self = Self {
-        corners: [[[0.0; LANES]; D]; D],
-        inverse_sq: [[0.0; LANES]; D],
-        outward: [[[0.0; LANES]; D]; D],
-        normal: [[0.0; LANES]; D],
-    };
+#[inline(always)]
+fn dot<const D: usize>(a: &[f32; D], b: &[f32; D]) -> f32 {
+    let mut sum = 0.0;
+    for k in 0..D {
+        sum += a[k] * b[k];
+    }
+    sum
+}
 
+/// In space.
+#[inline(always)]
+fn cross<const D: usize>(a: &[f32; D], b: &[f32; D]) -> [f32; D] {
+    std::array::from_fn(|k| a[(k + 1) % D] * b[(k + 2) % D] - a[(k + 2) % D] * b[(k + 1) % D])
+}
+
+impl<const D: usize> Block<D> {
     /// Of simplices whose corners are given lane by lane.
     #[inline(always)]
     pub(super) fn of(corners: [[Lane; D]; D]) -> Self {
-        let mut block = Self { corners, ..Self::EMPTY };
-        for s in 0..sides::<D>() {
-            let side = sub(&corners[(s + 1) % D], &corners[s]);
-            let length_sq = dot(&side, &side);
-            block.inverse_sq[s] = each(|l| if length_sq[l] > 0.0 { 1.0 / length_sq[l] } else { 0.0 });
-        }
-        if D == 3 {
-            let (u, v) = (sub(&corners[1], &corners[0]), sub(&corners[2], &corners[0]));
-            let normal = cross(&u, &v);
-            let (area_sq, u_sq, v_sq) = (dot(&normal, &normal), dot(&u, &u), dot(&v, &v));
-            // A narrower triangle lies within a thousandth of its length of its sides.
-            let scale =
-                each(|l| if area_sq[l] > 1e-6 * u_sq[l] * v_sq[l] { 1.0 / area_sq[l].sqrt() } else { 0.0 });
-            for k in 0..D {
-                for l in 0..LANES {
-                    block.normal[k][l] = normal[k][l] * scale[l];
-                }
-            }
+        let mut block = Self {
+            corners,
+            inverse_sq: [[0.0; LANES]; D],
+            outward: [[[0.0; LANES]; D]; D],
+            normal: [[0.0; LANES]; D],
+        };
+        for l in 0..LANES {
+            let mut side = [[0.0; D]; D];
             for s in 0..D {
-                block.outward[s] = cross(&sub(&corners[(s + 1) % D], &corners[s]), &block.normal);
+                for k in 0..D {
+                    side[s][k] = corners[(s + 1) % D][k][l] - corners[s][k][l];
+                }
+                let length_sq = dot(&side[s], &side[s]);
+                block.inverse_sq[s][l] = if length_sq > 0.0 { 1.0 / length_sq } else { 0.0 };
+            }
+            if D == 3 {
+                let normal = cross(&side[0], &side[1]);
+                let area_sq = dot(&normal, &normal);
+                // A narrower triangle lies within a thousandth of its length of its sides.
+                let wide = area_sq > 1e-6 * dot(&side[0], &side[0]) * dot(&side[1], &side[1]);
+                let scale = if wide { 1.0 / area_sq.sqrt() } else { 0.0 };
+                let normal = normal.map(|n| n * scale);
+                for k in 0..D {
+                    block.normal[k][l] = normal[k];
+                }
+                for s in 0..D {
+                    let outward = cross(&side[s], &normal);
+                    for k in 0..D {
+                        block.outward[s][k][l] = outward[k];
+                    }
+                }
             }
         }
         block
     }
 
-    /// The same simplex in every lane.
     #[inline(always)]
-    pub(super) fn all(simplex: &[[f32; D]; D]) -> Self {
-        let mut corners = [[[0.0; LANES]; D]; D];
-        for i in 0..D {
-            for k in 0..D {
-                corners[i][k] = [simplex[i][k]; LANES];
-            }
+    fn one(&self, l: usize) -> One<D> {
+        let corners: [[f32; D]; D] = std::array::from_fn(|s| std::array::from_fn(|k| self.corners[s][k][l]));
+        One {
+            corners,
+            sides: std::array::from_fn(|s| std::array::from_fn(|k| corners[(s + 1) % D][k] - corners[s][k])),
+            inverse_sq: std::array::from_fn(|s| self.inverse_sq[s][l]),
+            outward: std::array::from_fn(|s| std::array::from_fn(|k| self.outward[s][k][l])),
+            normal: std::array::from_fn(|k| self.normal[k][l]),
         }
-        Self::of(corners)
     }
 
-    /// Squared distance from a point to the simplex of each lane.
+    /// Lowers `best` to the squared distances from some points, a list of coordinates per axis, to the simplex of a lane.
     #[inline(always)]
-    pub(super) fn distance_sq(&self, p: &[Lane; D]) -> Lane {
-        let mut best = [f32::INFINITY; LANES];
-        let mut inside = [0.0f32; LANES];
-        let mut plane = [0.0; LANES];
-        for s in 0..sides::<D>() {
-            let from = sub(p, &self.corners[s]);
-            let side = sub(&self.corners[(s + 1) % D], &self.corners[s]);
-            let along = dot(&from, &side);
-            let t = each(|l| (along[l] * self.inverse_sq[s][l]).max(0.0).min(1.0));
-            let mut sq = [0.0; LANES];
-            for k in 0..D {
-                for l in 0..LANES {
-                    let off = from[k][l] - t[l] * side[k][l];
-                    sq[l] += off * off;
+    pub(super) fn relax<const N: usize>(&self, l: usize, points: &[[f32; N]; D], best: &mut [f32; N]) {
+        let (one, points, mut least) = (self.one(l), *points, *best);
+        for i in 0..N {
+            let (mut found, mut inside, mut plane) = (f32::INFINITY, f32::NEG_INFINITY, 0.0);
+            for s in 0..sides::<D>() {
+                let mut from = [0.0; D];
+                for k in 0..D {
+                    from[k] = points[k][i] - one.corners[s][k];
                 }
-            }
-            best = each(|l| if sq[l] < best[l] { sq[l] } else { best[l] });
-            if D == 3 {
+                let t = (dot(&from, &one.sides[s]) * one.inverse_sq[s]).max(0.0).min(1.0);
+                let mut sq = 0.0;
+                for k in 0..D {
+                    let off = from[k] - t * one.sides[s][k];
+                    sq += off * off;
+                }
+                found = if sq < found { sq } else { found };
                 // Negative on the inner side; the largest of the three tells whether the foot is in the triangle.
-                let out = dot(&from, &self.outward[s]);
-                inside = each(|l| if s == 0 || out[l] > inside[l] { out[l] } else { inside[l] });
+                let out = dot(&from, &one.outward[s]);
+                inside = if out > inside { out } else { inside };
                 if s == 0 {
-                    plane = dot(&from, &self.normal);
+                    plane = dot(&from, &one.normal);
                 }
             }
+            if D == 3 {
+                found = if inside < 0.0 { plane * plane } else { found };
+            }
+            least[i] = if found < least[i] { found } else { least[i] };
         }
-        if D == 3 {
-            best = each(|l| if inside[l] < 0.0 { plane[l] * plane[l] } else { best[l] });
-        }
-        best
+        *best = least;
     }
 }
 
@@ -175,7 +161,10 @@ mod tests {
             let p: [f64; D] =
                 std::array::from_fn(|_| (random.unit() - 0.5) * size).map(|v: f64| f64::from(v as f32));
             let want = simplex_distance_sq(p, &simplex).sqrt();
-            let got = Block::all(&simplex).distance_sq(&p.map(|v| [v as f32; LANES]))[0];
+            let lanes = simplex.map(|c| c.map(|v| [v; LANES]));
+            let mut best = [f32::INFINITY; LANES];
+            Block::of(lanes).relax(n % LANES, &p.map(|v| [v as f32; LANES]), &mut best);
+            let got = best[0];
             let error = (f64::from(got.sqrt()) - want).abs() / (1.0 + want);
             worst = worst.max(error);
         }

@@ -19,6 +19,7 @@ pub(crate) struct Refine<const D: usize> {
     blocks: Vec<Block<D>>,
     table: Table,
     tasks: Vec<Task>,
+    packed: Packed<D>,
 }
 
 /// A simplex of a cell at the brick's nodes.
@@ -34,7 +35,12 @@ struct Group<const D: usize> {
     /// Node where the crossing's edge starts, in cells from the brick's lowest node: what corners are relative to.
     origin: [f32; D],
     first: u32,
-    end: u32,
+    simplices: u32,
+    /// Nodes that ask for it.
+    nodes: u32,
+    /// Where they are packed.
+    packed: u32,
+    packed_end: u32,
 }
 
 /// A node whose distance to a group is wanted.
@@ -45,6 +51,8 @@ struct Task {
 }
 
 const NONE: u16 = u16::MAX;
+/// Nodes that are measured together, the widest vectors full; a group's are filled up to a multiple.
+const TOGETHER: usize = 16;
 /// Nodes along an axis with those beside the brick.
 const PADDED: usize = BLOCK_EDGE + 2;
 
@@ -59,6 +67,7 @@ impl<const D: usize> Refine<D> {
             blocks: Vec::new(),
             table: Table::new(),
             tasks: Vec::new(),
+            packed: Packed { points: std::array::from_fn(|_| Vec::new()), best: Vec::new() },
         }
     }
 
@@ -106,12 +115,44 @@ impl<const D: usize> Refine<D> {
                     }
                 }
             }
-            self.tasks.extend(groups[..count].iter().map(|&group| Task { node: node as u16, group }));
+            for &group in &groups[..count] {
+                self.groups[usize::from(group)].nodes += 1;
+                self.tasks.push(Task { node: node as u16, group });
+            }
         }
-        self.blocks.clear();
-        measure_groups(&self.corners, &mut self.blocks, &self.groups, &self.tasks, out);
+        self.measure(out);
         for v in out.iter_mut() {
             *v = v.sqrt();
+        }
+    }
+
+    /// Squared distances of all tasks.
+    fn measure(&mut self, out: &mut [f32]) {
+        let mut length = 0;
+        for group in &mut self.groups {
+            group.packed = length;
+            length += group.nodes.next_multiple_of(TOGETHER as u32);
+            group.packed_end = group.packed;
+        }
+        self.packed.clear(length as usize);
+        for task in &self.tasks {
+            let group = &mut self.groups[usize::from(task.group)];
+            for k in 0..D {
+                let at = digit(usize::from(task.node), k) as f32 - group.origin[k];
+                self.packed.points[k][group.packed_end as usize] = at;
+            }
+            group.packed_end += 1;
+        }
+        for group in &mut self.groups {
+            group.packed_end = group.packed_end.next_multiple_of(TOGETHER as u32);
+        }
+        self.blocks.clear();
+        measure_groups(&self.corners, &mut self.blocks, &self.groups, &mut self.packed);
+        for task in &self.tasks {
+            let next = &mut self.groups[usize::from(task.group)].packed;
+            let (found, least) = (self.packed.best[*next as usize], &mut out[usize::from(task.node)]);
+            *least = if found < *least { found } else { *least };
+            *next += 1;
         }
     }
 
@@ -220,7 +261,14 @@ impl<const D: usize> Refine<D> {
             }
         });
         let origin = start.map(|v| v as f32);
-        self.groups.push(Group { origin, first: first as u32, end: self.corners.len() as u32 });
+        self.groups.push(Group {
+            origin,
+            first: first as u32,
+            simplices: lane as u32,
+            nodes: 0,
+            packed: 0,
+            packed_end: 0,
+        });
     }
 }
 
@@ -244,41 +292,65 @@ fn measure_near<const D: usize>(near: &[Near<D>], lanes: &mut Vec<Lane>) {
             nodes[k][l] = (l >> k & 1) as f32;
         }
     }
-    for near in near {
-        lanes.push(Block::all(&near.simplex).distance_sq(&nodes));
+    for near in near.chunks(LANES) {
+        let mut corners = [[[0.0; LANES]; D]; D];
+        for (l, near) in near.iter().enumerate() {
+            for (to, from) in corners.as_flattened_mut().iter_mut().zip(near.simplex.as_flattened()) {
+                to[l] = *from;
+            }
+        }
+        let block = Block::of(corners);
+        for l in 0..near.len() {
+            let mut found = [f32::INFINITY; LANES];
+            block.relax(l, &nodes, &mut found);
+            lanes.push(found);
+        }
     }
 }
 
-/// Squared distances of nodes to groups, where they are less than what is there.
+/// Squared distances of nodes, packed by groups, to the elements of their groups.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
 fn measure_groups<const D: usize>(
     corners: &[[[Lane; D]; D]],
     blocks: &mut Vec<Block<D>>,
     groups: &[Group<D>],
-    tasks: &[Task],
-    out: &mut [f32],
+    packed: &mut Packed<D>,
 ) {
     for corners in corners {
         blocks.push(Block::of(*corners));
     }
-    for task in tasks {
-        let (node, group) = (usize::from(task.node), &groups[usize::from(task.group)]);
-        let mut p = [[0.0; LANES]; D];
-        for k in 0..D {
-            p[k] = [(node >> (3 * k) & 7) as f32 - group.origin[k]; LANES];
-        }
-        let mut best = [f32::INFINITY; LANES];
-        for block in &blocks[group.first as usize..group.end as usize] {
-            let found = block.distance_sq(&p);
-            for l in 0..LANES {
-                best[l] = if found[l] < best[l] { found[l] } else { best[l] };
+    for group in groups {
+        let nodes = group.packed as usize..group.packed_end as usize;
+        for at in nodes.step_by(TOGETHER) {
+            let mut points = [[0.0; TOGETHER]; D];
+            let mut best = [f32::INFINITY; TOGETHER];
+            for (to, from) in points.iter_mut().zip(&packed.points) {
+                to.copy_from_slice(&from[at..at + TOGETHER]);
             }
+            for simplex in 0..group.simplices as usize {
+                blocks[group.first as usize + simplex / LANES].relax(simplex % LANES, &points, &mut best);
+            }
+            packed.best[at..at + TOGETHER].copy_from_slice(&best);
         }
-        let mut least = out[node];
-        for v in best {
-            least = if v < least { v } else { least };
+    }
+}
+
+/// Nodes in the order of their groups, those of each filled up to whole vectors.
+#[derive(Debug)]
+struct Packed<const D: usize> {
+    /// In cells from the group's origin, along each axis.
+    points: [Vec<f32>; D],
+    best: Vec<f32>,
+}
+
+impl<const D: usize> Packed<D> {
+    fn clear(&mut self, length: usize) {
+        for list in self.points.iter_mut().chain([&mut self.best]) {
+            list.clear();
+            list.resize(length, f32::INFINITY);
         }
-        out[node] = least;
+        // What fills up may be anywhere.
+        self.points.iter_mut().for_each(|list| list.fill(0.0));
     }
 }
 

@@ -1,7 +1,6 @@
 //! Many points at once.
 
 use super::cubic::Smooth;
-use super::neighbourhood::smooth;
 use crate::answer::Answer;
 use crate::field::{Esdf, SparseEsdf};
 use crate::geom::{BlockKey, vector};
@@ -62,7 +61,7 @@ trait Samples<const D: usize>: Sync {
     /// that was looked into last.
     fn corners<'s>(&'s self, base: [i32; D], last: &mut Brick<'s, D>) -> Option<([f32; 8], bool)>;
 
-    fn cubic(&self, base: [i32; D], fraction: &[f64; D]) -> Option<Answer<Smooth<D>>>;
+    fn cubic_slope(&self, base: [i32; D], fraction: &[f64; D]) -> Option<Answer<Smooth<D>>>;
 
     /// Why a point has no answer.
     fn nothing(&self, p_world: [f64; D]) -> Status;
@@ -95,8 +94,8 @@ impl<const D: usize> Samples<D> for Esdf<D> {
     }
 
     #[inline(always)]
-    fn cubic(&self, base: [i32; D], fraction: &[f64; D]) -> Option<Answer<Smooth<D>>> {
-        smooth::<D, false>(self.neighbourhood(base), fraction, None, self.resolution())
+    fn cubic_slope(&self, base: [i32; D], fraction: &[f64; D]) -> Option<Answer<Smooth<D>>> {
+        self.cubic::<false>(base, fraction)
     }
 
     fn nothing(&self, p_world: [f64; D]) -> Status {
@@ -143,8 +142,8 @@ impl<const D: usize> Samples<D> for SparseEsdf<D> {
     }
 
     #[inline(always)]
-    fn cubic(&self, base: [i32; D], fraction: &[f64; D]) -> Option<Answer<Smooth<D>>> {
-        smooth::<D, false>(self.neighbourhood(base), fraction, Some(self.max_distance()), self.resolution())
+    fn cubic_slope(&self, base: [i32; D], fraction: &[f64; D]) -> Option<Answer<Smooth<D>>> {
+        self.cubic::<false>(base, fraction)
     }
 
     fn nothing(&self, p_world: [f64; D]) -> Status {
@@ -222,7 +221,7 @@ fn serial<S: Samples<D>, const D: usize>(
     if interpolation == Interpolation::Cubic {
         let slots = distance.iter_mut().zip(gradient).zip(status);
         for (&p, ((distance, gradient), status)) in points.iter().zip(slots) {
-            let answer = field.place(p).and_then(|(base, fraction)| field.cubic(base, &fraction));
+            let answer = field.place(p).and_then(|(base, fraction)| field.cubic_slope(base, &fraction));
             let (is, what) = match answer {
                 Some(Answer::Known(what)) => (Status::Known, Some(what)),
                 Some(Answer::Saturated(what)) => (Status::Saturated, Some(what)),

@@ -35,64 +35,75 @@ fn weights(t: f64) -> [[f64; 4]; 3] {
 
 /// Value, gradient and, with `HESSIAN`, second derivatives (0 otherwise), per cell and not per metre.
 ///
-/// One axis after the other, the slowest first, so that sums run over samples that lie side by side.
+/// The slowest axis first, so that sums run over samples that lie side by side: what is left is a plane of values, one of
+/// slopes and one of second derivatives along it.
 #[inline(always)]
 pub(super) fn cubic<const D: usize, const HESSIAN: bool>(
     samples: &Neighbourhood,
     fraction: &[f64; D],
 ) -> Smooth<D> {
-    let mut value = [0.0; 16];
-    let mut slope = [[0.0; 16]; D];
-    let mut bend = [[[0.0; 16]; D]; D];
-    for k in (0..D).rev() {
-        let w = weights(fraction[k]);
-        if k + 1 == D {
-            let half = 1 << (2 * k);
-            let (v, s, b) = (&mut value, &mut slope[k], &mut bend[k][k]);
-            for i in 0..half {
-                let f: [f64; 4] = std::array::from_fn(|j| f64::from(samples[i + j * half]));
-                v[i] = sum(&w[0], &f);
-                s[i] = sum(&w[1], &f);
-                b[i] = if HESSIAN { sum(&w[2], &f) } else { 0.0 };
-            }
-            continue;
-        }
+    let (x, y) = (weights(fraction[0]), weights(fraction[1]));
+    // The lower half of the Hessian, row by row.
+    let (distance, gradient, hessian) = if D == 2 {
+        let plane = std::array::from_fn(|i| f64::from(samples[i]));
+        let v = if HESSIAN { patch::<2>(&plane, &x, &y) } else { patch::<1>(&plane, &x, &y) };
+        (v.value, [v.slope[0], v.slope[1], 0.0], [v.bend[0], v.bend[1], v.bend[2], 0.0, 0.0, 0.0])
+    } else {
+        let z = weights(fraction[2]);
+        let (values, slopes) = (planes(samples, &z[0]), planes(samples, &z[1]));
         if HESSIAN {
-            for a in k + 1..D {
-                for b in a..D {
-                    bend[a][b] = fold(&bend[a][b], k, &w[0]);
-                }
-                bend[k][a] = fold(&slope[a], k, &w[1]);
-            }
-            bend[k][k] = fold(&value, k, &w[2]);
+            let (v, s) = (patch::<2>(&values, &x, &y), patch::<1>(&slopes, &x, &y));
+            let b = patch::<0>(&planes(samples, &z[2]), &x, &y);
+            let hessian = [v.bend[0], v.bend[1], v.bend[2], s.slope[0], s.slope[1], b.value];
+            (v.value, [v.slope[0], v.slope[1], s.value], hessian)
+        } else {
+            let (v, s) = (patch::<1>(&values, &x, &y), patch::<0>(&slopes, &x, &y));
+            (v.value, [v.slope[0], v.slope[1], s.value], [0.0; 6])
         }
-        for a in k + 1..D {
-            slope[a] = fold(&slope[a], k, &w[0]);
-        }
-        slope[k] = fold(&value, k, &w[1]);
-        value = fold(&value, k, &w[0]);
-    }
+    };
+    let lower = |a: usize, b: usize| hessian[a * (a + 1) / 2 + b];
     Smooth {
-        distance: value[0],
-        gradient: std::array::from_fn(|k| slope[k][0]),
-        hessian: std::array::from_fn(|a| std::array::from_fn(|b| bend[a.min(b)][a.max(b)][0])),
+        distance,
+        gradient: std::array::from_fn(|k| gradient[k]),
+        hessian: std::array::from_fn(|a| std::array::from_fn(|b| lower(a.max(b), a.min(b)))),
     }
 }
 
-/// Takes four samples each along axis `k` together.
-#[inline(always)]
-fn fold(from: &[f64; 16], k: usize, weights: &[f64; 4]) -> [f64; 16] {
-    let half = 1 << (2 * k);
-    let mut to = [0.0; 16];
-    for i in 0..half {
-        to[i] = sum(weights, &std::array::from_fn(|j| from[i + j * half]));
-    }
-    to
+/// A bicubic patch at one point: value, (x, y), (xx, xy, yy).
+struct Patch {
+    value: f64,
+    slope: [f64; 2],
+    bend: [f64; 3],
 }
 
+/// Derivatives up to `ORDER`; 0 beyond.
 #[inline(always)]
-fn sum(w: &[f64; 4], f: &[f64; 4]) -> f64 {
-    (w[0] * f[0] + w[1] * f[1]) + (w[2] * f[2] + w[3] * f[3])
+fn patch<const ORDER: usize>(plane: &[f64; 16], x: &[[f64; 4]; 3], y: &[[f64; 4]; 3]) -> Patch {
+    let sum = |w: &[f64; 4], f: &[f64; 4]| (w[0] * f[0] + w[1] * f[1]) + (w[2] * f[2] + w[3] * f[3]);
+    let row = |w: &[f64; 4]| -> [f64; 4] {
+        std::array::from_fn(|i| sum(w, &[plane[i], plane[i + 4], plane[i + 8], plane[i + 12]]))
+    };
+    let values = row(&y[0]);
+    let mut patch = Patch { value: sum(&x[0], &values), slope: [0.0; 2], bend: [0.0; 3] };
+    if ORDER >= 1 {
+        let slopes = row(&y[1]);
+        patch.slope = [sum(&x[1], &values), sum(&x[0], &slopes)];
+        if ORDER >= 2 {
+            patch.bend = [sum(&x[2], &values), sum(&x[1], &slopes), sum(&x[0], &row(&y[2]))];
+        }
+    }
+    patch
+}
+
+/// Four planes of samples taken together.
+#[inline(always)]
+fn planes(samples: &Neighbourhood, w: &[f64; 4]) -> [f64; 16] {
+    let mut plane = [0.0; 16];
+    for i in 0..16 {
+        let f = |j: usize| f64::from(samples[i + 16 * j]);
+        plane[i] = (w[0] * f(0) + w[1] * f(1)) + (w[2] * f(2) + w[3] * f(3));
+    }
+    plane
 }
 
 /// Fills unknown samples beside the `2^D` in the middle with the straight line through the two next to them, axis by

@@ -23,28 +23,38 @@ impl<const D: usize> Esdf<D> {
         let Some((base, fraction)) = self.grid().interpolation(p) else {
             return if self.grid().aabb().contains(p) { Answer::Unknown } else { Answer::Outside };
         };
-        let samples = self.neighbourhood(base);
-        smooth::<D, true>(samples, &fraction, None, self.grid().lattice.resolution).unwrap_or(Answer::Unknown)
+        self.cubic::<true>(base, &fraction).unwrap_or(Answer::Unknown)
     }
 
+    /// The answer in a cell; `None`: unknown.
     #[inline(always)]
-    pub(super) fn neighbourhood(&self, base: [i32; D]) -> Neighbourhood {
+    pub(super) fn cubic<const HESSIAN: bool>(
+        &self,
+        base: [i32; D],
+        fraction: &[f64; D],
+    ) -> Option<Answer<Smooth<D>>> {
         let (shape, strides) = (self.grid().shape, self.grid().strides());
+        let resolution = self.grid().lattice.resolution;
+        if !(0..D).all(|k| base[k] >= 1 && base[k] as usize + 2 < shape[k]) {
+            return smooth::<D, HESSIAN>(&self.border(base), fraction, None, resolution);
+        }
+        let first: usize = (0..D).map(|k| (base[k] as usize - 1) * strides[k]).sum();
+        let mut samples = [[0.0; 4]; 16];
+        for row in 0..1 << (2 * (D - 1)) {
+            let at = first + (1..D).map(|k| (row >> (2 * (k - 1)) & 3) * strides[k]).sum::<usize>();
+            samples[row] = *self.samples().get(at..)?.first_chunk()?;
+        }
+        smooth::<D, HESSIAN>(samples.as_flattened().first_chunk()?, fraction, None, resolution)
+    }
+
+    /// Samples where some of them lie outside.
+    #[cold]
+    #[inline(never)]
+    fn border(&self, base: [i32; D]) -> Neighbourhood {
         let mut samples = [f32::NAN; 64];
-        let inside = (0..D).all(|k| base[k] >= 1 && base[k] as usize + 2 < shape[k]);
-        if inside {
-            let first: usize = (0..D).map(|k| (base[k] as usize - 1) * strides[k]).sum();
-            for (row, to) in samples.as_chunks_mut::<4>().0.iter_mut().enumerate().take(1 << (2 * (D - 1))) {
-                let at = first + (1..D).map(|k| (row >> (2 * (k - 1)) & 3) * strides[k]).sum::<usize>();
-                if let Some(four) = self.samples().get(at..at + 4) {
-                    to.copy_from_slice(four);
-                }
-            }
-        } else {
-            for (i, to) in samples.iter_mut().enumerate().take(1 << (2 * D)) {
-                let cell = std::array::from_fn(|k| base[k] - 1 + (i >> (2 * k) & 3) as i32);
-                *to = self.grid().index(cell).and_then(|at| self.samples().get(at)).map_or(f32::NAN, |v| *v);
-            }
+        for (i, to) in samples.iter_mut().enumerate().take(1 << (2 * D)) {
+            let cell = std::array::from_fn(|k| base[k] - 1 + (i >> (2 * k) & 3) as i32);
+            *to = self.grid().index(cell).and_then(|at| self.samples().get(at)).map_or(f32::NAN, |v| *v);
         }
         samples
     }
@@ -59,9 +69,7 @@ impl<const D: usize> SparseEsdf<D> {
         let p = p_world.into();
         match self.place(p) {
             Answer::Known((base, fraction)) => {
-                let samples = self.neighbourhood(base);
-                smooth::<D, true>(samples, &fraction, Some(self.max_distance()), self.lattice().resolution)
-                    .unwrap_or_else(|| self.nothing(p))
+                self.cubic::<true>(base, &fraction).unwrap_or_else(|| self.nothing(p))
             }
             _ => Answer::Outside,
         }
@@ -85,25 +93,35 @@ impl<const D: usize> SparseEsdf<D> {
         })
     }
 
+    /// The answer in a cell; `None`: unknown.
     #[inline(always)]
-    pub(super) fn neighbourhood(&self, base: [i32; D]) -> Neighbourhood {
-        let mut samples = [f32::NAN; 64];
-        // At the ends of what indices can hold nothing lies beside.
-        let first: [i32; D] = std::array::from_fn(|k| base[k].saturating_sub(1));
-        let key = BlockKey::of_cell(first);
-        let inside = (0..D).all(|k| (first[k] & 7) <= BLOCK_EDGE as i32 - 4);
-        let rows = samples.as_chunks_mut::<4>().0.iter_mut().enumerate().take(1 << (2 * (D - 1)));
-        if inside {
-            let Some(brick) = self.brick(key) else { return samples };
-            let at = BlockKey::offset(first);
-            for (row, to) in rows {
-                let at = at + (1..D).map(|k| (row >> (2 * (k - 1)) & 3) << (3 * k)).sum::<usize>();
-                if let Some(four) = brick.get(at..at + 4) {
-                    to.copy_from_slice(four);
-                }
-            }
-            return samples;
+    pub(super) fn cubic<const HESSIAN: bool>(
+        &self,
+        base: [i32; D],
+        fraction: &[f64; D],
+    ) -> Option<Answer<Smooth<D>>> {
+        let (largest, resolution) = (Some(self.max_distance()), self.lattice().resolution);
+        // Indices of points keep away from the ends of what they can hold.
+        let first = base.map(|b| b.saturating_sub(1));
+        if !(0..D).all(|k| (first[k] & 7) <= BLOCK_EDGE as i32 - 4) {
+            return smooth::<D, HESSIAN>(&self.across(first), fraction, largest, resolution);
         }
+        let brick = self.brick(BlockKey::of_cell(first))?;
+        let first = BlockKey::offset(first);
+        let mut samples = [[0.0; 4]; 16];
+        for row in 0..1 << (2 * (D - 1)) {
+            let at = first + (1..D).map(|k| (row >> (2 * (k - 1)) & 3) << (3 * k)).sum::<usize>();
+            samples[row] = *brick.get(at..)?.first_chunk()?;
+        }
+        smooth::<D, HESSIAN>(samples.as_flattened().first_chunk()?, fraction, largest, resolution)
+    }
+
+    /// Samples that lie in several bricks; NaN where there is none.
+    #[inline(never)]
+    fn across(&self, first: [i32; D]) -> Neighbourhood {
+        let mut samples = [f32::NAN; 64];
+        let key = BlockKey::of_cell(first);
+        let rows = samples.as_chunks_mut::<4>().0.iter_mut().enumerate().take(1 << (2 * (D - 1)));
         let mut bricks: [Option<&[f32]>; 8] = [None; 8];
         for (n, brick) in bricks.iter_mut().enumerate().take(1 << D) {
             // Bricks that no sample lies in are not looked for.
@@ -132,31 +150,42 @@ impl<const D: usize> SparseEsdf<D> {
 
 /// The answer at a place in a neighbourhood, in metres; `None`: unknown. Samples beyond `largest` stand for it.
 #[inline(always)]
-pub(super) fn smooth<const D: usize, const HESSIAN: bool>(
-    mut samples: Neighbourhood,
+fn smooth<const D: usize, const HESSIAN: bool>(
+    samples: &Neighbourhood,
     fraction: &[f64; D],
     largest: Option<f32>,
     resolution: f64,
 ) -> Option<Answer<Smooth<D>>> {
-    let used = &samples[..1 << (2 * D)];
     let mut odd = false;
-    used.iter().for_each(|v| odd |= !v.is_finite());
-    let mut saturated = false;
+    samples[..1 << (2 * D)].iter().for_each(|v| odd |= !v.is_finite());
     if odd {
-        if let Some(largest) = largest {
-            saturated = used.iter().any(|v| v.is_infinite());
-            samples = samples.map(|v| v.clamp(-largest, largest));
-        }
-        if !complete::<D>(&mut samples) {
-            return None;
-        }
+        let (samples, saturated) = mended::<D>(samples, largest)?;
+        let answer = metric(cubic::<D, HESSIAN>(&samples, fraction), resolution);
+        return Some(if saturated { Answer::Saturated(answer) } else { Answer::Known(answer) });
     }
-    let Smooth { distance, gradient, hessian } = cubic::<D, HESSIAN>(&samples, fraction);
+    Some(Answer::Known(metric(cubic::<D, HESSIAN>(samples, fraction), resolution)))
+}
+
+/// All samples, and whether one of them stood for more; `None`: unknown.
+#[cold]
+#[inline(never)]
+fn mended<const D: usize>(samples: &Neighbourhood, largest: Option<f32>) -> Option<(Neighbourhood, bool)> {
+    let mut samples = *samples;
+    let mut saturated = false;
+    if let Some(largest) = largest {
+        saturated = samples[..1 << (2 * D)].iter().any(|v| v.is_infinite());
+        samples = samples.map(|v| v.clamp(-largest, largest));
+    }
+    complete::<D>(&mut samples).then_some((samples, saturated))
+}
+
+/// Per cell to per metre.
+#[inline(always)]
+fn metric<const D: usize>(cells: Smooth<D>, resolution: f64) -> Smooth<D> {
     let scale = 1.0 / resolution;
-    let answer = Smooth {
-        distance,
-        gradient: vector::scale(gradient, scale),
-        hessian: hessian.map(|row| vector::scale(row, scale * scale)),
-    };
-    Some(if saturated { Answer::Saturated(answer) } else { Answer::Known(answer) })
+    Smooth {
+        distance: cells.distance,
+        gradient: vector::scale(cells.gradient, scale),
+        hessian: cells.hessian.map(|row| vector::scale(row, scale * scale)),
+    }
 }

@@ -4,10 +4,9 @@ use super::anchors::{Anchor, bounds};
 use super::crossings::Crossings;
 use super::edges::edge_distances;
 use super::feature::Feature;
-use super::kernels::observes;
 use super::level::Input;
-use super::pass::{map_each, map_each_with};
-use super::planes::{EsdfBrick, Nearest};
+use super::pass::map_each;
+use super::planes::{EsdfBrick, Nearest, Sides};
 use super::reach::{Reach, within};
 use super::settings::EsdfUpdate;
 use super::sparse_esdf::SparseEsdf;
@@ -27,11 +26,7 @@ impl<const D: usize> SparseEsdf<D> {
         let changed = store.changed_since(self.epoch);
         self.epoch = store.epoch();
         let first = self.keys.is_empty();
-        let mut uncovered = Vec::new();
-        if self.settings.unknown {
-            uncovered = changed.iter().copied().filter(|&key| self.uncovered(store, key)).collect();
-        }
-        let moved = self.come_and_go(store, &changed);
+        let (moved, uncovered) = self.look_at(store, &changed);
         let touched = self.surface.update(store, &changed);
         let reach = self.limit().sqrt();
         let (dirty, stale) = if first {
@@ -46,10 +41,10 @@ impl<const D: usize> SparseEsdf<D> {
             (self.held(dirty), self.held(stale))
         };
         self.solve(&dirty);
-        let planes = map_each_with(&stale, Refine::new, |&key, refine| self.measured(store, key, refine));
-        for (key, plane) in stale.iter().zip(planes) {
+        // To be measured when it is read.
+        for key in &stale {
             if let Some(slot) = self.slot(*key) {
-                self.bricks[slot].distance = plane;
+                self.bricks[slot].distance = Arc::default();
             }
         }
         if self.settings.unknown {
@@ -57,35 +52,42 @@ impl<const D: usize> SparseEsdf<D> {
             let dirty = if first { self.keys() } else { self.held(around) };
             self.solve_unknown(store, &dirty);
         }
-        EsdfUpdate {
-            changed: changed.len(),
-            touched: touched.len(),
-            solved: dirty.len(),
-            measured: stale.len(),
-        }
+        EsdfUpdate { changed: changed.len(), touched: touched.len(), solved: dirty.len(), stale: stale.len() }
     }
 
-    /// Bricks that hold an observed cell now and did not, or the other way round, are added or removed. Returns them.
-    fn come_and_go(
+    /// Looks at which cells of the changed bricks were observed. Bricks that hold one now and did not, or the other way
+    /// round, are added or removed: returns them, and all in which other cells are observed.
+    fn look_at(
         &mut self,
         store: &Bricks<SignedDistance, D>,
         changed: &[BlockKey<D>],
-    ) -> Vec<BlockKey<D>> {
+    ) -> (Vec<BlockKey<D>>, Vec<BlockKey<D>>) {
         let min_weight = self.settings.min_weight;
-        let observed = map_each(changed, |&key| {
-            store.brick(key).is_some_and(|brick| observes(brick.weights(), min_weight))
+        let sides = map_each(changed, |&key| {
+            store.brick(key).map_or(Sides::default(), |brick| Sides::of(brick, min_weight))
         });
-        let mut moved = Vec::new();
-        let empty = EsdfBrick { distance: Arc::new([]), nearest: None, unknown: None };
-        for (&key, observed) in changed.iter().zip(observed) {
-            match (observed, self.slot(key)) {
-                (true, None) => self.add(key, empty.clone()),
+        let (mut moved, mut uncovered) = (Vec::new(), Vec::new());
+        for (&key, sides) in changed.iter().zip(sides) {
+            let slot = self.slot(key);
+            match (sides.any(), slot) {
+                (true, None) => self.add(key, EsdfBrick::new(sides)),
                 (false, Some(slot)) => self.remove(key, slot),
-                _ => continue,
+                (false, None) => continue,
+                (true, Some(slot)) => {
+                    let before = &mut self.bricks[slot].sides;
+                    if !before.same_cells(&sides) {
+                        uncovered.push(key);
+                    }
+                    if **before != sides {
+                        *before = Arc::new(sides);
+                    }
+                    continue;
+                }
             }
             moved.push(key);
+            uncovered.push(key);
         }
-        moved
+        (moved, uncovered)
     }
 
     /// The nearest crossings of all cells of bricks (ascending).
@@ -104,51 +106,40 @@ impl<const D: usize> SparseEsdf<D> {
         let outputs = outputs.map(|(&key, budget)| Reach { key, budget }).collect();
         let edges = around.iter().filter_map(|&key| Some(Input { key, source: self.surface.brick(key)? }));
         let edges: Vec<_> = edges.collect();
-        let level = edge_distances(&edges, outputs, |_, _, power, features| {
-            for (power, feature) in power.iter_mut().zip(features) {
+        let solved = edge_distances(&edges, outputs, |_, power, features| {
+            for (power, feature) in power.iter_mut().zip(&mut *features) {
                 let beyond = *power > limit;
                 *power = if beyond { f32::INFINITY } else { *power };
                 *feature = if beyond { Feature::NONE.0 } else { *feature };
             }
+            Arc::new(Nearest { power: (&*power).into(), feature: (&*features).into() })
         });
-        let cells = block_cells::<D>();
-        let planes: Vec<_> = level.values.chunks_exact(cells).zip(level.words.chunks_exact(cells)).collect();
-        let nearest = map_each(&planes, |(power, feature)| {
-            Arc::new(Nearest { power: (*power).into(), feature: (*feature).into() })
-        });
-        for (key, nearest) in level.keys.iter().zip(nearest) {
-            if let Some(slot) = self.slot(*key) {
+        for (key, nearest) in solved {
+            if let Some(slot) = self.slot(key) {
                 self.bricks[slot].nearest = Some(nearest);
             }
         }
     }
 
-    /// Signed distances of a brick.
-    fn measured(
-        &self,
-        store: &Bricks<SignedDistance, D>,
-        key: BlockKey<D>,
-        refine: &mut Refine<D>,
-    ) -> Arc<[f32]> {
-        let mut plane = vec![f32::NAN; block_cells::<D>()];
-        if let (Some(brick), Some(slot)) = (store.brick(key), self.slot(key)) {
-            if let Some(nearest) = &self.bricks[slot].nearest {
-                let beside = |axis: usize, side: usize| {
-                    let mut at = key;
-                    at.0[axis] += 2 * side as i32 - 1;
-                    let nearest = self.bricks[self.slot(at)?].nearest.as_ref()?;
-                    Some(&*nearest.feature)
-                };
-                refine.brick(&self.surface, key, &nearest.feature, beside, &mut plane);
-            }
-            let resolution = self.lattice.resolution as f32;
-            let cells = brick.distances().iter().zip(brick.weights());
-            for (value, (&d, &w)) in plane.iter_mut().zip(cells) {
-                let length = *value * resolution;
-                let length = if length <= self.max_distance { length } else { f32::INFINITY };
-                let signed = if d < 0.0 { -length } else { length };
-                *value = if (w > 0.0) & (w >= self.settings.min_weight) { signed } else { f32::NAN };
-            }
+    /// Signed distances of a brick, measured to the surface around what the transform found.
+    pub(super) fn measured(&self, slot: usize, refine: &mut Refine<D>) -> Box<[f32]> {
+        let (key, brick) = (self.keys[slot], &self.bricks[slot]);
+        let mut plane = vec![f32::INFINITY; block_cells::<D>()];
+        if let Some(nearest) = &brick.nearest {
+            let beside = |axis: usize, side: usize| {
+                let mut at = key;
+                at.0[axis] += 2 * side as i32 - 1;
+                let nearest = self.bricks[self.slot(at)?].nearest.as_ref()?;
+                Some(&*nearest.feature)
+            };
+            refine.brick(&self.surface, key, &nearest.feature, beside, &mut plane);
+        }
+        let resolution = self.lattice.resolution as f32;
+        for (i, value) in plane.iter_mut().enumerate() {
+            let length = *value * resolution;
+            let length = if length <= self.max_distance { length } else { f32::INFINITY };
+            let signed = if brick.sides.inside(i) { -length } else { length };
+            *value = if brick.sides.observed(i) { signed } else { f32::NAN };
         }
         plane.into()
     }

@@ -26,6 +26,9 @@ impl<const D: usize> Anchor<D> {
     pub(super) fn of_crossings(key: BlockKey<D>, crossings: &BrickCrossings<D>) -> Option<Self> {
         let mut best: Option<(f32, Self)> = None;
         for axis in 0..D {
+            if crossings.height[axis].iter().fold(true, |none, h| none & (*h == f32::INFINITY)) {
+                continue;
+            }
             let planes = crossings.place[axis].iter().zip(&crossings.height[axis]);
             for (i, (&place, &height)) in planes.enumerate().filter(|(_, (_, h))| **h < f32::INFINITY) {
                 let offset = std::array::from_fn(|k| if k == axis { place } else { 0.0 });

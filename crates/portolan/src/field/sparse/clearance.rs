@@ -7,7 +7,7 @@ use crate::answer::Answer;
 use crate::field::{Clearance, ClearanceField, UnknownSpace};
 
 /// Bounds that are further apart (cells) are tightened by looking at the elements between them.
-const APART: f64 = 1.0 / 64.0;
+const APART: f64 = 1.0 / 32.0;
 
 /// An interval in cells.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ impl Interval {
 /// concave for any closed set, so that multilinear interpolation of lower bounds less `sum t (1 - t)` is one; and no
 /// distance changes faster than the point moves. Upper bounds are distances to elements around what the nodes found.
 /// Where the lower bound is less than a cell, the elements around the point are looked at: both bounds are then exact up
-/// to a distance of one cell. Further away, up to 24 cells, bounds that are more than 1/64 of a cell apart make it look at
+/// to a distance of one cell. Further away, up to 24 cells, bounds that are more than 1/32 of a cell apart make it look at
 /// all elements that lie between them: O(bricks within the distance); O(1) otherwise.
 ///
 /// Pessimistic answers need the distances to unknown cells ([`super::SparseEsdfSettings::unknown`]); without them

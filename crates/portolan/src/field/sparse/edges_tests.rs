@@ -69,13 +69,10 @@ fn solve<const D: usize>(map: &Map<D>, keys: &[BlockKey<D>], limit: f32, bounded
     let anchors = keys.iter().map(|&key| map.brick(key).and_then(|b| Anchor::of_crossings(key, b))).collect();
     let budgets = if bounded { bounds(keys, anchors, limit) } else { vec![limit; keys.len()] };
     let outputs = keys.iter().zip(budgets).map(|(&key, budget)| Reach { key, budget }).collect();
-    let level = edge_distances(&edges, outputs, |_, _, _, _| {});
     let mut found = Found::<D>::new();
-    for (n, key) in level.keys.iter().enumerate() {
-        let planes = level.planes(n);
+    for (key, (values, words)) in edge_distances(&edges, outputs, |_, v, w| (v.to_vec(), w.to_vec())) {
         for i in 0..block_cells::<D>() {
-            let (value, word) = (planes.values[i], planes.words[i]);
-            let inside = (value <= limit).then_some((value.to_bits(), word));
+            let inside = (values[i] <= limit).then_some((values[i].to_bits(), words[i]));
             found.insert(key.cell(i).to_vec(), inside);
         }
     }
@@ -86,8 +83,9 @@ fn solve<const D: usize>(map: &Map<D>, keys: &[BlockKey<D>], limit: f32, bounded
 fn power<const D: usize>(q: [i32; D], (axis, cell, place, height): (usize, [i32; D], f32, f32)) -> f32 {
     let d = (cell[axis] - q[axis]) as f32 + place;
     let mut sum = d * d + height;
-    // Whole squares are exact, their sum with the root is rounded once per pass.
-    for k in [0, 1, 2].into_iter().filter(|&k| k < D && k != axis) {
+    // Whole squares are exact, their sum with the root is rounded once per pass: of z-edges along y first.
+    let order = if axis == 2 { [1, 0, 2] } else { [0, 1, 2] };
+    for k in order.into_iter().filter(|&k| k < D && k != axis) {
         let d = (cell[k] - q[k]) as f32;
         sum += d * d;
     }

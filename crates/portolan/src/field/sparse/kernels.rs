@@ -108,8 +108,3 @@ pub(super) fn mask(
         *value = if rule.observed(w) { side * length } else { f32::NAN };
     }
 }
-
-/// Whether some cell was observed.
-pub(super) fn observes(weights: &[f32], min_weight: f32) -> bool {
-    weights.iter().fold(false, |any, &w| any | ((w > 0.0) & (w >= min_weight)))
-}

@@ -34,8 +34,16 @@ impl<const D: usize> Level<D> {
         self.keys.clear();
         self.keys.extend(bricks.iter().map(|r| r.key));
         let cells = bricks.len() * block_cells::<D>();
+        if self.values.capacity() < cells {
+            // Zeroed by the system, where growing would write them.
+            self.values = vec![0.0; cells];
+        }
         self.values.resize(cells, 0.0);
-        self.words.resize(if words { cells } else { 0 }, 0);
+        let words = if words { cells } else { 0 };
+        if self.words.capacity() < words {
+            self.words = vec![0; words];
+        }
+        self.words.resize(words, 0);
     }
 }
 

@@ -4,6 +4,7 @@ use super::level::{Input, lines};
 use super::min_plus::{Found, LANES, Panels, Row, Words, min_plus, min_plus_boxes, min_plus_words};
 use super::reach::{Reach, bricks_within};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
+use multiversion::multiversion;
 
 /// What a pass looks for on its lines, in bricks of type `B`.
 pub(super) trait Search<B, const D: usize>: Sync {
@@ -168,27 +169,56 @@ impl<B: Sync, const D: usize> Pass<'_, B, D> {
         let cells = block_cells::<D>();
         let mut tasks = Vec::new();
         let (mut values, mut words) = (values, words);
-        let mut first = 0;
-        for (inputs, outputs) in lines(self.inputs, self.outputs, self.axis) {
-            let count = outputs.len() * cells;
+        for line in self.lines() {
+            let count = line.outputs.len() * cells;
             let (here, behind) = std::mem::take(&mut values).split_at_mut(count);
             let (words_here, words_behind) =
                 std::mem::take(&mut words).split_at_mut(if S::WORDS { count } else { 0 });
             (values, words) = (behind, words_behind);
-            let known = if self.known.is_empty() { &[] } else { &self.known[first..first + outputs.len()] };
-            let line = Line { axis: self.axis, inputs, outputs, known, values: here, words: words_here };
-            tasks.push((first, line));
-            first += outputs.len();
+            tasks.push((line, here, words_here));
         }
-        for_each(tasks, Scratch::default, |(first, mut line), scratch| {
-            line.solve(&search, &rows, scratch);
-            let mut words = line.words.chunks_exact_mut(cells);
-            for (n, (output, values)) in
-                line.outputs.iter().zip(line.values.chunks_exact_mut(cells)).enumerate()
-            {
-                filled(first + n, output.key, values, words.next().unwrap_or_default());
+        for_each(tasks, Scratch::default, |(line, values, words), scratch| {
+            line.solve(&search, &rows, scratch, (values, words));
+            let mut words = words.chunks_exact_mut(cells);
+            for (n, (output, values)) in line.outputs.iter().zip(values.chunks_exact_mut(cells)).enumerate() {
+                filled(line.first + n, output.key, values, words.next().unwrap_or_default());
             }
         });
+    }
+
+    /// [`Pass::run`] that holds no more than a line of each thread at a time: what `make` makes of every output.
+    pub(super) fn run_each<S: Search<B, D>, R: Send>(
+        &self,
+        search: S,
+        make: impl Fn(BlockKey<D>, &mut [f32], &mut [u32]) -> R + Sync + Send,
+    ) -> Vec<R> {
+        let rows = Rows::of::<D>(self.axis, self.to);
+        let cells = block_cells::<D>();
+        let lines: Vec<_> = self.lines().collect();
+        let mut made: Vec<Vec<R>> = lines.iter().map(|line| Vec::with_capacity(line.outputs.len())).collect();
+        let scratch = || (Scratch::default(), Vec::new(), Vec::new());
+        for_each(lines.into_iter().zip(&mut made).collect(), scratch, |(line, made), scratch| {
+            let (scratch, values, words) = scratch;
+            let count = line.outputs.len() * cells;
+            values.resize(count, 0.0);
+            words.resize(if S::WORDS { count } else { 0 }, 0);
+            line.solve(&search, &rows, scratch, (&mut *values, &mut *words));
+            let mut words = words.chunks_exact_mut(cells);
+            for (output, values) in line.outputs.iter().zip(values.chunks_exact_mut(cells)) {
+                made.push(make(output.key, values, words.next().unwrap_or_default()));
+            }
+        });
+        made.into_iter().flatten().collect()
+    }
+
+    fn lines(&self) -> impl Iterator<Item = Line<'_, B, D>> {
+        let mut first = 0;
+        lines(self.inputs, self.outputs, self.axis).map(move |(inputs, outputs)| {
+            let here = first..first + outputs.len();
+            let known = self.known.get(here.clone()).unwrap_or_default();
+            first = here.end;
+            Line { axis: self.axis, first: here.start, inputs, outputs, known }
+        })
     }
 }
 
@@ -200,7 +230,18 @@ pub(super) struct Rows {
     /// Where each cell of the outputs' layout is among the found rows; of chunks of eight, unless they are torn
     /// apart.
     places: Vec<u16>,
-    torn: bool,
+    way: Way,
+}
+
+/// How eight cells that follow each other in the outputs lie among the found rows.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    /// Side by side in a row.
+    Row,
+    /// One below the other, in a lane.
+    Lane,
+    /// In lanes of several panels.
+    Torn,
 }
 
 impl Rows {
@@ -213,24 +254,32 @@ impl Rows {
             let (row, lane) = (from / lines, from % lines);
             places[layout::<D>(to, i)] = ((lane / LANES * BLOCK_EDGE + row) * LANES + lane % LANES) as u16;
         }
-        // Chunks stay together where the same axis is the fastest on both sides.
-        let torn = axis != to && (axis == 0 || to == 0);
-        if !torn {
+        let way = match places[1].wrapping_sub(places[0]) {
+            1 => Way::Row,
+            step if usize::from(step) == LANES => Way::Lane,
+            _ => Way::Torn,
+        };
+        if way != Way::Torn {
             places = places.into_iter().step_by(BLOCK_EDGE).collect();
         }
-        Self { lines, panels: lines.div_ceil(LANES), places, torn }
+        Self { lines, panels: lines.div_ceil(LANES), places, way }
     }
 
     /// A brick's plane from its found rows.
     fn collect<T: Copy>(&self, found: &[[T; LANES]], plane: &mut [T]) {
-        let found = found.as_flattened();
-        if self.torn {
-            for (value, &place) in plane.iter_mut().zip(&self.places) {
-                *value = found[place as usize];
+        let flat = found.as_flattened();
+        let (chunks, _) = plane.as_chunks_mut::<BLOCK_EDGE>();
+        match self.way {
+            Way::Row => {
+                for (chunk, &place) in chunks.iter_mut().zip(&self.places) {
+                    chunk.copy_from_slice(&flat[place as usize..][..BLOCK_EDGE]);
+                }
             }
-        } else {
-            for (chunk, &place) in plane.chunks_exact_mut(BLOCK_EDGE).zip(&self.places) {
-                chunk.copy_from_slice(&found[place as usize..][..BLOCK_EDGE]);
+            Way::Lane => turn(found, &self.places, chunks),
+            Way::Torn => {
+                for (value, &place) in plane.iter_mut().zip(&self.places) {
+                    *value = flat[place as usize];
+                }
             }
         }
     }
@@ -248,15 +297,29 @@ impl Rows {
     }
 }
 
+/// Chunks of eight from the lanes in which they stand.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
+fn turn<T: Copy>(found: &[[T; LANES]], places: &[u16], chunks: &mut [[T; BLOCK_EDGE]]) {
+    let (panels, _) = found.as_chunks::<BLOCK_EDGE>();
+    for (chunk, &place) in chunks.iter_mut().zip(places) {
+        let rows = &panels[place as usize / (BLOCK_EDGE * LANES)];
+        let lane = place as usize % LANES;
+        *chunk = std::array::from_fn(|r| rows[r][lane]);
+    }
+}
+
 /// One line of bricks.
 struct Line<'a, B, const D: usize> {
     axis: usize,
+    /// Place of the first output among all.
+    first: usize,
     inputs: &'a [Input<B, D>],
     outputs: &'a [Reach<D>],
     known: &'a [Option<Planes<'a>>],
-    values: &'a mut [f32],
-    words: &'a mut [u32],
 }
+
+/// Values and words of a line's outputs.
+type Filled<'a> = (&'a mut [f32], &'a mut [u32]);
 
 struct Scratch<L> {
     line: L,
@@ -270,7 +333,13 @@ impl<L: Default> Default for Scratch<L> {
 }
 
 impl<B, const D: usize> Line<'_, B, D> {
-    fn solve<S: Search<B, D>>(&mut self, search: &S, rows: &Rows, scratch: &mut Scratch<S::Line>) {
+    fn solve<S: Search<B, D>>(
+        &self,
+        search: &S,
+        rows: &Rows,
+        scratch: &mut Scratch<S::Line>,
+        (values, words): Filled<'_>,
+    ) {
         let axis = self.axis;
         let at = |key: &BlockKey<D>| key.0[axis];
         let far = self.outputs.iter().map(|o| bricks_within(o.budget)).max().unwrap_or(0);
@@ -280,7 +349,7 @@ impl<B, const D: usize> Line<'_, B, D> {
             let (first, last) = (at(&run[0].key), at(&run[run.len() - 1].key));
             let from = self.outputs.partition_point(|o| at(&o.key) < first - far);
             let to = self.outputs.partition_point(|o| at(&o.key) <= last + far);
-            self.leave(done..from, rows, scratch);
+            self.leave(done..from, rows, scratch, (&mut *values, &mut *words));
             done = to;
             let outputs = &self.outputs[from..to];
             let (Some(lowest), Some(highest)) = (outputs.first(), outputs.last()) else { continue };
@@ -294,37 +363,43 @@ impl<B, const D: usize> Line<'_, B, D> {
             for (n, output) in outputs.iter().enumerate() {
                 let reach = output.budget.sqrt() as usize;
                 let row = (at(&output.key) - start) as usize * BLOCK_EDGE;
-                self.begin(from + n, rows, &mut scratch.found);
+                self.begin(from + n, rows, &mut scratch.found, S::WORDS);
                 search.find(&mut scratch.line, length, row, reach, &mut scratch.found);
-                self.end(from + n, rows, &scratch.found);
+                Self::end(from + n, rows, &scratch.found, (&mut *values, &mut *words));
             }
         }
-        self.leave(done..self.outputs.len(), rows, scratch);
+        self.leave(done..self.outputs.len(), rows, scratch, (values, words));
     }
 
     /// Outputs that no input reaches.
-    fn leave<L>(&mut self, outputs: std::ops::Range<usize>, rows: &Rows, scratch: &mut Scratch<L>) {
+    fn leave<L>(
+        &self,
+        outputs: std::ops::Range<usize>,
+        rows: &Rows,
+        scratch: &mut Scratch<L>,
+        (values, words): Filled<'_>,
+    ) {
         for n in outputs {
-            self.begin(n, rows, &mut scratch.found);
-            self.end(n, rows, &scratch.found);
+            self.begin(n, rows, &mut scratch.found, !words.is_empty());
+            Self::end(n, rows, &scratch.found, (&mut *values, &mut *words));
         }
     }
 
-    fn begin(&self, n: usize, rows: &Rows, found: &mut Found) {
+    fn begin(&self, n: usize, rows: &Rows, found: &mut Found, carries: bool) {
         let blank: Row = std::array::from_fn(|lane| if lane < rows.lines { f32::INFINITY } else { 0.0 });
         found.values.clear();
         found.values.resize(rows.panels * BLOCK_EDGE, blank);
-        found.words.resize(if self.words.is_empty() { 0 } else { rows.panels * BLOCK_EDGE }, [0; LANES]);
+        found.words.resize(if carries { rows.panels * BLOCK_EDGE } else { 0 }, [0; LANES]);
         if let Some(Some(known)) = self.known.get(n) {
             rows.spread(known.values, 0, BLOCK_EDGE, &mut found.values);
             rows.spread(known.words, 0, BLOCK_EDGE, &mut found.words);
         }
     }
 
-    fn end(&mut self, n: usize, rows: &Rows, found: &Found) {
+    fn end(n: usize, rows: &Rows, found: &Found, (values, words): Filled<'_>) {
         let cells = n * block_cells::<D>()..(n + 1) * block_cells::<D>();
-        rows.collect(&found.values, &mut self.values[cells.clone()]);
-        if let Some(words) = self.words.get_mut(cells) {
+        rows.collect(&found.values, &mut values[cells.clone()]);
+        if let Some(words) = words.get_mut(cells) {
             rows.collect(&found.words, words);
         }
     }

@@ -69,7 +69,6 @@ impl<'a, const D: usize> Search<&'a BrickCrossings<D>, D> for Roots {
 
     fn find(&self, line: &mut RootLines, _: usize, first: usize, reach: usize, found: &mut Found) {
         let word = Feature::new::<D>(self.axis, [0; D]).0;
-        let shift = 10 * self.axis as u32;
         let values = found.values.chunks_exact_mut(BLOCK_EDGE);
         let out = values.zip(found.words.chunks_exact_mut(BLOCK_EDGE));
         for (list, (values, words)) in line.panels.iter().zip(out) {
@@ -77,7 +76,7 @@ impl<'a, const D: usize> Search<&'a BrickCrossings<D>, D> for Roots {
                 let mut at = [0; LANES];
                 nearest(list, (first + r) as i32, reach as i32, &mut values[r], &mut at);
                 for (to, step) in words[r].iter_mut().zip(at) {
-                    *to = word.wrapping_add((step as u32) << shift);
+                    *to = word.wrapping_add(Feature::step(self.axis, step));
                 }
             }
         }

@@ -3,13 +3,14 @@
 use super::kernels::{CellRule, mask, sign};
 use super::level::Level;
 use super::pass::map_each;
-use super::planes::EsdfBrick;
+use super::planes::{EsdfBrick, Sides};
 use super::seeds::Survey;
 use super::settings::EsdfMethod;
 use super::sparse_esdf::SparseEsdf;
 use crate::cell::SignedDistance;
 use crate::geom::block_cells;
 use crate::store::Bricks;
+use std::sync::{Arc, OnceLock};
 
 impl<const D: usize> SparseEsdf<D> {
     /// Solves the whole map by one of the methods whose seeds are cells.
@@ -44,17 +45,20 @@ impl<const D: usize> SparseEsdf<D> {
             }
         };
         self.epoch = store.epoch();
-        self.hold(&level);
+        self.hold(store, &level);
         if self.settings.unknown {
             self.solve_unknown(store, &self.keys());
         }
     }
 
-    fn hold(&mut self, level: &Level<D>) {
+    fn hold(&mut self, store: &Bricks<SignedDistance, D>, level: &Level<D>) {
         self.clear();
-        let planes: Vec<&[f32]> = level.values.chunks_exact(block_cells::<D>()).collect();
-        let bricks =
-            map_each(&planes, |plane| EsdfBrick { distance: (*plane).into(), nearest: None, unknown: None });
+        let planes: Vec<_> = level.keys.iter().zip(level.values.chunks_exact(block_cells::<D>())).collect();
+        let min_weight = self.settings.min_weight;
+        let bricks = map_each(&planes, |&(&key, plane)| {
+            let sides = store.brick(key).map_or(Sides::default(), |brick| Sides::of(brick, min_weight));
+            EsdfBrick { distance: Arc::new(OnceLock::from(Box::from(plane))), ..EsdfBrick::new(sides) }
+        });
         for (&key, brick) in level.keys.iter().zip(bricks) {
             self.add(key, brick);
         }

@@ -63,6 +63,6 @@ pub struct EsdfUpdate {
     pub touched: usize,
     /// Bricks that were solved again.
     pub solved: usize,
-    /// Bricks whose distances to the surface were measured again.
-    pub measured: usize,
+    /// Bricks whose distances to the surface are measured again when they are read.
+    pub stale: usize,
 }

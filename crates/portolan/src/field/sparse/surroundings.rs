@@ -81,21 +81,23 @@ impl<const D: usize> Spot<D> {
 /// The bricks of the nodes around a point.
 pub(super) struct Nearby<'f, const D: usize> {
     bricks: [Option<&'f EsdfBrick>; 8],
+    distances: [&'f [f32]; 8],
     places: [usize; 8],
 }
 
 impl<'f, const D: usize> Nearby<'f, D> {
     pub(super) fn of(field: &'f SparseEsdf<D>, spot: &Spot<D>) -> Self {
-        let mut nearby = Self { bricks: [None; 8], places: [0; 8] };
+        let mut nearby = Self { bricks: [None; 8], distances: [&[]; 8], places: [0; 8] };
         let mut last = None;
         for i in 0..1 << D {
             let (node, key) = (spot.node(i), BlockKey::of_cell(spot.node(i)));
             nearby.places[i] = BlockKey::offset(node);
-            nearby.bricks[i] = match last {
-                Some((of, brick)) if of == key => brick,
-                _ => field.slot(key).map(|slot| &field.bricks[slot]),
+            let (brick, distances) = match last {
+                Some((of, found)) if of == key => found,
+                _ => (field.slot(key).map(|slot| &field.bricks[slot]), field.brick(key).unwrap_or(&[])),
             };
-            last = Some((key, nearby.bricks[i]));
+            (nearby.bricks[i], nearby.distances[i]) = (brick, distances);
+            last = Some((key, (brick, distances)));
         }
         nearby
     }
@@ -109,7 +111,7 @@ impl<'f, const D: usize> Nearby<'f, D> {
         // Sums of squares in f32, and their heights.
         let certified = power * (1.0 - 1e-6) - quarter - 4e-6;
         // Up to one cell, a node's own distance is exact; in f32.
-        let found = f64::from(brick.distance[at].abs()) / field.lattice.resolution;
+        let found = f64::from(self.distances[i][at].abs()) / field.lattice.resolution;
         let exact = if found.is_nan() { 0.0 } else { (found.min(1.0).min(reach) - 1e-5).max(0.0) };
         Some(certified.max(exact * exact))
     }
@@ -133,7 +135,7 @@ impl<'f, const D: usize> Nearby<'f, D> {
     /// Signed distance (metres) between the nodes that know one: of the side where the point lies.
     pub(super) fn signed(&self, spot: &Spot<D>, max_distance: f64) -> f64 {
         let known = (0..1 << D).filter_map(|i| {
-            let value = f64::from(self.bricks[i]?.distance[self.places[i]]);
+            let value = f64::from(*self.distances[i].get(self.places[i])?);
             (!value.is_nan()).then(|| spot.weight(i) * value.clamp(-max_distance, max_distance))
         });
         known.sum()
@@ -143,12 +145,13 @@ impl<'f, const D: usize> Nearby<'f, D> {
 impl<const D: usize> SparseEsdf<D> {
     /// Whether a cell was observed.
     pub(super) fn observes(&self, cell: [i32; D]) -> bool {
-        self.value(cell).is_some_and(|v| !v.is_nan())
+        let brick = self.slot(BlockKey::of_cell(cell)).map(|slot| &self.bricks[slot]);
+        brick.is_some_and(|brick| brick.sides.observed(BlockKey::offset(cell)))
     }
 
     /// The answer about a cell that was not observed.
     pub(super) fn unobserved_at<T>(&self, cell: [i32; D]) -> Answer<T> {
-        if self.value(cell).is_some() { Answer::Unknown } else { self.nothing_at(cell) }
+        if self.slot(BlockKey::of_cell(cell)).is_some() { Answer::Unknown } else { self.nothing_at(cell) }
     }
 
     /// Distance (cells) to the nearest element of the `3^D` cells between nodes around the point: of all that are not

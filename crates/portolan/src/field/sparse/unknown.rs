@@ -100,12 +100,4 @@ impl<const D: usize> SparseEsdf<D> {
         });
         beside.map(at)
     }
-
-    /// Whether another set of cells of a brick is observed now than when it was looked at last.
-    pub(super) fn uncovered(&self, store: &Bricks<SignedDistance, D>, key: BlockKey<D>) -> bool {
-        let known = self.slot(key).map_or(&[][..], |slot| &self.bricks[slot].distance);
-        let weights = store.brick(key).map_or(&[][..], |brick| brick.weights());
-        known.len() != weights.len()
-            || known.iter().zip(weights).any(|(d, w)| d.is_nan() == observed(*w, self.settings.min_weight))
-    }
 }
