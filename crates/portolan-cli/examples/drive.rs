@@ -34,7 +34,6 @@ struct Args {
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     let place = Place::of(args.log.or_else(intel).as_deref())?;
-    let demand = Demand::new(args.radius);
 
     // From where the log begins to the place farthest from there where the robot was.
     let free = |p: &&[f64; 2]| place.clearance(**p).is_some_and(|[lower, _]| lower > args.radius + 0.1);

@@ -56,7 +56,9 @@ impl Place {
         }
         let grid = Grid::covering(seen.grown(0.5), 0.05).context("the log has no box")?;
         let mut tsdf = Tsdf::new(TsdfConfig::default().with_grid(&grid))?;
-        scans.iter().for_each(|(pose, scan)| drop(tsdf.integrate(pose, scan, true)));
+        for (pose, scan) in &scans {
+            tsdf.integrate(pose, scan, true);
+        }
         let how = SparseEsdfSettings {
             min_weight: EsdfSettings::of(&tsdf).min_weight,
             max_distance: 2.0,

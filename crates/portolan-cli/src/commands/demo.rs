@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use portolan::gallery::Gallery;
 use portolan::geom::{Grid, Pose};
 use portolan::map::SweepKind;
 use portolan::scan::{RangeLimits, Scan, ScanStats};
