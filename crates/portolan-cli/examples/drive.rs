@@ -12,11 +12,11 @@ mod planning;
 
 use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use clap::Parser;
 use planning::{Drawn, Place, intel, length, picture};
 use portolan::geom::vector;
-use portolan::plan::{Demand, PathCheck, Waypoints, check_path};
+use portolan::plan::{Demand, Waypoints, check_path};
 use portolan_draw::color;
 
 /// A certified way through a mapped building, as a picture.
@@ -34,7 +34,6 @@ struct Args {
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     let place = Place::of(args.log.or_else(intel).as_deref())?;
-    let demand = Demand::new(args.radius);
 
     // From where the log begins to the place farthest from there where the robot was.
     let free = |p: &&[f64; 2]| place.clearance(**p).is_some_and(|[lower, _]| lower > args.radius + 0.1);
@@ -45,9 +44,6 @@ fn main() -> anyhow::Result<()> {
     let found = place.search(start, goal, args.radius, 0.6, 4.0).context("there is no way")?;
 
     // As few corners as can be certified: from each the farthest one that a straight leg reaches.
-    let certified = |line: &[[f64; 2]]| {
-        Waypoints::new(line.to_vec()).map(|path| check_path(&place.field, &path, &demand))
-    };
     // A leg keeps as much room as the search took, up to what is comfortable.
     let roomy = |from: usize, to: usize| {
         let taken = found[from..=to].iter().filter_map(|p| place.clearance(*p)).map(|[lower, _]| lower);
@@ -60,12 +56,9 @@ fn main() -> anyhow::Result<()> {
         at = (at + 1..found.len()).rev().find(|&to| to == at + 1 || roomy(at, to)).unwrap_or(at + 1);
         corners.push(found[at]);
     }
-    let verdict = certified(&corners)?;
-    let PathCheck::Certified(least) = verdict else { anyhow::bail!("the way is not certified: {verdict:?}") };
-    ensure!(
-        certified(&found)?.is_certified(),
-        "neighbouring cells are certified, and so is all between them"
-    );
+    let least = place.certified(&corners, args.radius)?;
+    // Neighbouring cells are certified, and so is all between them.
+    place.certified(&found, args.radius)?;
 
     let words = format!(
         "{}: {:.1} m and {} corners; A* over cells found {:.1} m. Nowhere nearer than {:.0} cm to a surface or to what was \
@@ -74,7 +67,7 @@ fn main() -> anyhow::Result<()> {
         length(&corners),
         corners.len() - 2,
         length(&found),
-        100.0 * least.lower
+        100.0 * least
     );
     let lines = [
         Drawn { name: "A* over cells", line: &found, color: color::MEASUREMENT, robot: None },

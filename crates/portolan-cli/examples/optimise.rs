@@ -16,7 +16,6 @@ use anyhow::Context;
 use clap::Parser;
 use planning::{Drawn, Place, length, picture, resampled};
 use portolan::geom::vector;
-use portolan::plan::{Demand, PathCheck, Waypoints, check_path};
 use portolan_draw::color;
 
 /// A trajectory before and after optimisation, as a picture.
@@ -56,13 +55,9 @@ fn main() -> anyhow::Result<()> {
         descend(&place, &mut after, args.radius + args.margin);
     }
 
-    let check = |line: &[[f64; 2]]| {
-        let path = Waypoints::new(line.to_vec())?;
-        anyhow::Ok(check_path(&place.field, &path, &Demand::new(args.radius)))
-    };
-    let verdict = match check(&after)? {
-        PathCheck::Certified(least) => format!("certified, {:.0} cm at least", 100.0 * least.lower),
-        PathCheck::Violated(v) => format!("not certified from {:.2} m on: {:?}", v.from, v.cause),
+    let verdict = match place.certified(&after, args.radius) {
+        Ok(least) => format!("certified, {:.0} cm at every point", 100.0 * least),
+        Err(where_not) => where_not.to_string(),
     };
     let words = format!(
         "{}: {} steps of covariant gradient descent. Length {:.2} m before, {:.2} m after; roughness {:.2} before, {:.2} \

@@ -5,10 +5,11 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use portolan::field::{ClearanceField, EsdfSettings, SparseEsdf, SparseEsdfSettings, UnknownSpace};
 use portolan::geom::{Aabb, Grid, Pose, vector};
 use portolan::map::{Tsdf, TsdfConfig};
+use portolan::plan::{Demand, PathCheck, Waypoints, check_path};
 use portolan::scan::{RangeLimits, Scan};
 use portolan::surface::{Contour, ContourSettings, marching_squares};
 use portolan_draw::{Anchor, Canvas, Chart, Color, Entry, Font, Pen, PixelRect, Swatch, View, color};
@@ -55,7 +56,9 @@ impl Place {
         }
         let grid = Grid::covering(seen.grown(0.5), 0.05).context("the log has no box")?;
         let mut tsdf = Tsdf::new(TsdfConfig::default().with_grid(&grid))?;
-        scans.iter().for_each(|(pose, scan)| drop(tsdf.integrate(pose, scan, true)));
+        for (pose, scan) in &scans {
+            tsdf.integrate(pose, scan, true);
+        }
         let how = SparseEsdfSettings {
             min_weight: EsdfSettings::of(&tsdf).min_weight,
             max_distance: 2.0,
@@ -75,6 +78,22 @@ impl Place {
             Known(c) | Saturated(c) if !c.inside => Some([c.lower, c.upper]),
             _ => None,
         }
+    }
+
+    /// The largest clearance that a line is certified to keep at every point (metres), to a millimetre; an error says
+    /// where it does not even keep `demanded`.
+    pub(crate) fn certified(&self, line: &[[f64; 2]], demanded: f64) -> anyhow::Result<f64> {
+        let path = Waypoints::new(line.to_vec())?;
+        let (mut low, mut high) = match check_path(&self.field, &path, &Demand::new(demanded)) {
+            PathCheck::Certified(least) => (demanded.max(least.lower), least.upper.min(10.0)),
+            PathCheck::Violated(v) => bail!("not certified from {:.2} m on: {:?}", v.from, v.cause),
+        };
+        while high - low > 1e-3 {
+            let middle = 0.5 * (low + high);
+            let holds = check_path(&self.field, &path, &Demand::new(middle)).is_certified();
+            if holds { low = middle } else { high = middle }
+        }
+        Ok(low)
     }
 
     /// A* over the centres of cells (Hart, Nilsson, Raphael 1968) for a robot of this radius (metres). Where less than

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Clearance, ClearanceField, Esdf, SparseEsdf, UnknownSpace};
+use portolan::field::{Clearance, ClearanceField, Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map::{MapRepr, OccupancySweep, SparseOccupancy};
 use portolan::store::Store;
@@ -139,16 +139,53 @@ type Occupancy<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<f64>>;
 type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>;
 
 /// Certified bounds of the distance.
-type Certified<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<Clearance>>;
+struct Certified<const D: usize> {
+    field: SparseEsdf<D>,
+    unknown: UnknownSpace,
+    /// Where as much is certified, more is not said (metres).
+    limit: f64,
+}
+
+/// Cells that a field is maintained beyond what is said of it, so that a saturated answer is a certified one: bounds fall
+/// short of distances by less.
+const BEYOND: f64 = 2.0;
+
+impl<const D: usize> Certified<D> {
+    fn bounds(&self, p: [f64; D], unknown: UnknownSpace) -> Option<Clearance> {
+        match self.field.clearance(p, unknown) {
+            Answer::Known(c) | Answer::Saturated(c) => Some(c),
+            Answer::Unknown | Answer::Outside => None,
+        }
+    }
+
+    /// Fills in the bounds, and what nothing is nearer than.
+    fn complete(&self, p: [f64; D], row: &mut AnswerRow<D>) {
+        let surface = self.bounds(p, UnknownSpace::Optimistic);
+        let far = surface.is_some_and(|c| c.lower >= self.limit);
+        if far {
+            row.status = AnswerStatus::Saturated;
+            row.distance = row.distance.map(|d| self.limit.copysign(d));
+            row.gradient = None;
+        }
+        let surface_only = self.unknown == UnknownSpace::Optimistic;
+        let asked = if surface_only { surface } else { self.bounds(p, self.unknown) };
+        row.lower = asked.map(|c| if far { c.lower.min(self.limit) } else { c.lower });
+        row.upper = asked.map(|c| c.upper).filter(|u| u.is_finite() && !(far && surface_only));
+    }
+}
 
 /// What a field in bricks answers. Only the accurate method certifies.
-fn sparse<const D: usize>(esdf: SparseEsdf<D>, args: &Args) -> (Distance<D>, Option<Certified<D>>) {
+fn sparse<const D: usize>(
+    field: SparseEsdf<D>,
+    limit: f64,
+    args: &Args,
+) -> (Distance<D>, Option<Certified<D>>) {
     let unknown = args.unknown.map_or(UnknownSpace::Optimistic, UnknownArg::space);
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
+    let reach = f64::from(field.max_distance()) - BEYOND * field.lattice().resolution;
     // Bricks are shared.
-    let same = esdf.clone();
-    let certified = certifies.then(|| -> Certified<D> { Box::new(move |p| same.clearance(p, unknown)) });
-    (Box::new(move |p| esdf.distance_and_gradient(p)), certified)
+    let certified = certifies.then(|| Certified { field: field.clone(), unknown, limit: limit.min(reach) });
+    (Box::new(move |p| field.distance_and_gradient(p)), certified)
 }
 
 fn dense<const D: usize>(esdf: Esdf<D>) -> Distance<D> {
@@ -176,7 +213,7 @@ impl Fields {
 fn of_map(file: MapFile, args: &Args) -> Field<2> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
         let pessimistic = args.unknown == Some(UnknownArg::Pessimistic);
-        sparse(plane_esdf(t, args.esdf.unwrap_or_default(), pessimistic), args)
+        sparse(plane_esdf(t, args.esdf.unwrap_or_default(), pessimistic), f64::INFINITY, args)
     });
     let of_grid = || {
         let map = file.grid.as_ref()?;
@@ -203,7 +240,10 @@ fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
         let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
         how.method = args.esdf.unwrap_or_default().method();
         how.unknown = args.unknown == Some(UnknownArg::Pessimistic);
-        sparse(SparseEsdf::of(&map.store, &how), args)
+        if how.method == EsdfMethod::Accurate {
+            how.max_distance += BEYOND * map.store.lattice().resolution;
+        }
+        sparse(SparseEsdf::of(&map.store, &how), max_distance, args)
     });
     let (distance, clearance) =
         field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
@@ -312,14 +352,9 @@ impl<const D: usize> Field<D> {
             Answer::Outside => row.status = AnswerStatus::Outside,
         }
         if matches!(row.status, AnswerStatus::Known | AnswerStatus::Saturated)
-            && let Some(clearance) = &self.clearance
+            && let Some(certified) = &self.clearance
         {
-            let bounds = match clearance(p) {
-                Answer::Known(c) | Answer::Saturated(c) => Some(c),
-                Answer::Unknown | Answer::Outside => None,
-            };
-            row.lower = bounds.map(|c| c.lower);
-            row.upper = bounds.map(|c| c.upper).filter(|u| u.is_finite());
+            certified.complete(p, &mut row);
         }
         row
     }

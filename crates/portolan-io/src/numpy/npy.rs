@@ -48,7 +48,7 @@ pub(super) fn write(w: &mut impl Write, array: &NpyArray) -> io::Result<()> {
         array.values.description()
     );
     // The values begin at a multiple of 64 bytes.
-    while (MAGIC.len() + 4 + header.len() + 1) % 64 != 0 {
+    while !(MAGIC.len() + 4 + header.len() + 1).is_multiple_of(64) {
         header.push(' ');
     }
     header.push('\n');

@@ -1,0 +1,38 @@
+//! What the README shows to planners, in the plane and in space.
+
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
+
+use portolan::field::{SparseEsdf, SparseEsdfSettings};
+use portolan::map::{SparseTsdf, SparseTsdfConfig, Tsdf2, Tsdf2Config};
+use portolan::plan::{Demand, Waypoints, check_path};
+
+/// Distances to a wall at x = 3, as a map would have them.
+fn wall_2d() -> Tsdf2 {
+    let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [80, 60], ..Default::default() }).unwrap();
+    (0..tsdf.grid().len()).for_each(|i| {
+        let cell = tsdf.grid().cell(i);
+        let d = 3.0 - tsdf.grid().lattice.center(cell)[0];
+        tsdf.fuse(cell, d, 1.0);
+    });
+    tsdf
+}
+
+#[test]
+fn in_the_plane() {
+    let tsdf = wall_2d();
+    let how = SparseEsdfSettings { unknown: true, ..Default::default() };
+    let field = SparseEsdf::of_tsdf(&tsdf, &how);
+    let path = Waypoints::new(vec![[0.5, 0.5], [2.5, 1.5], [2.5, 2.4]]).unwrap();
+    assert!(check_path(&field, &path, &Demand::new(0.4)).is_certified());
+    assert!(!check_path(&field, &path, &Demand::new(0.55)).is_certified());
+}
+
+#[test]
+fn in_space() {
+    let tsdf = SparseTsdf::new(SparseTsdfConfig::default()).unwrap();
+    let how = SparseEsdfSettings { unknown: true, ..Default::default() };
+    let field = SparseEsdf::of(tsdf.store(), &how);
+    let path = Waypoints::new(vec![[0.0, 0.0, 1.0], [2.0, 1.0, 1.5]]).unwrap();
+    // Nothing was seen yet: nothing is certified.
+    assert!(!check_path(&field, &path, &Demand::new(0.3)).is_certified());
+}
