@@ -18,6 +18,7 @@ pub(crate) struct BrickCrossings<const D: usize> {
 /// Who knows the crossings of every brick.
 pub(crate) trait Crossings<const D: usize>: Sync {
     /// The bricks with at least one crossing, ascending.
+    #[cfg(test)]
     fn keys(&self) -> Vec<BlockKey<D>>;
 
     /// The crossings on the edges that start in a brick; `None`: there are none.
