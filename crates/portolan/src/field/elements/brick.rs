@@ -47,7 +47,7 @@ impl<const D: usize> Scratch<D> {
         Self {
             nodes: Nodes::new(),
             cell: CellSurface::default(),
-            numbers: vec![NONE; D * block_cells::<D>() << D],
+            numbers: vec![NONE; (D * block_cells::<D>()) << D],
             edges: Vec::new(),
         }
     }

@@ -114,7 +114,7 @@ impl<const D: usize> Block<D> {
                 for k in 0..D {
                     from[k] = points[k][i] - one.corners[s][k];
                 }
-                let t = (dot(&from, &one.sides[s]) * one.inverse_sq[s]).max(0.0).min(1.0);
+                let t = (dot(&from, &one.sides[s]) * one.inverse_sq[s]).clamp(0.0, 1.0);
                 let mut sq = 0.0;
                 for k in 0..D {
                     let off = from[k] - t * one.sides[s][k];

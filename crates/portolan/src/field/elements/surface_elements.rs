@@ -32,6 +32,7 @@ impl<const D: usize> SurfaceElements<D> {
     }
 
     /// The surface of a whole map. O(cells).
+    #[cfg(test)]
     pub(crate) fn of(store: &Bricks<SignedDistance, D>, min_weight: f32) -> Self {
         let mut all = Self::new(min_weight);
         all.update(store, &store.keys());
@@ -96,6 +97,7 @@ impl<const D: usize> SurfaceElements<D> {
     }
 
     /// The keys of the bricks with elements, ascending.
+    #[cfg(test)]
     pub(crate) fn element_keys(&self) -> Vec<BlockKey<D>> {
         let mut keys: Vec<_> = self.elements.keys().copied().collect();
         keys.sort_unstable();

@@ -122,7 +122,7 @@ impl<const D: usize> SparseEsdf<D> {
             interval.lower = lower;
             for i in 0..1 << D {
                 let at_node = nearby.unknown_at(i).map_or(f64::INFINITY, |sq| f64::from(sq).sqrt());
-                interval.upper = interval.upper.min(at_node * (1.0 + 1e-6) + spot.from_node(i));
+                interval.upper = interval.upper.min(at_node * (1.0 + 1e-6) + spot.to_node(i));
             }
         }
         if interval.lower < 1.0 {

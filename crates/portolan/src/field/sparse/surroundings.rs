@@ -39,7 +39,7 @@ impl<const D: usize> Spot<D> {
     }
 
     /// Distance from node `i`, in cells.
-    pub(super) fn from_node(&self, i: usize) -> f64 {
+    pub(super) fn to_node(&self, i: usize) -> f64 {
         let off = |k: usize| self.t[k] - (i >> k & 1) as f64;
         (0..D).map(|k| off(k) * off(k)).sum::<f64>().sqrt()
     }
@@ -58,7 +58,7 @@ impl<const D: usize> Spot<D> {
                 continue;
             };
             sum += self.weight(i) * sq;
-            let reached = sq.sqrt() - self.from_node(i);
+            let reached = sq.sqrt() - self.to_node(i);
             steep = Some(steep.map_or(reached, |s: f64| s.max(reached)));
         }
         let bend: f64 = self.t.iter().map(|t| t * (1.0 - t)).sum();
