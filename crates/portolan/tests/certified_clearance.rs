@@ -94,6 +94,16 @@ impl Slack {
     }
 }
 
+/// Bounds that are only as narrow as a demand needs are bounds, and decide what the narrow ones do.
+fn decides_alike<const D: usize>(esdf: &SparseEsdf<D>, p: [f64; D], exact: f64, narrow: &Clearance) {
+    for enough in [0.0, 0.5 * exact, exact - 0.001, exact - 0.02, exact + 0.001, exact + 0.02, 2.0 * exact] {
+        let wide = esdf.clearance_against(p, UnknownSpace::Optimistic, enough).known().unwrap();
+        assert!(wide.lower <= exact && exact <= wide.upper && wide.inside == narrow.inside);
+        assert_eq!(wide.lower >= enough, narrow.lower >= enough, "{wide:?} {narrow:?} {enough}");
+        assert_eq!(wide.upper < enough, narrow.upper < enough, "{wide:?} {narrow:?} {enough}");
+    }
+}
+
 /// Asks at a million points; exact distances to the surface are `exact`.
 fn no_bound_is_violated<const D: usize>(
     name: &str,
@@ -114,6 +124,9 @@ fn no_bound_is_violated<const D: usize>(
                 slack.note(r, want, &c);
                 if n % 12 < 3 {
                     uniform.note(r, want, &c);
+                }
+                if n % 10 == 0 {
+                    decides_alike(esdf, p, want, &c);
                 }
                 // Exact but for rounding.
                 if want < 0.999 * r {

@@ -31,8 +31,15 @@ pub enum UnknownSpace {
 /// that was not observed (for [`UnknownSpace::Optimistic`]: and nothing is maintained there); outside, nowhere near
 /// the map.
 pub trait ClearanceField<const D: usize>: Sync {
-    /// The interval at a point (world). O(1).
+    /// The interval at a point (world), as narrow as the field can make it. O(1), but where a field looks closer.
     fn clearance(&self, p_world: [f64; D], unknown: UnknownSpace) -> Answer<Clearance>;
+
+    /// An interval that is only as narrow as it takes to tell whether the clearance is at least `enough` (metres):
+    /// decides whatever [`ClearanceField::clearance`] decides, and may cost less.
+    fn clearance_against(&self, p_world: [f64; D], unknown: UnknownSpace, enough: f64) -> Answer<Clearance> {
+        let _ = enough;
+        self.clearance(p_world, unknown)
+    }
 
     /// Signed distance (metres) and the exact derivative of the same interpolant, not certified. O(1).
     fn distance_and_gradient(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])>;

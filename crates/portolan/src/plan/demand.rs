@@ -40,17 +40,35 @@ impl Demand {
         self.tolerance.max(1e-3 * field.resolution()).max(1e-9)
     }
 
-    /// What the field says of a point.
+    /// What the field says of a point, as exactly as it can.
     pub(super) fn at<const D: usize>(
         &self,
         field: &(impl ClearanceField<D> + ?Sized),
         p_world: [f64; D],
     ) -> Verdict {
+        self.judge(field, p_world, || field.clearance(p_world, self.unknown))
+    }
+
+    /// What the field says of a point, where only the verdict counts: bounds may be wider.
+    pub(super) fn met_at<const D: usize>(
+        &self,
+        field: &(impl ClearanceField<D> + ?Sized),
+        p_world: [f64; D],
+    ) -> Verdict {
+        self.judge(field, p_world, || field.clearance_against(p_world, self.unknown, self.clearance))
+    }
+
+    fn judge<const D: usize>(
+        &self,
+        field: &(impl ClearanceField<D> + ?Sized),
+        p_world: [f64; D],
+        ask: impl FnOnce() -> Answer<Clearance>,
+    ) -> Verdict {
         let refused = |cause| Verdict::Refused { cause, reach: 0.0 };
         if !p_world.iter().all(|v| v.is_finite()) {
             return refused(Cause::Outside);
         }
-        match field.clearance(p_world, self.unknown) {
+        match ask() {
             Answer::Outside => refused(Cause::Outside),
             Answer::Unknown => refused(Cause::Unknown),
             Answer::Known(found) => self.of(field, p_world, found),

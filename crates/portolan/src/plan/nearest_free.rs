@@ -80,7 +80,9 @@ pub fn nearest_free<const D: usize>(
         Verdict::Free(_) => return NearestFree::Here,
         Verdict::Refused { reach, .. } => reach,
     };
-    search(field.resolution(), p_world, reach, limits, |p| matches!(demand.at(field, p), Verdict::Free(_)))
+    search(field.resolution(), p_world, reach, limits, |p| {
+        matches!(demand.met_at(field, p), Verdict::Free(_))
+    })
 }
 
 /// The nearest position of a body, turned as it is, at which all of it is certified to be free. As [`nearest_free`], with a

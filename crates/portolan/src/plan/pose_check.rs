@@ -29,7 +29,7 @@ impl BodyCheck {
 /// Between the body's surface and the nearest obstacle, at least and at most (metres).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyClearance {
-    /// At least so much; at least what was demanded.
+    /// At least so much; at least what was demanded, and no more than it takes to tell that.
     pub lower: f64,
     /// At most so much; infinite where nothing is near, or the body has no sphere.
     pub upper: f64,
@@ -88,7 +88,7 @@ pub fn check_pose<const D: usize>(
 ) -> BodyCheck {
     let mut free = BodyClearance::NOTHING;
     for (sphere, &Sphere { center, radius }) in body.spheres().iter().enumerate() {
-        match demand.beyond(radius).at(field, world_from_body.transform_point(center)) {
+        match demand.beyond(radius).met_at(field, world_from_body.transform_point(center)) {
             Verdict::Free(found) => free.include(sphere, found.lower - radius, found.upper - radius),
             Verdict::Refused { cause, .. } => return BodyCheck::Refused { sphere, cause },
         }

@@ -132,7 +132,10 @@ fn following_equals_starting_again<const D: usize>(seed: u64, noise: Noise) {
             let key = store.keys()[random.next() as usize % store.len()];
             let mut brick = store.brick(key).unwrap().clone();
             let i = random.next() as usize % block_cells::<D>();
-            brick.set(i, (random.next() % 2 == 0).then_some(SignedDistance { distance: -0.1, weight: 1.0 }));
+            brick.set(
+                i,
+                (random.next().is_multiple_of(2)).then_some(SignedDistance { distance: -0.1, weight: 1.0 }),
+            );
             store.insert(key, brick).unwrap();
         }
         let touched = elements.update(&store, &store.changed_since(seen));

@@ -41,18 +41,11 @@ impl Interval {
 /// unknown cells are looked for around the point only, and `lower` is never more than a cell.
 impl<const D: usize> ClearanceField<D> for SparseEsdf<D> {
     fn clearance(&self, p_world: [f64; D], unknown: UnknownSpace) -> Answer<Clearance> {
-        let Some(spot) = Spot::of(self, p_world) else { return Answer::Outside };
-        if unknown == UnknownSpace::Pessimistic && !self.observes(spot.holder) {
-            return self.unobserved_at(spot.holder);
-        }
-        let mut nearby = Nearby::of(self, &spot);
-        let Some((mut interval, signed)) = self.to_surface(&spot, &mut nearby) else {
-            return self.unobserved_at(spot.holder);
-        };
-        if unknown == UnknownSpace::Pessimistic {
-            interval = interval.nearer(self.to_unknown(&spot, &nearby));
-        }
-        self.answer(&spot, interval, signed < 0.0)
+        self.interval(p_world, unknown, None)
+    }
+
+    fn clearance_against(&self, p_world: [f64; D], unknown: UnknownSpace, enough: f64) -> Answer<Clearance> {
+        self.interval(p_world, unknown, Some(enough / self.lattice.resolution))
     }
 
     fn distance_and_gradient(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])> {
@@ -65,6 +58,22 @@ impl<const D: usize> ClearanceField<D> for SparseEsdf<D> {
 }
 
 impl<const D: usize> SparseEsdf<D> {
+    /// `enough` (cells): bounds need not be tightened that say on which side of it the clearance is.
+    fn interval(&self, p_world: [f64; D], unknown: UnknownSpace, enough: Option<f64>) -> Answer<Clearance> {
+        let Some(spot) = Spot::of(self, p_world) else { return Answer::Outside };
+        if unknown == UnknownSpace::Pessimistic && !self.observes(spot.holder) {
+            return self.unobserved_at(spot.holder);
+        }
+        let mut nearby = Nearby::of(self, &spot);
+        let Some((mut interval, signed)) = self.to_surface(&spot, &mut nearby, enough) else {
+            return self.unobserved_at(spot.holder);
+        };
+        if unknown == UnknownSpace::Pessimistic {
+            interval = interval.nearer(self.to_unknown(&spot, &nearby));
+        }
+        self.answer(&spot, interval, signed < 0.0)
+    }
+
     /// How far the nearest cell is that was not observed, at least and at most (metres); cells of bricks that were never
     /// made are among them. 0 in such a cell; saturated beyond the largest distance, and beyond a cell where
     /// [`super::SparseEsdfSettings::unknown`] did not ask for these distances. `inside` is false. O(1).
@@ -91,7 +100,12 @@ impl<const D: usize> SparseEsdf<D> {
 
     /// Distance to the extracted surface in cells, and a value whose sign is that of the side; `None` where nothing is
     /// maintained.
-    fn to_surface(&self, spot: &Spot<D>, nearby: &mut Nearby<'_, D>) -> Option<(Interval, f64)> {
+    fn to_surface(
+        &self,
+        spot: &Spot<D>,
+        nearby: &mut Nearby<'_, D>,
+        enough: Option<f64>,
+    ) -> Option<(Interval, f64)> {
         let lower_sq = |i: usize| nearby.surface_sq(self, i);
         let mut interval = Interval { lower: spot.lower_bound(lower_sq)?, upper: f64::INFINITY };
         if interval.lower < 1.0 {
@@ -105,7 +119,10 @@ impl<const D: usize> SparseEsdf<D> {
         if interval.upper > interval.lower {
             interval.upper = interval.upper.min(self.to_elements_found(spot, nearby));
             let apart = interval.upper - interval.lower;
-            if apart > APART && interval.upper <= FURTHEST {
+            // What rounding may have done is taken off afterwards.
+            let decided =
+                enough.is_some_and(|e| interval.lower - spot.margin >= e || interval.upper + spot.margin < e);
+            if apart > APART && interval.upper <= FURTHEST && !decided {
                 interval.upper = self.search_elements(spot, interval.upper);
                 interval.lower = interval.upper;
             }
