@@ -213,7 +213,16 @@ impl Fields {
 fn of_map(file: MapFile, args: &Args) -> Field<2> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
         let pessimistic = args.unknown == Some(UnknownArg::Pessimistic);
-        sparse(plane_esdf(t, args.esdf.unwrap_or_default(), pessimistic), f64::INFINITY, args)
+        let field = plane_esdf(t, args.esdf.unwrap_or_default(), pessimistic);
+        let (distance, clearance) = sparse(field, f64::INFINITY, args);
+        // A map of the plane is a box: what lies outside does not depend on where something was seen.
+        let bounds = t.grid().aabb();
+        let in_box: Distance<2> = Box::new(move |p| match distance(p) {
+            _ if !bounds.contains(p) => Answer::Outside,
+            Answer::Outside => Answer::Unknown,
+            answer => answer,
+        });
+        (in_box, clearance)
     });
     let of_grid = || {
         let map = file.grid.as_ref()?;
