@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 use portolan::field::{SparseEsdf, SparseEsdfSettings};
-use portolan::map::{SparseTsdf, SparseTsdfConfig, Tsdf2, Tsdf2Config};
+use portolan::map::{SparseTsdf, SparseTsdfConfig, Tsdf, Tsdf2, Tsdf2Config, TsdfConfig};
 use portolan::plan::{Demand, Waypoints, check_path};
+use portolan::store::Bricks;
 
 /// Distances to a wall at x = 3, as a map would have them.
 fn wall_2d() -> Tsdf2 {
@@ -29,10 +30,20 @@ fn in_the_plane() {
 
 #[test]
 fn in_space() {
-    let tsdf = SparseTsdf::new(SparseTsdfConfig::default()).unwrap();
     let how = SparseEsdfSettings { unknown: true, ..Default::default() };
-    let field = SparseEsdf::of(tsdf.store(), &how);
-    let path = Waypoints::new(vec![[0.0, 0.0, 1.0], [2.0, 1.0, 1.5]]).unwrap();
+    let path = Waypoints::new(vec![[0.5, 0.5, 0.5], [1.5, 1.0, 1.5], [1.5, 1.5, 1.0]]).unwrap();
     // Nothing was seen yet: nothing is certified.
+    let unseen = SparseTsdf::new(SparseTsdfConfig::default()).unwrap();
+    let field = SparseEsdf::of(unseen.store(), &how);
     assert!(!check_path(&field, &path, &Demand::new(0.3)).is_certified());
+    // A wall at x = 2.
+    let mut tsdf = Tsdf::<3>::new(TsdfConfig { cells: [48; 3], ..Default::default() }).unwrap();
+    (0..tsdf.grid().len()).for_each(|i| {
+        let cell = tsdf.grid().cell(i);
+        let d = 2.0 - tsdf.grid().lattice.center(cell)[0];
+        tsdf.fuse(cell, d, 1.0);
+    });
+    let field = SparseEsdf::of(&Bricks::from(tsdf.store()), &how);
+    assert!(check_path(&field, &path, &Demand::new(0.45)).is_certified());
+    assert!(!check_path(&field, &path, &Demand::new(0.55)).is_certified());
 }

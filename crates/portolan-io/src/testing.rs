@@ -76,8 +76,8 @@ pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
 /// A Python with a package.
 pub(crate) struct Python(PathBuf);
 
-/// The Python of `PORTOLAN_PYTHON`, else `python3`, if it has the package. Without it a loud line says so: the files are
-/// tested against their description all the same.
+/// The Python of `PORTOLAN_PYTHON`, else `python3`, if it has the package. Without it a loud line says so and the
+/// test is skipped.
 pub(crate) fn python(package: &str) -> Option<Python> {
     let named = std::env::var_os("PORTOLAN_PYTHON").map(PathBuf::from);
     let python = Python(named.unwrap_or_else(|| "python3".into()));
@@ -87,7 +87,7 @@ pub(crate) fn python(package: &str) -> Option<Python> {
     let shown = python.0.display();
     writeln!(
         std::io::stderr(),
-        "NOT COMPARED: {shown} has no {package} (set PORTOLAN_PYTHON to a Python that has)"
+        "SKIPPED: {shown} has no {package} (set PORTOLAN_PYTHON to a Python that has)"
     )
     .unwrap();
     None
