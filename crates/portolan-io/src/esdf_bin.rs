@@ -79,6 +79,32 @@ pub fn write_esdf<const D: usize>(
     status: Option<&[u8]>,
 ) -> Result<(), IoError> {
     let path = path.as_ref();
+    check_esdf(path, grid, distances, status)?;
+    write_atomic(path, |w| write_to(w, grid, distances, status))
+}
+
+/// The same in memory, for who hands files on in another way.
+///
+/// # Errors
+/// [`IoError::Unwritable`] as [`EsdfBin::write`].
+pub fn esdf_to_bytes<const D: usize>(
+    grid: &Grid<D>,
+    distances: &[f32],
+    status: Option<&[u8]>,
+) -> Result<Vec<u8>, IoError> {
+    let name = Path::new("esdf.bin");
+    check_esdf(name, grid, distances, status)?;
+    let mut bytes = Vec::new();
+    write_to(&mut bytes, grid, distances, status).map_err(|e| IoError::os(name, "write it", e))?;
+    Ok(bytes)
+}
+
+fn check_esdf<const D: usize>(
+    path: &Path,
+    grid: &Grid<D>,
+    distances: &[f32],
+    status: Option<&[u8]>,
+) -> Result<(), IoError> {
     let cells = grid.checked_len().filter(|&n| n as u64 <= MOST_CELLS);
     let fits = cells == Some(distances.len()) && status.is_none_or(|s| s.len() == distances.len());
     if !fits || distances.is_empty() {
@@ -96,25 +122,33 @@ pub fn write_esdf<const D: usize>(
         let value = format!("{resolution} at {origin:?}");
         return Err(IoError::unwritable(path, "the resolution", value, "give finite values, above zero"));
     }
-    write_atomic(path, |w| {
-        w.write_all(MAGIC)?;
-        for word in [1, D as u32] {
-            w.write_all(&word.to_le_bytes())?;
-        }
-        for k in 0..3 {
-            w.write_all(&(grid.shape.get(k).map_or(1, |&s| s as u32)).to_le_bytes())?;
-        }
-        w.write_all(&u32::from(status.is_some()).to_le_bytes())?;
-        for k in 0..3 {
-            w.write_all(&origin.get(k).copied().unwrap_or(0.0).to_le_bytes())?;
-        }
-        w.write_all(&resolution.to_le_bytes())?;
-        for chunk in distances.chunks(1 << 14) {
-            let bytes: Vec<u8> = chunk.iter().flat_map(|d| d.to_le_bytes()).collect();
-            w.write_all(&bytes)?;
-        }
-        w.write_all(status.unwrap_or(&[]))
-    })
+    Ok(())
+}
+
+fn write_to<const D: usize>(
+    w: &mut impl Write,
+    grid: &Grid<D>,
+    distances: &[f32],
+    status: Option<&[u8]>,
+) -> std::io::Result<()> {
+    let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
+    w.write_all(MAGIC)?;
+    for word in [1, D as u32] {
+        w.write_all(&word.to_le_bytes())?;
+    }
+    for k in 0..3 {
+        w.write_all(&(grid.shape.get(k).map_or(1, |&s| s as u32)).to_le_bytes())?;
+    }
+    w.write_all(&u32::from(status.is_some()).to_le_bytes())?;
+    for k in 0..3 {
+        w.write_all(&origin.get(k).copied().unwrap_or(0.0).to_le_bytes())?;
+    }
+    w.write_all(&resolution.to_le_bytes())?;
+    for chunk in distances.chunks(1 << 14) {
+        let bytes: Vec<u8> = chunk.iter().flat_map(|d| d.to_le_bytes()).collect();
+        w.write_all(&bytes)?;
+    }
+    w.write_all(status.unwrap_or(&[]))
 }
 
 impl EsdfFile {

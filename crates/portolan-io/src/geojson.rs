@@ -27,6 +27,18 @@ pub fn write_geojson(path: impl AsRef<Path>, lines: &[Polyline]) -> Result<(), I
     write_atomic(path, |w| write_to(w, lines))
 }
 
+/// The same in memory, for who hands files on in another way.
+///
+/// # Errors
+/// [`IoError::Unwritable`] for a coordinate that is not finite.
+pub fn geojson_to_bytes(lines: &[Polyline]) -> Result<Vec<u8>, IoError> {
+    let name = Path::new("contour.geojson");
+    check_finite(name, lines)?;
+    let mut bytes = Vec::new();
+    write_to(&mut bytes, lines).map_err(|e| IoError::os(name, "write it", e))?;
+    Ok(bytes)
+}
+
 /// Refuses coordinates that no text format can hold.
 pub(crate) fn check_finite(path: &Path, lines: &[Polyline]) -> Result<(), IoError> {
     match lines.iter().flatten().find(|p| !p.iter().all(|v| v.is_finite())) {

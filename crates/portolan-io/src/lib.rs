@@ -70,8 +70,8 @@ pub use container::{Chunk, Container, ContainerWriter};
 pub use costmap::write_costmap;
 pub use detect::{FileKind, detect};
 pub use error::IoError;
-pub use esdf_bin::{EsdfBin, EsdfFile, write_esdf};
-pub use geojson::{parse_geojson, read_geojson, write_geojson};
+pub use esdf_bin::{EsdfBin, EsdfFile, esdf_to_bytes, write_esdf};
+pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{

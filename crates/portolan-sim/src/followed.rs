@@ -28,6 +28,7 @@ pub struct GhostGroup {
 }
 
 /// A followed cell.
+#[derive(Clone, Debug)]
 pub(crate) struct Followed {
     /// Distance of the new world (metres), clamped to the truncation.
     pub(crate) truth: f64,
@@ -118,7 +119,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 impl GhostGroup {
     /// What these cells have in common.
-    pub(crate) fn of(cells: &[&Followed], rule: &TsdfRule, laps: usize) -> Self {
+    pub(crate) fn of(cells: &[&Followed], rule: &TsdfRule, laps: f64) -> Self {
         let of = |f: &dyn Fn(&Followed) -> f64| median(cells.iter().map(|c| f(c)).collect());
         let full: Vec<f64> = cells
             .iter()
@@ -142,7 +143,7 @@ impl GhostGroup {
             },
             half_life_of_gains: of(&Followed::half_life_of_gains),
             weight: median(cells.iter().flat_map(|c| c.events.iter().map(weight_of)).collect()),
-            observations_per_lap: of(&|c| c.events.len() as f64) / laps as f64,
+            observations_per_lap: of(&|c| c.events.len() as f64) / laps,
             weight_at_move: of(&|c| c.weight_at_move),
             curve: curve.collect(),
         }

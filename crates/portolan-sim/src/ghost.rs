@@ -5,7 +5,8 @@
 //! re-observation. Filter theory says: it halves every `ln 2 / ln(1 + w / W_max)` of them.
 
 use crate::drive::{LapConfig, lap};
-use crate::followed::{Fate, Followed, GhostGroup};
+use crate::followed::GhostGroup;
+use crate::ghost_watch::GhostWatch;
 use crate::{CHAIR_MOVE, StaticNoise, World, apartment, static_noise};
 use portolan::geom::{Aabb, Grid};
 use portolan::map::{MapError, SweepKind, Tsdf, TsdfConfig};
@@ -92,7 +93,7 @@ struct Run {
     saturated_after: Option<usize>,
     laps_before: usize,
     laps_after: usize,
-    cells: Vec<([i32; 2], Followed)>,
+    watch: Option<GhostWatch>,
     done: bool,
 }
 
@@ -115,7 +116,7 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
             saturated_after: None,
             laps_before: 0,
             laps_after: 0,
-            cells: Vec::new(),
+            watch: None,
             done: false,
         });
     }
@@ -174,19 +175,19 @@ fn chair(world: &World) -> Aabb<2> {
 }
 
 /// Cells of the chair's place: centre in the chair or within a cell of it, estimated as behind or near its surface.
-fn old_place(tsdf: &Tsdf<2>, place: Aabb<2>) -> Vec<[i32; 2]> {
+pub(crate) fn old_place(tsdf: &Tsdf<2>, place: Aabb<2>) -> Vec<[i32; 2]> {
     let near = place.grown(tsdf.grid().lattice.resolution);
     let limit = (0.5 * tsdf.config().truncation) as f32;
     cells_in(tsdf, near).filter(|&c| tsdf.store_cell(c).is_some_and(|s| s.distance < limit)).collect()
 }
 
-fn cells_in(tsdf: &Tsdf<2>, place: Aabb<2>) -> impl Iterator<Item = [i32; 2]> + '_ {
+pub(crate) fn cells_in(tsdf: &Tsdf<2>, place: Aabb<2>) -> impl Iterator<Item = [i32; 2]> + '_ {
     let grid = tsdf.grid();
     (0..grid.len()).map(|i| grid.cell(i)).filter(move |&c| place.contains(grid.lattice.center(c)))
 }
 
 /// Shorter words for what is asked often.
-trait StoreCell {
+pub(crate) trait StoreCell {
     fn store_cell(&self, cell: [i32; 2]) -> Option<portolan::cell::SignedDistance>;
 }
 
@@ -198,27 +199,10 @@ impl StoreCell for Tsdf<2> {
 
 impl Run {
     /// Chooses the cells and watches them from now on.
-    fn follow(&mut self, after: &World, [old, new]: [Aabb<2>; 2]) {
-        let tau = self.tsdf.config().truncation;
-        let mut chosen: Vec<_> = old_place(&self.tsdf, old).into_iter().map(|c| (c, false)).collect();
-        // At the new place all that was free and comes to lie in the chair.
-        chosen.extend(cells_in(&self.tsdf, new).map(|c| (c, true)));
-        for (cell, appears) in chosen {
-            let Some(state) = self.tsdf.store_cell(cell) else { continue };
-            let truth = after.signed_distance(self.tsdf.grid().lattice.center(cell)).clamp(-tau, tau);
-            self.cells.push((
-                cell,
-                Followed {
-                    truth,
-                    appears,
-                    distance_at_move: state.distance.into(),
-                    weight_at_move: state.weight.into(),
-                    events: Vec::new(),
-                },
-            ));
-        }
-        self.cells.sort_by_key(|c| c.0);
-        self.tsdf.watch(self.cells.iter().map(|c| c.0));
+    fn follow(&mut self, after: &World, places: [Aabb<2>; 2]) {
+        let watch = GhostWatch::new(&self.tsdf, after, places);
+        self.tsdf.watch(watch.cells());
+        self.watch = Some(watch);
     }
 
     /// One more lap; done when all measured cells were seen often enough.
@@ -227,38 +211,27 @@ impl Run {
         scans: &[(portolan::geom::Pose<2>, portolan::scan::Scan<2>)],
         settings: &GhostSettings,
     ) {
+        let Some(watch) = &mut self.watch else { return };
         for (pose, scan) in scans {
             self.tsdf.integrate(pose, scan, true);
-            for (cell, event) in self.tsdf.events() {
-                if let Ok(i) = self.cells.binary_search_by_key(cell, |c| c.0) {
-                    self.cells[i].1.events.push(*event);
-                }
-            }
+            watch.observe(self.tsdf.events());
         }
         self.laps_after += 1;
-        let w_max = self.w_max;
-        let mut measured = self.cells.iter().filter(|c| c.1.fate(w_max) == Fate::Measured).peekable();
-        // Without a cell that is seen again the run goes on to its last lap.
-        self.done = measured.peek().is_some()
-            && measured.all(|(_, c)| {
-                let half_life = self.tsdf.rule().half_life(c.weight());
-                c.events.len() as f64 >= settings.half_lives * half_life
-            });
+        self.done = watch.is_measured(self.tsdf.rule(), settings.half_lives);
     }
 
     fn tell(self) -> GhostRun {
-        let group = |fate: Fate| {
-            let cells = self.cells.iter().map(|c| &c.1).filter(|c| c.fate(self.w_max) == fate);
-            GhostGroup::of(&cells.collect::<Vec<_>>(), self.tsdf.rule(), self.laps_after)
-        };
+        let groups =
+            self.watch.map(|w| w.groups(self.tsdf.rule(), self.laps_after as f64)).unwrap_or_default();
+        let [measured, unclamped, tapered] = groups;
         GhostRun {
             w_max: self.w_max,
             laps_before: self.laps_before,
             laps_until_saturated: self.saturated_after,
             laps_after: self.laps_after,
-            measured: group(Fate::Measured),
-            unclamped: group(Fate::Unclamped),
-            tapered: group(Fate::Tapered),
+            measured,
+            unclamped,
+            tapered,
             static_noise: None,
         }
     }

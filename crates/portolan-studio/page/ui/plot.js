@@ -1,0 +1,69 @@
+// @ts-check
+import uPlot from "../vendor/uPlot.js";
+import { colors } from "./theme.js";
+import { el } from "./controls.js";
+
+/**
+ * A plot of lines over one axis, which follows its frame's size and the theme.
+ *
+ * @param {{id: string, label: string, x: string, y: string, height?: number,
+ *   series: {label: string, color: string, dashed?: boolean, width?: number, fill?: boolean, points?: boolean, steps?: boolean}[],
+ *   log?: boolean, yRange?: [number, number]}} o `label` says in words what is plotted; colours by the names of style.css
+ */
+export function plot(o) {
+  const node = el("figure", { class: "plot", id: o.id, role: "img", "aria-label": o.label });
+  if (o.height) node.style.height = `${o.height}px`;
+  /** @type {any} */
+  let made;
+  /** @type {(number | null)[][]} */
+  let data = [[], ...o.series.map(() => [])];
+
+  function make() {
+    made?.destroy();
+    const c = colors();
+    const axis = (/** @type {string} */ label, /** @type {number} */ size) => ({
+      label, stroke: c.muted, labelSize: 18, size, font: "11px system-ui, sans-serif", labelFont: "11px system-ui, sans-serif",
+      grid: { stroke: c["grid-line"], width: 1 }, ticks: { stroke: c.line, width: 1 },
+    });
+    made = new uPlot(
+      {
+        width: Math.max(node.clientWidth, 50), height: Math.max(node.clientHeight, 50), padding: [8, 10, 0, 0],
+        legend: { show: false }, cursor: { show: true, points: { size: 6 }, drag: { x: false, y: false } },
+        scales: { x: { time: false }, y: { ...(o.log ? { distr: 3 } : {}), ...(o.yRange ? { range: o.yRange } : {}) } },
+        axes: [axis(o.x, 30), axis(o.y, 46)],
+        series: [
+          {},
+          ...o.series.map((s) => ({
+            label: s.label, stroke: c[s.color], width: s.width ?? 1.5, dash: s.dashed ? [5, 4] : undefined,
+            fill: s.fill ? `${c[s.color]}33` : undefined, points: { show: s.points ?? false, size: 4 }, spanGaps: false,
+            paths: s.steps ? uPlot.paths.stepped({ align: 1 }) : undefined,
+          })),
+        ],
+      },
+      data,
+      node,
+    );
+  }
+
+  new ResizeObserver(() => {
+    if (node.clientWidth === 0) return;
+    if (!made) make();
+    else made.setSize({ width: node.clientWidth, height: node.clientHeight });
+  }).observe(node);
+
+  return {
+    node,
+    /** x values, then the values of each line; `null` where there is none. @param {(number | null)[][]} values */
+    set(values) {
+      data = values;
+      if (made) made.setData(values);
+      else if (node.clientWidth > 0) make();
+    },
+    /** With the colours of the theme. */
+    redraw() {
+      if (made) make();
+    },
+    /** The canvas it is drawn on. @returns {HTMLCanvasElement | null} */
+    canvas: () => node.querySelector("canvas"),
+  };
+}

@@ -1,0 +1,60 @@
+//! Files made in memory, for the page to save: the same bytes that the command line writes.
+
+use portolan::field::{EsdfMethod, EsdfSettings, SparseEsdf, SparseEsdfSettings};
+use portolan::geom::vector::norm;
+use portolan::map::Tsdf2;
+use portolan::surface::{ContourSettings, Polyline, marching_squares};
+use portolan_io::{IoError, MapFile, MapHeader, esdf_to_bytes, geojson_to_bytes};
+use serde_json::{Map, Value, json};
+
+use super::{Refusal, Reply};
+
+fn refused(error: IoError) -> Refusal {
+    Refusal::new(error)
+}
+
+/// A file under a name.
+pub(super) fn file(name: &str, bytes: Vec<u8>) -> Result<Reply, Refusal> {
+    Ok(Reply::of(json!({ "name": name, "bytes": bytes.len() }))?.with("file", bytes))
+}
+
+/// The Euclidean field of a map, as `query` and `map` make it: accurate, over the whole map.
+pub(super) fn field(tsdf: &Tsdf2, unknown: bool) -> SparseEsdf<2> {
+    let grid = tsdf.grid();
+    SparseEsdf::of_tsdf(
+        tsdf,
+        &SparseEsdfSettings {
+            min_weight: EsdfSettings::of(tsdf).min_weight,
+            max_distance: norm(grid.aabb().extent()).max(grid.lattice.resolution),
+            method: EsdfMethod::Accurate,
+            unknown,
+        },
+    )
+}
+
+/// `esdf.bin`
+pub(super) fn esdf(tsdf: &Tsdf2) -> Result<Reply, Refusal> {
+    let dense = field(tsdf, false).dense(tsdf.grid());
+    let status = dense.status.contains(&2).then_some(&dense.status[..]);
+    file("esdf.bin", esdf_to_bytes(&dense.grid, &dense.distances, status).map_err(refused)?)
+}
+
+/// `contour.geojson`
+pub(super) fn contour(tsdf: &Tsdf2) -> Result<Reply, Refusal> {
+    let lines = marching_squares(tsdf, &ContourSettings::of(tsdf)).polylines();
+    let closed = |line: Polyline| {
+        let again = line.vertices.first().copied().filter(|_| line.closed);
+        line.vertices.into_iter().chain(again).collect()
+    };
+    let lines: Vec<Vec<[f64; 2]>> = lines.into_iter().map(closed).collect();
+    file("contour.geojson", geojson_to_bytes(&lines).map_err(refused)?)
+}
+
+/// `map.portolan`
+pub(super) fn map(tsdf: &Tsdf2, log: &str, scans: usize, settings: &Value) -> Result<Reply, Refusal> {
+    let settings: Map<String, Value> = settings.as_object().cloned().unwrap_or_default();
+    let header = MapHeader { logs: vec![log.into()], scans: scans as u64, settings, ..MapHeader::default() };
+    let mut content = MapFile::default();
+    (content.header, content.tsdf) = (header, Some(tsdf.clone()));
+    file("map.portolan", content.to_bytes().map_err(refused)?)
+}

@@ -1,0 +1,54 @@
+//! The ghost of the chair: how fast the map forgets it, beside how fast it should.
+
+use portolan::cell::FusionEvent;
+use portolan::map::Tsdf2;
+use portolan_sim::{GhostGroup, GhostWatch};
+use serde_json::{Value, json};
+
+use super::lap::Move;
+
+/// A moved chair that the map remembers.
+pub(super) struct Ghost {
+    since: usize,
+    watch: GhostWatch,
+}
+
+impl Ghost {
+    pub(super) fn new(tsdf: &Tsdf2, moved: &Move) -> Self {
+        Self { since: moved.scan, watch: GhostWatch::new(tsdf, &moved.world, moved.places) }
+    }
+
+    pub(super) fn cells(&self) -> impl Iterator<Item = [i32; 2]> + '_ {
+        self.watch.cells()
+    }
+
+    pub(super) fn observe(&mut self, events: &[([i32; 2], FusionEvent)]) {
+        self.watch.observe(events);
+    }
+
+    /// Measured and predicted, after `at` scans.
+    pub(super) fn tell(&self, tsdf: &Tsdf2, at: usize, lap: usize) -> Value {
+        let laps = (at - self.since.min(at)) as f64 / lap.max(1) as f64;
+        let [measured, unclamped, tapered] = self.watch.groups(tsdf.rule(), laps);
+        json!({
+            "since": self.since,
+            "laps": laps,
+            "cells": self.watch.cells().count(),
+            "measured": group(&measured),
+            "unclamped": group(&unclamped),
+            "tapered": group(&tapered),
+        })
+    }
+}
+
+/// What is not finite becomes `null`: half of the cells have not halved their error yet.
+fn group(g: &GhostGroup) -> Value {
+    json!({
+        "cells": g.cells,
+        "halved": g.halved,
+        "half_life_measured": g.half_life_measured,
+        "half_life_predicted": g.half_life_predicted,
+        "observations_per_lap": g.observations_per_lap,
+        "curve": g.curve,
+    })
+}

@@ -1,0 +1,92 @@
+//! One cell's filter, step by step.
+
+use portolan::cell::FusionEvent;
+use portolan::map::Tsdf2;
+use serde_json::{Value, json};
+
+use super::lap::Move;
+
+/// A cell and everything that scans did to it.
+pub(super) struct Inspected {
+    cell: [i32; 2],
+    /// The scan that did it, and what it did.
+    events: Vec<(usize, FusionEvent)>,
+    /// Events that the page has been told.
+    told: std::cell::Cell<usize>,
+}
+
+impl Inspected {
+    pub(super) fn new(cell: [i32; 2]) -> Self {
+        Self { cell, events: Vec::new(), told: 0.into() }
+    }
+
+    pub(super) fn cell(&self) -> [i32; 2] {
+        self.cell
+    }
+
+    pub(super) fn forget_events(&mut self) {
+        self.events.clear();
+        self.told.set(0);
+    }
+
+    pub(super) fn observe(&mut self, scan: usize, events: &[([i32; 2], FusionEvent)]) {
+        let of_cell = events.iter().filter(|e| e.0 == self.cell);
+        self.events.extend(of_cell.map(|e| (scan, e.1)));
+    }
+
+    /// What has happened since the page was told, and whether it must forget what it was told before.
+    pub(super) fn last(&self) -> Value {
+        let from = self.told.replace(self.events.len());
+        json!({ "cell": self.cell, "from": from, "events": rows(&self.events[from..]) })
+    }
+
+    /// All of it, with the decay that theory says.
+    pub(super) fn tell(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+        self.told.set(self.events.len());
+        let state = tsdf.grid().index(self.cell).and_then(|i| tsdf.store().at(i));
+        json!({
+            "cell": self.cell,
+            "center": tsdf.grid().lattice.center(self.cell),
+            "distance": state.map(|s| s.distance),
+            "weight": state.map(|s| s.weight),
+            "from": 0,
+            "events": rows(&self.events),
+            "decay": self.decay(tsdf, moved),
+        })
+    }
+
+    /// The closed form `D_n = m + (D_0 - m) lambda^n` with `lambda = W_max / (W_max + w)`, from the observation before
+    /// the chair was moved: `m` is the new truth, clamped, `w` the median weight of the observations since. `null` where
+    /// nothing moved, nothing was seen since, or nothing is forgotten.
+    fn decay(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+        let rule = tsdf.rule();
+        let (Some(moved), true) = (moved, rule.w_max.is_finite()) else { return Value::Null };
+        let since = self.events.partition_point(|e| e.0 < moved.scan);
+        let after = &self.events[since..];
+        let Some((_, first)) = after.first() else { return Value::Null };
+        let mut weights: Vec<f64> = after.iter().map(|(_, e)| weight(e)).collect();
+        weights.sort_by(f64::total_cmp);
+        let (w, w_max) = (weights[weights.len() / 2], f64::from(rule.w_max));
+        let tau = f64::from(rule.truncation);
+        let center = tsdf.grid().lattice.center(self.cell);
+        let target = moved.world.signed_distance(center).clamp(-tau, tau);
+        let lambda = w_max / (w_max + w);
+        let values: Vec<f64> =
+            (0..=after.len()).map(|n| target + (first.before - target) * lambda.powi(n as i32)).collect();
+        json!({ "since": since, "target": target, "weight": w, "lambda": lambda, "half_life": rule.half_life(w), "values": values })
+    }
+}
+
+/// The weight of an observation: `K = w / (W + w)` solved for `w`.
+fn weight(event: &FusionEvent) -> f64 {
+    if event.gain < 1.0 { event.weight_before * event.gain / (1.0 - event.gain) } else { event.weight_after }
+}
+
+/// `[scan, D before, W before, d, K, D after, W after]`; `D before` is `null` where nothing was known.
+fn rows(events: &[(usize, FusionEvent)]) -> Vec<Value> {
+    let row = |(scan, e): &(usize, FusionEvent)| {
+        let before = (e.weight_before > 0.0).then_some(e.before);
+        json!([scan, before, e.weight_before, e.observation, e.gain, e.after, e.weight_after])
+    };
+    events.iter().map(row).collect()
+}

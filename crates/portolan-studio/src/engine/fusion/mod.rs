@@ -1,0 +1,12 @@
+//! The lap, scan by scan: the truncated field, its cells' filters, and the chair's ghost.
+
+mod ask;
+mod chair;
+mod frame;
+mod inspect;
+mod lap;
+mod seen;
+mod settings;
+mod state;
+
+pub(super) use state::Fusion;

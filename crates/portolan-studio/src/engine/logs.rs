@@ -1,0 +1,39 @@
+//! What the studio shows: a log of the plane and one of space, recorded or simulated.
+
+use portolan::geom::Pose;
+use portolan::scan::Scan;
+use portolan_io::space_log::SpaceLog;
+
+/// The two logs that every session looks at. They never change.
+#[derive(Default)]
+pub struct Logs {
+    /// What the views of the plane show.
+    pub plane: PlaneLog,
+    /// What the view of space shows.
+    pub space: SpaceSource,
+}
+
+/// Scans of the plane.
+#[derive(Default)]
+pub enum PlaneLog {
+    /// The chapter's lap through the Apartment, over and over.
+    #[default]
+    Apartment,
+    /// A log that was read.
+    Recorded {
+        /// Its name, for people.
+        name: String,
+        /// Scans and where they were taken.
+        scans: Vec<(Pose<2>, Scan<2>)>,
+    },
+}
+
+/// Scans of space.
+#[derive(Default)]
+pub enum SpaceSource {
+    /// The simulated building, of which the truth is known.
+    #[default]
+    Building,
+    /// A log whose frames are read when they are asked for.
+    Recorded(Box<SpaceLog>),
+}

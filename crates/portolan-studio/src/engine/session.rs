@@ -1,0 +1,77 @@
+//! One tab's engine.
+
+use std::sync::Arc;
+
+use super::fusion::Fusion;
+use super::protocol::{Message, Refusal, Reply, View, Wire, encode};
+use super::{Clock, Logs};
+
+/// What one session may take.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Bytes of all its maps together.
+    pub memory: usize,
+}
+
+impl Default for Limits {
+    /// 2 GiB.
+    fn default() -> Self {
+        Self { memory: 2 << 30 }
+    }
+}
+
+/// The maps of one tab of the browser and what the page has been told of them. Dropping it frees them.
+pub struct Session {
+    limits: Limits,
+    fusion: Fusion,
+}
+
+impl Session {
+    /// Nothing fused yet.
+    pub fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
+        Self { limits, fusion: Fusion::new(logs, limits, clock) }
+    }
+
+    /// Answers one message of the page, whatever it is: what cannot be answered is refused in words.
+    pub fn answer(&mut self, message: &str) -> Wire {
+        match serde_json::from_str::<Message>(message) {
+            Ok(message) => encode(Some(message.id), self.dispatch(&message)),
+            Err(error) => encode(id_of(message), Err(error.into())),
+        }
+    }
+
+    fn dispatch(&mut self, message: &Message) -> Result<Reply, Refusal> {
+        let ask = message.ask.get();
+        let reply = match message.view {
+            View::Fusion => self.fusion.ask(serde_json::from_str(ask)?),
+        }?;
+        let held = self.memory_bytes();
+        if held > self.limits.memory {
+            // Views check before they allocate; this is the net below them.
+            self.forget(message.view);
+            let (held, limit) = (held >> 20, self.limits.memory >> 20);
+            return Err(Refusal::new(format!(
+                "the maps of this tab take {held} MiB of the {limit} MiB that it may have, and are given up; \
+                 choose larger cells"
+            )));
+        }
+        Ok(reply)
+    }
+
+    /// Bytes of all maps of this tab.
+    pub fn memory_bytes(&self) -> usize {
+        self.fusion.memory_bytes()
+    }
+
+    fn forget(&mut self, view: View) {
+        match view {
+            View::Fusion => self.fusion.forget(),
+        }
+    }
+}
+
+/// The number of a message that is otherwise none.
+fn id_of(message: &str) -> Option<u32> {
+    let value: serde_json::Value = serde_json::from_str(message).ok()?;
+    value.get("id")?.as_u64()?.try_into().ok()
+}
