@@ -34,14 +34,17 @@ impl Inspected {
         self.events.extend(of_cell.map(|e| (scan, e.1)));
     }
 
-    /// What has happened since the page was told, and whether it must forget what it was told before.
-    pub(super) fn last(&self) -> Value {
-        let from = self.told.replace(self.events.len());
-        json!({ "cell": self.cell, "from": from, "events": rows(&self.events[from..]) })
+    /// What has happened since the page was told; the page forgets what it has of event `from` and those after it.
+    pub(super) fn news(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+        self.tell(self.told.get().min(self.events.len()), tsdf, moved)
     }
 
-    /// All of it, with the decay that theory says.
-    pub(super) fn tell(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+    /// All of it.
+    pub(super) fn all(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+        self.tell(0, tsdf, moved)
+    }
+
+    fn tell(&self, from: usize, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
         self.told.set(self.events.len());
         let state = tsdf.grid().index(self.cell).and_then(|i| tsdf.store().at(i));
         json!({
@@ -49,8 +52,8 @@ impl Inspected {
             "center": tsdf.grid().lattice.center(self.cell),
             "distance": state.map(|s| s.distance),
             "weight": state.map(|s| s.weight),
-            "from": 0,
-            "events": rows(&self.events),
+            "from": from,
+            "events": rows(&self.events[from..]),
             "decay": self.decay(tsdf, moved),
         })
     }
