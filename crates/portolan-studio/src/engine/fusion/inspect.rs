@@ -2,6 +2,7 @@
 
 use portolan::cell::FusionEvent;
 use portolan::map::Tsdf2;
+use portolan_sim::World;
 use serde_json::{Value, json};
 
 use super::lap::Move;
@@ -60,7 +61,7 @@ impl Inspected {
 
     /// The closed form `D_n = m + (D_0 - m) lambda^n` with `lambda = W_max / (W_max + w)`, from the observation before
     /// the chair was moved: `m` is the new truth, clamped, `w` the median weight of the observations since. `null` where
-    /// nothing moved, nothing was seen since, or nothing is forgotten.
+    /// nothing moved as far as this cell can tell, nothing was seen since, or nothing is forgotten.
     fn decay(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
         let rule = tsdf.rule();
         let (Some(moved), true) = (moved, rule.w_max.is_finite()) else { return Value::Null };
@@ -72,7 +73,11 @@ impl Inspected {
         let (w, w_max) = (weights[weights.len() / 2], f64::from(rule.w_max));
         let tau = f64::from(rule.truncation);
         let center = tsdf.grid().lattice.center(self.cell);
-        let target = moved.world.signed_distance(center).clamp(-tau, tau);
+        let truth = |world: &World| world.signed_distance(center).clamp(-tau, tau);
+        let target = truth(&moved.world);
+        if truth(&moved.before) == target {
+            return Value::Null;
+        }
         let lambda = w_max / (w_max + w);
         let values: Vec<f64> =
             (0..=after.len()).map(|n| target + (first.before - target) * lambda.powi(n as i32)).collect();
