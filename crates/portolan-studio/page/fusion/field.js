@@ -39,7 +39,8 @@ export class Field {
   clear() {
     this.distance.fill(0);
     this.weight.fill(0);
-    this.cells.fill(() => this.unknown);
+    this.cells.words.fill(this.unknown);
+    this.cells.touch(0, this.grid.shape[1]);
   }
 
   /** Takes blocks in. @param {Uint32Array} blocks @param {Float32Array} distance @param {Float32Array} weight */

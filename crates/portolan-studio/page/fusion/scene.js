@@ -48,7 +48,8 @@ export function layers(s) {
     (g, camera) => {
       if (!s.visible.contour) return;
       g.strokeStyle = colors().contour;
-      g.lineWidth = 1.8;
+      // Of a map seen from afar the line must not be wider than its walls.
+      g.lineWidth = Math.min(1.8, Math.max(0.7, 0.35 * (s.field?.grid.resolution ?? 1) * camera.scale));
       g.lineJoin = "round";
       strokeLines(g, camera, s.contour, s.lines);
     },

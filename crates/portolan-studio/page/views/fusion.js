@@ -29,6 +29,8 @@ export default {
     let last;
     let opened = false;
     let greeted = false;
+    /** Where the chair stood first. @type {import("../fusion/scene.js").Box | undefined} */
+    let home;
 
     const plane = new Plane({ id: "fusion-canvas", label: "The truncated signed distance field while it is fused", meter: app.meter, before: takeIn });
     plane.layers = layers(scene);
@@ -65,8 +67,7 @@ export default {
       move: () => {
         const box = scene.truth?.chair;
         if (!box) return;
-        const home = [1.42, 2.6].every((v, k) => Math.abs(box.min[k] - v) < 1e-9);
-        const sign = home ? 1 : -1;
+        const sign = home && Math.hypot(box.min[0] - home.min[0], box.min[1] - home.min[1]) < 1e-9 ? 1 : -1;
         moveChair([(box.min[0] + box.max[0]) / 2 + sign * CHAPTER_MOVE[0], (box.min[1] + box.max[1]) / 2 + sign * CHAPTER_MOVE[1]]);
       },
       toCell: () => scene.cell && scene.field && moveChair(scene.field.center(scene.cell)),
@@ -86,19 +87,24 @@ export default {
     });
     const shown = (/** @type {"beams" | "contour" | "truth"} */ what, /** @type {string} */ label) =>
       toggle({ id: `show-${what}`, label, value: true, onchange: (v) => ((scene.visible[what] = v), plane.draw()) });
+    const truthToggle = shown("truth", "Truth");
     const exportFile = (/** @type {string} */ file, /** @type {string} */ name) =>
-      el("button", { type: "button", id: `export-${file}`, onclick: async () => saveAnswer(await ask({ op: "export", file })) }, name);
+      el("button", { type: "button", id: `export-${file}`, onclick: () => tryAsk({ op: "export", file }).then((answer) => answer && saveAnswer(answer)) }, name);
+
+    const legendOf = (/** @type {boolean} */ simulated) =>
+      legend([
+        { color: "", text: "behind, in front of a surface", ramp: "linear-gradient(90deg, var(--negative), transparent, color-mix(in srgb, var(--positive) 50%, transparent))" },
+        { color: "beam", text: "beams" }, { color: "contour", text: "contour" }, ...(simulated ? [{ color: "truth", text: "truth", dashed: true }, { color: "chair", text: "chair" }] : []),
+        { color: "unknown", text: "never observed" },
+      ]);
+    const theLegend = el("div");
 
     root.append(
       el("div", { class: "field" }, plane.node, play.node),
       el(
         "div", { class: "side" },
-        el("div", { class: "group" }, shows.node, shown("beams", "Beams of the scan").node, shown("contour", "Extracted contour").node, shown("truth", "Truth").node,
-          legend([
-            { color: "", text: "behind, in front of a surface", ramp: "linear-gradient(90deg, var(--negative), transparent, color-mix(in srgb, var(--positive) 50%, transparent))" },
-            { color: "beam", text: "beams" }, { color: "contour", text: "contour" }, { color: "truth", text: "truth", dashed: true }, { color: "chair", text: "chair" },
-            { color: "unknown", text: "never observed" },
-          ])),
+        el("div", { class: "group" }, shows.node, shown("beams", "Beams of the scan").node, shown("contour", "Extracted contour").node, truthToggle.node,
+          theLegend),
         inspector.node, chair.node, panel.node,
         group("This scan", numbers.node),
         group("Take away", el("div", { class: "row" }, exportFile("esdf", "esdf.bin"), exportFile("contour", "contour.geojson"), exportFile("map", "map.portolan"))),
@@ -121,9 +127,11 @@ export default {
             else if (before.resolution !== grid.resolution) scene.cell = undefined;
           }
           scene.truth = truth;
+          home ??= truth?.chair;
           scene.held = undefined;
           panel.show(s, truth !== null);
-          chair.node.hidden = truth === null;
+          chair.node.hidden = truthToggle.node.hidden = truth === null;
+          if (!greeted) theLegend.append(legendOf(truth !== null));
           scene.field.setColors(s.truncation, s.w_max ?? 256);
           if (!greeted) app.say(`${name}: ${body.lap} scans. Play, click a cell${truth ? ", move the chair" : ""}.`);
           greeted = true;

@@ -16,7 +16,7 @@ use super::lap::Lap;
 use super::seen::Seen;
 use super::settings::Settings;
 use crate::engine::exports;
-use crate::engine::{Clock, Limits, Logs, Refusal, Reply};
+use crate::engine::{Clock, Limits, Logs, PlaneLog, Refusal, Reply};
 
 /// Scans that one question may fuse: more would keep the page waiting for its picture.
 const MOST_STEPS: usize = 256;
@@ -47,7 +47,10 @@ struct Made {
 
 impl Fusion {
     pub(in crate::engine) fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
-        let settings = Settings::default();
+        let settings = match logs.plane {
+            PlaneLog::Apartment => Settings::default(),
+            PlaneLog::Recorded { .. } => Settings::of_log(),
+        };
         Self {
             limits,
             clock: clock.clone(),
