@@ -31,6 +31,8 @@ export default {
     let greeted = false;
     /** Where the chair stood first. @type {import("../fusion/scene.js").Box | undefined} */
     let home;
+    /** When the chair was moved, and where to. @type {[number, [number, number]][]} */
+    let moves = [];
 
     const plane = new Plane({ id: "fusion-canvas", label: "The truncated signed distance field while it is fused", meter: app.meter, before: takeIn });
     plane.layers = layers(scene);
@@ -128,6 +130,7 @@ export default {
           }
           scene.truth = truth;
           home ??= truth?.chair;
+          moves = body.all.moves;
           scene.held = undefined;
           panel.show(s, truth !== null);
           chair.node.hidden = truthToggle.node.hidden = truth === null;
@@ -181,6 +184,7 @@ export default {
       scene.held = undefined;
       plane.draw();
       if (answer) app.say("The chair was moved. Play on, and watch the ghost fade.");
+      app.changed();
     }
 
     function recolor() {
@@ -254,7 +258,7 @@ export default {
       const texts = Object.entries({ ...rest, w_max: w_max ?? "inf" }).map(([k, v]) => [k, String(v)]);
       return {
         ...Object.fromEntries(texts), scan: String(at), ...(scene.cell ? { cell: scene.cell.join(",") } : {}), ...(shows.value === "weight" ? { shows: "weight" } : {}),
-        ...(last?.ghost && scene.truth ? { chair: [last.ghost.since, ...[0, 1].map((k) => (scene.truth ? (scene.truth.chair.min[k] + scene.truth.chair.max[k]) / 2 : 0).toFixed(4))].join(",") } : {}),
+        ...(moves.length ? { chair: moves.map(([scan, [x, y]]) => `${scan},${x.toFixed(4)},${y.toFixed(4)}`).join(";") } : {}),
       };
     }
 
@@ -271,9 +275,10 @@ export default {
       }
       if (JSON.stringify(wanted) !== JSON.stringify(now)) await tryAsk({ op: "set", settings: wanted });
       const numbersOf = (/** @type {string} */ key) => (state.get(key) ?? "").split(",").map(Number);
-      const [since, x, y] = numbersOf("chair");
-      if (state.has("chair") && [since, x, y].every(Number.isFinite)) {
-        await tryAsk({ op: "seek", scan: since });
+      for (const text of (state.get("chair") ?? "").split(";")) {
+        const [since, x, y] = text.split(",").map(Number);
+        if (!text || ![since, x, y].every(Number.isFinite)) continue;
+        await tryAsk({ op: "seek", scan: Math.max(0, Math.floor(since)) });
         await tryAsk({ op: "move_chair", to: [x, y] });
       }
       if (state.has("scan")) await tryAsk({ op: "seek", scan: Math.max(0, Math.floor(Number(state.get("scan"))) || 0) });

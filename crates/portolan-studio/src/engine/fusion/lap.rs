@@ -103,6 +103,12 @@ impl Lap {
         self.driven.as_ref()?.moves.iter().rfind(|m| m.scan <= scans)
     }
 
+    /// All moves: after how many scans, and where the middle of the chair has been since.
+    pub(super) fn moves(&self) -> Vec<(usize, [f64; 2])> {
+        let moves = self.driven.iter().flat_map(|d| &d.moves);
+        moves.map(|m| (m.scan, middle(m.places[1]))).collect()
+    }
+
     /// The move that comes exactly before scan `i`.
     pub(super) fn move_before(&self, i: usize) -> Option<&Move> {
         self.last_move(i).filter(|m| m.scan == i)

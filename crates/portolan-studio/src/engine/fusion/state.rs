@@ -257,6 +257,7 @@ impl Fusion {
                 "grid": frame::grid(made.tsdf.grid()),
                 "way": self.lap.way(),
                 "truth": self.lap.world(made.at).map(frame::truth),
+                "moves": self.lap.moves(),
                 "block": super::seen::EDGE,
             });
         }
