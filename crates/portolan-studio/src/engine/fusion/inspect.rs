@@ -61,13 +61,16 @@ impl Inspected {
 
     /// The closed form `D_n = m + (D_0 - m) lambda^n` with `lambda = W_max / (W_max + w)`, from the observation before
     /// the chair was moved: `m` is the new truth, clamped, `w` the median weight of the observations since. `null` where
-    /// nothing moved as far as this cell can tell, nothing was seen since, or nothing is forgotten.
+    /// nothing moved as far as this cell can tell, nothing was seen before or since, or nothing is forgotten.
     fn decay(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
         let rule = tsdf.rule();
         let (Some(moved), true) = (moved, rule.w_max.is_finite()) else { return Value::Null };
         let since = self.events.partition_point(|e| e.0 < moved.scan);
         let after = &self.events[since..];
-        let Some((_, first)) = after.first() else { return Value::Null };
+        // What was never seen before has nothing to forget.
+        let Some((_, first)) = after.first().filter(|(_, e)| e.weight_before > 0.0) else {
+            return Value::Null;
+        };
         let mut weights: Vec<f64> = after.iter().map(|(_, e)| weight(e)).collect();
         weights.sort_by(f64::total_cmp);
         let (w, w_max) = (weights[weights.len() / 2], f64::from(rule.w_max));

@@ -144,8 +144,17 @@ fn the_ghost_fades_as_predicted() {
     ask(&mut session, json!({ "op": "seek", "scan": 10 }));
     assert_eq!(ask(&mut session, json!({ "op": "seek", "scan": 600 }))["ghost"], told["ghost"]);
     // A cell of the old place: its decay is the closed form.
-    let cell = ask(&mut session, json!({ "op": "watch", "cell": [32, 55] }));
-    assert_eq!(cell["decay"]["target"].as_f64().map(|v| (v * 1e6).round() / 1e6), Some(0.15), "{cell}");
+    let cell = ask(&mut session, json!({ "op": "watch", "cell": [29, 59] }));
+    let (events, decay) = (cell["events"].as_array().unwrap(), &cell["decay"]);
+    let since = decay["since"].as_u64().unwrap() as usize;
+    let values = decay["values"].as_array().unwrap();
+    assert_eq!((values.len(), &values[0]), (events.len() - since + 1, &events[since][1]));
+    for (event, value) in events[since..].iter().zip(&values[1..]) {
+        let (after, closed) = (event[5].as_f64().unwrap(), value.as_f64().unwrap());
+        assert!((after - closed).abs() < 1e-6, "{event} against {closed}");
+    }
+    // In the middle of the chair nothing was ever seen before: nothing to forget.
+    assert!(ask(&mut session, json!({ "op": "watch", "cell": [32, 55] }))["decay"].is_null());
 }
 
 #[test]
