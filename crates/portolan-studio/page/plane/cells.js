@@ -64,14 +64,15 @@ export const STEPS = 256;
  * from zero, so that small distances are told from none.
  * @param {string} negative `#rrggbb`
  * @param {string} positive
- * @param {number} most opacity at the ends, 0 to 1
+ * @param {[number, number]} most opacity at either end, 0 to 1: there is more free space than anything else, and it should
+ *   not shout
  */
-export function diverging(negative, positive, most = 1) {
+export function diverging(negative, positive, most = [0.95, 0.5]) {
   const ramp = new Uint32Array(STEPS);
   for (let i = 0; i < STEPS; i++) {
     const v = (2 * i) / (STEPS - 1) - 1;
     const [r, g, b] = rgb(v < 0 ? negative : positive);
-    ramp[i] = word(r, g, b, Math.round(255 * most * Math.sqrt(Math.abs(v))));
+    ramp[i] = word(r, g, b, Math.round(255 * most[v < 0 ? 0 : 1] * Math.sqrt(Math.abs(v))));
   }
   return ramp;
 }

@@ -1,7 +1,10 @@
 // @ts-check
-import uPlot from "../vendor/uPlot.js";
+import uPlotModule from "../vendor/uPlot.js";
 import { colors } from "./theme.js";
 import { el } from "./controls.js";
+
+/** The library has no types of its own here. @type {any} */
+const uPlot = uPlotModule;
 
 /**
  * A plot of lines over one axis, which follows its frame's size and the theme.

@@ -1,6 +1,7 @@
 //! The ghost of the chair: how fast the map forgets it, beside how fast it should.
 
 use portolan::cell::FusionEvent;
+use portolan::geom::Aabb;
 use portolan::map::Tsdf2;
 use portolan_sim::{GhostGroup, GhostWatch};
 use serde_json::{Value, json};
@@ -10,12 +11,17 @@ use super::lap::Move;
 /// A moved chair that the map remembers.
 pub(super) struct Ghost {
     since: usize,
+    old: Aabb<2>,
     watch: GhostWatch,
 }
 
 impl Ghost {
     pub(super) fn new(tsdf: &Tsdf2, moved: &Move) -> Self {
-        Self { since: moved.scan, watch: GhostWatch::new(tsdf, &moved.world, moved.places) }
+        Self {
+            since: moved.scan,
+            old: moved.places[0],
+            watch: GhostWatch::new(tsdf, &moved.world, moved.places),
+        }
     }
 
     pub(super) fn cells(&self) -> impl Iterator<Item = [i32; 2]> + '_ {
@@ -32,6 +38,7 @@ impl Ghost {
         let [measured, unclamped, tapered] = self.watch.groups(tsdf.rule(), laps);
         json!({
             "since": self.since,
+            "old": { "min": self.old.min, "max": self.old.max },
             "laps": laps,
             "cells": self.watch.cells().count(),
             "measured": group(&measured),

@@ -2,6 +2,7 @@
 
 use portolan::cell::FusionEvent;
 use portolan::map::Tsdf2;
+use portolan_sim::World;
 use serde_json::{Value, json};
 
 use super::lap::Move;
@@ -34,14 +35,17 @@ impl Inspected {
         self.events.extend(of_cell.map(|e| (scan, e.1)));
     }
 
-    /// What has happened since the page was told, and whether it must forget what it was told before.
-    pub(super) fn last(&self) -> Value {
-        let from = self.told.replace(self.events.len());
-        json!({ "cell": self.cell, "from": from, "events": rows(&self.events[from..]) })
+    /// What has happened since the page was told; the page forgets what it has of event `from` and those after it.
+    pub(super) fn news(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+        self.tell(self.told.get().min(self.events.len()), tsdf, moved)
     }
 
-    /// All of it, with the decay that theory says.
-    pub(super) fn tell(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+    /// All of it.
+    pub(super) fn all(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+        self.tell(0, tsdf, moved)
+    }
+
+    fn tell(&self, from: usize, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
         self.told.set(self.events.len());
         let state = tsdf.grid().index(self.cell).and_then(|i| tsdf.store().at(i));
         json!({
@@ -49,15 +53,15 @@ impl Inspected {
             "center": tsdf.grid().lattice.center(self.cell),
             "distance": state.map(|s| s.distance),
             "weight": state.map(|s| s.weight),
-            "from": 0,
-            "events": rows(&self.events),
+            "from": from,
+            "events": rows(&self.events[from..]),
             "decay": self.decay(tsdf, moved),
         })
     }
 
     /// The closed form `D_n = m + (D_0 - m) lambda^n` with `lambda = W_max / (W_max + w)`, from the observation before
     /// the chair was moved: `m` is the new truth, clamped, `w` the median weight of the observations since. `null` where
-    /// nothing moved, nothing was seen since, or nothing is forgotten.
+    /// nothing moved as far as this cell can tell, nothing was seen since, or nothing is forgotten.
     fn decay(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
         let rule = tsdf.rule();
         let (Some(moved), true) = (moved, rule.w_max.is_finite()) else { return Value::Null };
@@ -69,7 +73,11 @@ impl Inspected {
         let (w, w_max) = (weights[weights.len() / 2], f64::from(rule.w_max));
         let tau = f64::from(rule.truncation);
         let center = tsdf.grid().lattice.center(self.cell);
-        let target = moved.world.signed_distance(center).clamp(-tau, tau);
+        let truth = |world: &World| world.signed_distance(center).clamp(-tau, tau);
+        let target = truth(&moved.world);
+        if truth(&moved.before) == target {
+            return Value::Null;
+        }
         let lambda = w_max / (w_max + w);
         let values: Vec<f64> =
             (0..=after.len()).map(|n| target + (first.before - target) * lambda.powi(n as i32)).collect();

@@ -21,6 +21,8 @@ pub(in crate::engine) struct Move {
     pub(in crate::engine) scan: usize,
     /// Where the chair was and is.
     pub(in crate::engine) places: [Aabb<2>; 2],
+    /// The world until then.
+    pub(in crate::engine) before: World,
     /// The world since.
     pub(in crate::engine) world: World,
 }
@@ -133,7 +135,10 @@ impl Lap {
         if !to.iter().all(|v| v.is_finite()) {
             return Err(Refusal::new("the chair must be put at a finite place"));
         }
-        let world = driven.world(scans);
+        // A second move at the same scan replaces the first: the chair was never there.
+        let before = driven.moves.iter().rfind(|m| m.scan == scans).map(|m| m.before.clone());
+        let world = before.unwrap_or_else(|| driven.world(scans).clone());
+        let world = &world;
         let old = chair(world);
         let moved = world.with_moved("chair", sub(to, middle(old)));
         let new = chair(&moved);
@@ -153,7 +158,7 @@ impl Lap {
             return Err(Refusal::new("the chair would stand in the robot's way"));
         }
         driven.moves.retain(|m| m.scan < scans);
-        driven.moves.push(Move { scan: scans, places: [old, new], world: moved });
+        driven.moves.push(Move { scan: scans, places: [old, new], before: world.clone(), world: moved });
         driven.scans.truncate(scans);
         Ok(())
     }

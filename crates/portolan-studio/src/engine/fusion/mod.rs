@@ -8,5 +8,7 @@ mod lap;
 mod seen;
 mod settings;
 mod state;
+#[cfg(test)]
+mod tests;
 
 pub(super) use state::Fusion;

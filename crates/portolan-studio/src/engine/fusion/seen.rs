@@ -10,11 +10,14 @@ pub(super) struct Seen {
     shape: [usize; 2],
     distance: Vec<f32>,
     weight: Vec<f32>,
+    fresh: bool,
 }
 
 /// Blocks that the page must change, each `EDGE` x `EDGE` cells, x fastest; cells beyond the grid are 0.
 #[derive(Default)]
 pub(super) struct Delta {
+    /// The page must forget what it has: these are all blocks in which anything was observed.
+    pub(super) fresh: bool,
     /// Number of the block, x fastest.
     pub(super) blocks: Vec<u32>,
     pub(super) distance: Vec<f32>,
@@ -25,7 +28,7 @@ impl Seen {
     /// A page that knows nothing: all is unobserved.
     pub(super) fn nothing(shape: [usize; 2]) -> Self {
         let cells = shape[0] * shape[1];
-        Self { shape, distance: vec![0.0; cells], weight: vec![0.0; cells] }
+        Self { shape, distance: vec![0.0; cells], weight: vec![0.0; cells], fresh: true }
     }
 
     /// What has changed since the last time.
@@ -33,7 +36,7 @@ impl Seen {
         let planes = tsdf.store().planes();
         let [width, height] = self.shape;
         let across = width.div_ceil(EDGE);
-        let mut delta = Delta::default();
+        let mut delta = Delta { fresh: std::mem::take(&mut self.fresh), ..Delta::default() };
         for by in 0..height.div_ceil(EDGE) {
             let rows = EDGE * by..height.min(EDGE * (by + 1));
             for bx in 0..across {

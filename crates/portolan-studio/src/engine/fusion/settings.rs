@@ -28,6 +28,16 @@ pub(in crate::engine) struct Settings {
     pub(in crate::engine) sweep: String,
 }
 
+/// What an observation of free space weighs where `map` fuses a recorded log: thin things survive.
+const CARVE_WEIGHT_OF_LOGS: f64 = 0.3;
+
+impl Settings {
+    /// Those that `map` has, so that the same log gives the same map.
+    pub(super) fn of_log() -> Self {
+        Self { carve_weight: CARVE_WEIGHT_OF_LOGS, ..Self::default() }
+    }
+}
+
 impl Default for Settings {
     /// The chapter's, with the default sweep.
     fn default() -> Self {

@@ -16,7 +16,7 @@ use super::lap::Lap;
 use super::seen::Seen;
 use super::settings::Settings;
 use crate::engine::exports;
-use crate::engine::{Clock, Limits, Logs, Refusal, Reply};
+use crate::engine::{Clock, Limits, Logs, PlaneLog, Refusal, Reply};
 
 /// Scans that one question may fuse: more would keep the page waiting for its picture.
 const MOST_STEPS: usize = 256;
@@ -47,7 +47,10 @@ struct Made {
 
 impl Fusion {
     pub(in crate::engine) fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
-        let settings = Settings::default();
+        let settings = match logs.plane {
+            PlaneLog::Apartment => Settings::default(),
+            PlaneLog::Recorded { .. } => Settings::of_log(),
+        };
         Self {
             limits,
             clock: clock.clone(),
@@ -233,6 +236,7 @@ impl Fusion {
         let delta = made.seen.update(&made.tsdf);
         let mut body = json!({
             "at": made.at,
+            "fresh": delta.fresh,
             "lap": self.lap.lap_length(),
             "most": self.lap.most(),
             "revision": self.revision,
@@ -242,7 +246,7 @@ impl Fusion {
             "bytes": made.tsdf.memory_bytes(),
             "half_life": self.settings.config()?.w_max.is_finite().then(|| made.tsdf.rule().half_life(1.0)),
             "ghost": made.ghost.as_ref().map(|g| g.tell(&made.tsdf, made.at, self.lap.lap_length())),
-            "inspected": self.inspected.as_ref().map(Inspected::last),
+            "inspected": self.inspected.as_ref().map(|i| i.news(&made.tsdf, self.lap.last_move(made.at))),
         });
         let last = made.at.checked_sub(1).map(|i| &self.lap.first(i + 1)[i]);
         body["pose"] = json!(last.map(|(pose, _)| frame::pose(pose)));
@@ -292,7 +296,7 @@ impl Fusion {
         let mut body = json!(null);
         if let Some(made) = &mut self.made {
             made.watch(Some(&inspected));
-            body = inspected.tell(&made.tsdf, self.lap.last_move(at));
+            body = inspected.all(&made.tsdf, self.lap.last_move(at));
         }
         self.inspected = Some(inspected);
         Reply::of(body)
