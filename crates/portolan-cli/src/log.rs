@@ -105,6 +105,12 @@ pub(crate) struct LimitArgs {
 }
 
 impl LimitArgs {
+    /// Whether any was given.
+    pub(crate) fn is_given(&self) -> bool {
+        let Self { min_range, max_range, no_return, no_return_free } = self;
+        [min_range, max_range, no_return, no_return_free].iter().any(|limit| limit.is_some())
+    }
+
     /// The limits for a log; what was not given is found out or left open.
     pub(crate) fn limits(&self, log: &CarmenLog) -> RangeLimits {
         let open = RangeLimits::default();

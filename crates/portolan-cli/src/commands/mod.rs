@@ -9,6 +9,7 @@ mod map;
 mod mesh;
 mod query;
 mod radiance;
+mod studio;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
@@ -28,6 +29,8 @@ pub(crate) enum Command {
     Mesh(mesh::Args),
     /// The differentiable renderer on a line: rendering as a measurement model
     Radiance(radiance::Args),
+    /// A web app on this machine that shows maps while they are made
+    Studio(studio::Args),
     /// Measure a map against scans that were not fused, or against a reference contour
     Eval(eval::Args),
 }
@@ -43,6 +46,7 @@ impl Command {
             Self::Convert(args) => convert::run(args),
             Self::Mesh(args) => mesh::run(args),
             Self::Radiance(args) => radiance::run(args),
+            Self::Studio(args) => studio::run(args),
             Self::Eval(args) => eval::run(args),
         }
     }

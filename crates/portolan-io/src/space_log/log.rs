@@ -96,6 +96,12 @@ impl SpaceLog {
         Ok(Self { path: path.into(), kind, name, source, entries, camera, stats })
     }
 
+    /// Only every `n`-th scan of it, from the first; 0 counts as 1. [`SpaceLog::stats`] stays about all of it.
+    pub fn every(mut self, n: usize) -> Self {
+        self.entries = self.entries.into_iter().step_by(n.max(1)).collect();
+        self
+    }
+
     /// Where the log is.
     pub fn path(&self) -> &Path {
         &self.path

@@ -10,4 +10,4 @@ mod session;
 pub use clock::Clock;
 pub use logs::{Logs, PlaneLog, SpaceSource};
 pub use protocol::{Array, Refusal, Reply, Values, Wire};
-pub use session::{Limits, Session};
+pub use session::{Limits, Session, check};

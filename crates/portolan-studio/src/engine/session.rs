@@ -20,6 +20,14 @@ impl Default for Limits {
     }
 }
 
+/// Whether a tab can open these logs with the settings that it begins with.
+///
+/// # Errors
+/// Where the map would not fit into the limits, or its extent is none.
+pub fn check(logs: &Arc<Logs>, limits: Limits) -> Result<(), Refusal> {
+    Fusion::new(logs, limits, &Clock::new(|| 0.0)).tsdf().map(|_| ())
+}
+
 /// The maps of one tab of the browser and what the page has been told of them. Dropping it frees them.
 pub struct Session {
     limits: Limits,

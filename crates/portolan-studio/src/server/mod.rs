@@ -6,16 +6,20 @@
 //! | a message is no JSON, of no view, of impossible values, or too long | an error in words, or the socket is closed |
 //! | too many tabs | refused with a reason, the others go on |
 //! | a tab asks for too large maps | refused before they are made |
-//! | a tab is closed | its session is dropped, also where it is at work |
+//! | a tab is closed | its session is dropped; where it is at work, when that is done |
+//! | a peer opens connections and sends nothing, or half of a request | they are closed after a while, and are not many at a time |
+//! | a peer opens a session and is gone, or reads no answers | it is asked, and its session is dropped |
 
 mod assets;
+mod connections;
 mod guard;
 mod socket;
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::time::Instant;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 use axum::Router;
 use axum::middleware::from_fn_with_state;
@@ -35,12 +39,20 @@ pub struct Settings {
     pub sessions: usize,
     /// What each of them may take.
     pub limits: Limits,
+    /// How long a peer may keep the server waiting.
+    pub patience: Duration,
 }
 
 impl Default for Settings {
-    /// 127.0.0.1, any port, eight sessions.
+    /// 127.0.0.1, any port, eight sessions, half a minute.
     fn default() -> Self {
-        Self { address: Ipv4Addr::LOCALHOST.into(), port: 0, sessions: 8, limits: Limits::default() }
+        Self {
+            address: Ipv4Addr::LOCALHOST.into(),
+            port: 0,
+            sessions: 8,
+            limits: Limits::default(),
+            patience: Duration::from_secs(30),
+        }
     }
 }
 
@@ -50,7 +62,9 @@ struct Shared {
     logs: Arc<Logs>,
     limits: Limits,
     clock: Clock,
+    patience: Duration,
     seats: Arc<Semaphore>,
+    held: Arc<AtomicUsize>,
     address: SocketAddr,
 }
 
@@ -59,6 +73,7 @@ pub struct Server {
     runtime: tokio::runtime::Runtime,
     address: SocketAddr,
     seats: (Arc<Semaphore>, usize),
+    held: Arc<AtomicUsize>,
 }
 
 impl Server {
@@ -66,18 +81,21 @@ impl Server {
     ///
     /// # Errors
     /// Where the address cannot be listened at.
-    pub fn start(logs: Logs, settings: &Settings) -> io::Result<Self> {
+    pub fn start(logs: impl Into<Arc<Logs>>, settings: &Settings) -> io::Result<Self> {
         let listener = std::net::TcpListener::bind((settings.address, settings.port))?;
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
         let started = Instant::now();
         let seats = Arc::new(Semaphore::new(settings.sessions));
+        let held = Arc::new(AtomicUsize::new(0));
         let shared = Shared {
-            logs: Arc::new(logs),
+            logs: logs.into(),
             limits: settings.limits,
             clock: Clock::new(move || started.elapsed().as_secs_f64()),
+            patience: settings.patience,
             seats: seats.clone(),
+            held: held.clone(),
             address,
         };
         let app = Router::new()
@@ -85,11 +103,12 @@ impl Server {
             .fallback(assets::serve)
             .layer(from_fn_with_state(shared.clone(), guard::check))
             .with_state(shared);
-        runtime.spawn(async move {
-            let listener = tokio::net::TcpListener::from_std(listener)?;
-            axum::serve(listener, app).await
-        });
-        Ok(Self { runtime, address, seats: (seats, settings.sessions) })
+        let listener = {
+            let _inside = runtime.enter();
+            tokio::net::TcpListener::from_std(listener)?
+        };
+        runtime.spawn(connections::accept(listener, app, settings.patience));
+        Ok(Self { runtime, address, seats: (seats, settings.sessions), held })
     }
 
     /// Where the page is.
@@ -109,8 +128,19 @@ impl Server {
         self.seats.1 - self.seats.0.available_permits()
     }
 
-    /// Serves until the process ends.
-    pub fn wait(self) {
-        self.runtime.block_on(std::future::pending::<()>());
+    /// Bytes of the maps of all sessions, as of their last answers.
+    pub fn memory_bytes(&self) -> usize {
+        self.held.load(Ordering::Relaxed)
+    }
+
+    /// Serves until the process is interrupted (Ctrl-C).
+    ///
+    /// # Errors
+    /// Where interruptions cannot be listened for.
+    pub fn wait(self) -> io::Result<()> {
+        let interrupted = self.runtime.block_on(tokio::signal::ctrl_c());
+        // Whatever sessions are at, nobody waits for it any more.
+        self.runtime.shutdown_background();
+        interrupted
     }
 }
