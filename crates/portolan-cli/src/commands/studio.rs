@@ -17,10 +17,11 @@ use crate::mapping::with_outlier;
 use crate::output::Output;
 
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  portolan studio\n  portolan studio intel-corrected.log.gz --every 2")]
-/// Serve the studio: a web app on this machine that shows maps while they are made
-///
-/// Open the address that it prints in a browser. Every tab has maps of its own; closing it frees them. Ctrl-C stops it.
+#[command(
+    after_help = "Open the address that it prints in a browser. Every tab has maps of its own; closing it frees them. \
+                  Ctrl-C stops the studio.\n\nExamples:\n  portolan studio\n  portolan studio \
+                  intel-corrected.log.gz --every 2"
+)]
 pub(crate) struct Args {
     /// Log of range scans with poses, planar or of space; its kind is recognised. Without one, and in the views that
     /// it is not for, simulated scans are shown

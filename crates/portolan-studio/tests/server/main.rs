@@ -1,6 +1,7 @@
 //! The server against pages of other sites, broken peers and hostile messages: it refuses, and goes on.
 #![allow(clippy::unwrap_used)]
 
+mod messages;
 mod peer;
 
 use std::io::{Read, Write};
