@@ -3,6 +3,7 @@ import { connect } from "./engine/socket.js";
 import { Meter } from "./ui/meter.js";
 import { applyTheme, nextTheme } from "./ui/theme.js";
 import { save } from "./ui/files.js";
+import clearance from "./views/clearance.js";
 import fusion from "./views/fusion.js";
 
 /**
@@ -33,7 +34,7 @@ import fusion from "./views/fusion.js";
  */
 
 /** @type {View[]} */
-const VIEWS = [fusion];
+const VIEWS = [fusion, clearance];
 
 const $ = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const status = $("status");
