@@ -3,9 +3,11 @@ import { colors } from "../ui/theme.js";
 
 /** Gradients shorter than this are dots: there is no direction in them. */
 const NONE = 0.05;
+/** Longer ones are drawn as if they were of this length: projective distances can grow faster than one walks. */
+const MOST = 1.3;
 
 /**
- * Arrows of one field, as long as the gradients are: one of length 1 fills its square.
+ * Arrows of one field, as long as the gradients are: one of length 1 takes most of its square.
  * @param {CanvasRenderingContext2D} g
  * @param {import("../plane/plane.js").Camera} camera
  * @param {import("./scene.js").Arrows} arrows
@@ -22,7 +24,8 @@ export function drawArrows(g, camera, { points, gradients, spacing }) {
     const [gx, gy] = [gradients[i], -gradients[i + 1]];
     const norm = Math.hypot(gx, gy);
     if (norm < NONE) continue;
-    arrow(g, x - 0.5 * gx * unit, y - 0.5 * gy * unit, gx * unit, gy * unit, head);
+    const scale = (unit * Math.min(norm, MOST)) / norm;
+    arrow(g, x - 0.5 * gx * scale, y - 0.5 * gy * scale, gx * scale, gy * scale, head);
   }
   g.stroke();
   for (let i = 0; i < points.length; i += 2) {
@@ -78,8 +81,9 @@ export function drawProbe(g, camera, s) {
     }
     const gradient = last[s.image?.which ?? "euclidean"].gradient;
     if (gradient && Math.hypot(gradient[0], gradient[1]) >= NONE) {
+      const length = 44 * Math.min(1, MOST / Math.hypot(gradient[0], gradient[1]));
       g.beginPath();
-      arrow(g, cx, cy, 44 * gradient[0], -44 * gradient[1], 8);
+      arrow(g, cx, cy, length * gradient[0], -length * gradient[1], 8);
       g.lineCap = "round";
       stroked(g, c.paper, 5);
       stroked(g, c.ink, 2.25);

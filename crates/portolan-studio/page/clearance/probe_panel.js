@@ -28,8 +28,9 @@ export function probePanel() {
     el("thead", {}, el("tr", {}, el("td", {}), heads.euclidean, heads.truncated)),
     el("tbody", {}, ...ROWS.map(([, label], i) => el("tr", {}, el("th", { scope: "row" }, label), cells.euclidean[i], cells.truncated[i]))),
   );
+  const note = el("p", { class: "note", id: "probe-note" });
   const node = el(
-    "div", { class: "group" }, el("div", { class: "row" }, el("h2", {}, "Probe"), at), table,
+    "div", { class: "group" }, el("div", { class: "row" }, el("h2", {}, "Probe"), at), table, note,
     el("details", { id: "probe-query" }, el("summary", {}, "As ", el("code", {}, "query"), " prints it"), el("p", { class: "note" }, "status, occupancy, distance, lower, upper and gradient, with ", command), row),
   );
   return {
@@ -45,6 +46,7 @@ export function probePanel() {
         cells[which][0].dataset.status = said[which].status;
       }
       put(row, said.row);
+      put(note, `At least and at most are certified, to the nearest surface${unknown === "pessimistic" ? " or unknown cell" : ""}; the distance is interpolated.`);
       put(command, `--unknown ${unknown}`);
     },
     /** Which field is on the picture. @param {Which} which */

@@ -5,8 +5,9 @@ import { meterPanel } from "../clearance/meter_panel.js";
 import { drag, MOST } from "../clearance/path_edit.js";
 import { pathPanel } from "../clearance/path_panel.js";
 import { probePanel } from "../clearance/probe_panel.js";
-import { layers } from "../clearance/scene.js";
+import { movingLayers, stillLayers } from "../clearance/scene.js";
 import { shownPanel } from "../clearance/shown_panel.js";
+import { Still } from "../clearance/still.js";
 import { Plane } from "../plane/plane.js";
 import { el, group } from "../ui/controls.js";
 import { saveAnswer } from "../ui/files.js";
@@ -30,7 +31,13 @@ export default {
     let reopening = false;
 
     const plane = new Plane({ id: "clearance-canvas", label: "The distance field of the map, a probe into it and a path through it", meter: app.meter });
-    plane.layers = layers(scene);
+    const still = new Still(stillLayers(scene));
+    plane.layers = [still.draw, ...movingLayers(scene)];
+    /** Everything is drawn anew. */
+    const redraw = () => {
+      still.changed();
+      plane.draw();
+    };
     plane.oncamera = () => {
       askArrows();
       app.changed();
@@ -44,12 +51,12 @@ export default {
         [scene.rings, scene.arrows] = [undefined, undefined];
         askRings();
         askArrows();
-        plane.draw();
+        redraw();
         app.changed();
       },
       unknown: () => (askProbe(), askPath(), app.changed()),
       spacing: () => (askRings(), app.changed()),
-      toggled: () => (askArrows(), plane.draw(), app.changed()),
+      toggled: () => (askArrows(), redraw(), app.changed()),
     });
     const probe = probePanel();
     const meter = meterPanel();
@@ -96,11 +103,13 @@ export default {
         const f = /** @type {any} */ (arrays);
         scene.rings = { points: f.points, starts: f.starts, levels: f.levels, spacing: body.spacing };
         shown.tellRings(body, opened?.truncation);
+        still.changed();
       }), app.fail),
       arrows: latest(ask, taking(({ body, arrays }, /** @type {any} */ question) => {
         if (question.field !== scene.image?.which) return;
         const f = /** @type {any} */ (arrays);
         scene.arrows = { points: f.points, gradients: f.gradients, spacing: body.spacing };
+        still.changed();
       }), app.fail),
       path: latest(ask, taking((answer) => {
         if (scene.waypoints.length === 0) return;
@@ -188,7 +197,7 @@ export default {
       askRings();
       askArrows();
       askPath();
-      plane.draw();
+      redraw();
     }
 
     plane.onhover = (p) => p && put(p);
@@ -240,7 +249,7 @@ export default {
         scene.image?.paint();
         path.plot.redraw();
         meter.plot.redraw();
-        plane.draw();
+        redraw();
       },
     };
 
@@ -263,6 +272,7 @@ export default {
       path.count(scene.waypoints.length);
       if (opened) {
         scene.image?.show(shown.field);
+        redraw();
         [askProbe, askRings, askArrows, askPath].forEach((f) => f());
       }
       probe.mark(shown.field);
