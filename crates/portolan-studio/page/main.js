@@ -51,7 +51,7 @@ function fail(error) {
   status.textContent = error instanceof Error ? error.message : String(error);
 }
 
-/** @type {Map<string, {section: HTMLElement, shown: Shown}>} */
+/** What is mounted, and the theme that it was drawn in. @type {Map<string, {section: HTMLElement, shown: Shown, theme?: string}>} */
 const mounted = new Map();
 /** @type {View | undefined} */
 let current;
@@ -119,6 +119,9 @@ async function main() {
     }
     try {
       await entry.shown.show(state);
+      const { theme } = document.documentElement.dataset;
+      if (entry.theme && entry.theme !== theme) entry.shown.redraw();
+      entry.theme = theme;
       app.changed();
     } catch (error) {
       fail(error);
@@ -139,7 +142,11 @@ async function main() {
   };
   window.addEventListener("hashchange", readAddress);
 
-  const redraw = () => current && mounted.get(current.id)?.shown.redraw();
+  const redraw = () => {
+    const entry = current && mounted.get(current.id);
+    entry?.shown.redraw();
+    if (entry) entry.theme = document.documentElement.dataset.theme;
+  };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (applyTheme(), redraw()));
   $("theme").onclick = () => (say(`Theme: ${nextTheme()}`), redraw());
   $("share").onclick = async () => {
