@@ -79,6 +79,14 @@ export function drawProbe(g, camera, s) {
         g.setLineDash([]);
       }
     }
+    // What the truncated field takes for the distance: the same wherever it is a constant.
+    const kept = last.truncated.distance;
+    if (s.image?.which === "truncated" && kept) {
+      circle(g, cx, cy, Math.abs(kept) * camera.scale);
+      g.setLineDash([3, 3]);
+      stroked(g, c.ink, 1.25);
+      g.setLineDash([]);
+    }
     const gradient = last[s.image?.which ?? "euclidean"].gradient;
     if (gradient && Math.hypot(gradient[0], gradient[1]) >= NONE) {
       const length = 44 * Math.min(1, MOST / Math.hypot(gradient[0], gradient[1]));

@@ -224,7 +224,7 @@ export default {
       picture() {
         plane.paint();
         const field = shown.field === "euclidean" ? "Euclidean" : "truncated";
-        return compose(`portolan studio · clearance · ${field} field`, [[plane.canvas], [path.plot.canvas(), meter.plot.canvas()]]);
+        return compose(`portolan studio · clearance · ${field} field`, [[plane.canvas], [scene.checked ? path.plot.canvas() : null, meter.plot.canvas()]]);
       },
       key(event) {
         const far = event.shiftKey ? 10 : 1;
