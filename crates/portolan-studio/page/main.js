@@ -3,6 +3,7 @@ import { connect } from "./engine/socket.js";
 import { Meter } from "./ui/meter.js";
 import { applyTheme, nextTheme } from "./ui/theme.js";
 import { save } from "./ui/files.js";
+import clearance from "./views/clearance.js";
 import fusion from "./views/fusion.js";
 
 /**
@@ -33,7 +34,7 @@ import fusion from "./views/fusion.js";
  */
 
 /** @type {View[]} */
-const VIEWS = [fusion];
+const VIEWS = [fusion, clearance];
 
 const $ = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const status = $("status");
@@ -50,7 +51,7 @@ function fail(error) {
   status.textContent = error instanceof Error ? error.message : String(error);
 }
 
-/** @type {Map<string, {section: HTMLElement, shown: Shown}>} */
+/** What is mounted, and the theme that it was drawn in. @type {Map<string, {section: HTMLElement, shown: Shown, theme?: string}>} */
 const mounted = new Map();
 /** @type {View | undefined} */
 let current;
@@ -118,6 +119,9 @@ async function main() {
     }
     try {
       await entry.shown.show(state);
+      const { theme } = document.documentElement.dataset;
+      if (entry.theme && entry.theme !== theme) entry.shown.redraw();
+      entry.theme = theme;
       app.changed();
     } catch (error) {
       fail(error);
@@ -138,7 +142,11 @@ async function main() {
   };
   window.addEventListener("hashchange", readAddress);
 
-  const redraw = () => current && mounted.get(current.id)?.shown.redraw();
+  const redraw = () => {
+    const entry = current && mounted.get(current.id);
+    entry?.shown.redraw();
+    if (entry) entry.theme = document.documentElement.dataset.theme;
+  };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => (applyTheme(), redraw()));
   $("theme").onclick = () => (say(`Theme: ${nextTheme()}`), redraw());
   $("share").onclick = async () => {

@@ -1,5 +1,6 @@
 //! What answers the page: one [`Session`] per tab, a view of it per folder.
 
+mod clearance;
 mod clock;
 mod exports;
 mod fusion;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::clearance::Clearance;
 use super::fusion::Fusion;
 use super::protocol::{Message, Refusal, Reply, View, Wire, encode};
 use super::{Clock, Logs};
@@ -32,12 +33,13 @@ pub fn check(logs: &Arc<Logs>, limits: Limits) -> Result<(), Refusal> {
 pub struct Session {
     limits: Limits,
     fusion: Fusion,
+    clearance: Clearance,
 }
 
 impl Session {
     /// Nothing fused yet.
     pub fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
-        Self { limits, fusion: Fusion::new(logs, limits, clock) }
+        Self { limits, fusion: Fusion::new(logs, limits, clock), clearance: Clearance::new(limits, clock) }
     }
 
     /// Answers one message of the page, whatever it is: what cannot be answered is refused in words.
@@ -52,6 +54,7 @@ impl Session {
         let ask = message.ask.get();
         let reply = match message.view {
             View::Fusion => self.fusion.ask(serde_json::from_str(ask)?),
+            View::Clearance => self.clearance.ask(serde_json::from_str(ask)?, &mut self.fusion),
         }?;
         let held = self.memory_bytes();
         if held > self.limits.memory {
@@ -68,12 +71,13 @@ impl Session {
 
     /// Bytes of all maps of this tab.
     pub fn memory_bytes(&self) -> usize {
-        self.fusion.memory_bytes()
+        self.fusion.memory_bytes() + self.clearance.memory_bytes()
     }
 
     fn forget(&mut self, view: View) {
         match view {
             View::Fusion => self.fusion.forget(),
+            View::Clearance => self.clearance.forget(),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 mod ask;
 mod chair;
-mod frame;
+pub(super) mod frame;
 mod inspect;
 mod lap;
 mod seen;

@@ -1,0 +1,54 @@
+// @ts-check
+import { strokeFaces, strokeLines } from "../plane/lines.js";
+import { colors } from "../ui/theme.js";
+import { drawPath } from "./path_layer.js";
+import { drawArrows, drawProbe } from "./probe_layer.js";
+import { drawRings } from "./rings_layer.js";
+
+/**
+ * What is drawn, as the last answers told it.
+ * @typedef {object} Scene
+ * @property {import("./map.js").FieldImage | undefined} image
+ * @property {Float32Array} contour
+ * @property {Uint32Array} lines
+ * @property {any} truth faces, of the simulated world
+ * @property {Rings | undefined} rings
+ * @property {Arrows | undefined} arrows
+ * @property {[number, number] | undefined} probe where it is (world)
+ * @property {any} said what was answered there
+ * @property {[number, number][]} waypoints
+ * @property {import("./path_layer.js").Checked | undefined} checked the path as it was answered last
+ * @property {number} radius of the robot (metres)
+ * @property {{rings: boolean, arrows: boolean, contour: boolean, truth: boolean}} visible
+ *
+ * @typedef {{points: Float32Array, starts: Uint32Array, levels: Float32Array, spacing: number}} Rings
+ * @typedef {{points: Float32Array, gradients: Float32Array, spacing: number}} Arrows
+ */
+
+/** What stays while the probe moves, from back to front. @param {Scene} s @returns {import("../plane/plane.js").Layer[]} */
+export function stillLayers(s) {
+  return [
+    (g, camera) => s.image?.draw(g, camera),
+    (g, camera) => s.visible.rings && s.rings && drawRings(g, camera, s.rings),
+    (g, camera) => s.visible.arrows && s.arrows && drawArrows(g, camera, s.arrows),
+    (g, camera) => {
+      if (!s.visible.truth || !s.truth) return;
+      g.strokeStyle = colors().truth;
+      g.lineWidth = 1.25;
+      g.setLineDash([5, 4]);
+      strokeFaces(g, camera, s.truth.faces);
+    },
+    (g, camera) => {
+      if (!s.visible.contour) return;
+      g.strokeStyle = colors().contour;
+      g.lineWidth = 1.8;
+      g.lineJoin = "round";
+      strokeLines(g, camera, s.contour, s.lines);
+    },
+  ];
+}
+
+/** What moves, over it. @param {Scene} s @returns {import("../plane/plane.js").Layer[]} */
+export function movingLayers(s) {
+  return [(g, camera) => drawPath(g, camera, s), (g, camera) => drawProbe(g, camera, s)];
+}

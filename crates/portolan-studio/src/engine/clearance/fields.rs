@@ -1,0 +1,109 @@
+//! The two fields of one map.
+
+use portolan::field::{DenseEsdf, Esdf, EsdfSettings, FieldSlots, Interpolation, SparseEsdf, Status};
+use portolan::geom::vector::norm;
+use portolan::geom::{Aabb, Grid};
+use portolan::map::Tsdf2;
+use portolan::{Answer, field::EsdfError};
+
+use super::ask::Which;
+use crate::engine::exports;
+
+/// Distance and gradient.
+pub(super) type Sample = (f64, [f64; 2]);
+
+/// Both fields, over the cells of the map.
+pub(super) struct Fields {
+    /// As `query` makes it, with distances to unknown cells.
+    pub(super) euclidean: SparseEsdf<2>,
+    /// The same at the cells' centres.
+    pub(super) dense: DenseEsdf<2>,
+    /// What the filter keeps, read as if it were a distance field: bilinear between the centres of the same cells that the
+    /// Euclidean field knows.
+    truncated: Esdf<2>,
+    /// From here on (metres) the truncated field is a constant.
+    pub(super) limit: f64,
+}
+
+impl Fields {
+    pub(super) fn of(tsdf: &Tsdf2) -> Result<Self, EsdfError> {
+        let euclidean = exports::field(tsdf, true);
+        // A probe must not wait for bricks that nobody has read yet.
+        euclidean.measure();
+        let dense = euclidean.dense(tsdf.grid());
+        let planes = tsdf.store().planes();
+        let least = EsdfSettings::of(tsdf).min_weight;
+        let cells = planes.distances().iter().zip(planes.weights());
+        let kept = cells.map(|(&d, &w)| if w > 0.0 && w >= least { d } else { f32::NAN });
+        Ok(Self {
+            euclidean,
+            dense,
+            truncated: Esdf::from_samples(*tsdf.grid(), kept.collect())?,
+            // As the map itself tells its saturated cells from others.
+            limit: f64::from(tsdf.rule().truncation) * (1.0 - 1e-4),
+        })
+    }
+
+    pub(super) fn grid(&self) -> &Grid<2> {
+        self.truncated.grid()
+    }
+
+    pub(super) fn bounds(&self) -> Aabb<2> {
+        self.grid().aabb()
+    }
+
+    /// At the cells' centres, x fastest; NaN where nothing is known.
+    pub(super) fn samples(&self, which: Which) -> &[f32] {
+        match which {
+            Which::Truncated => self.truncated.samples(),
+            Which::Euclidean => &self.dense.distances,
+        }
+    }
+
+    /// Whether a cell's sample is a distance, and not what a distance is at least.
+    pub(super) fn is_known(&self, which: Which, i: usize) -> bool {
+        match which {
+            Which::Truncated => self.truncated.samples()[i].abs() < self.limit as f32,
+            Which::Euclidean => self.dense.status[i] == 1,
+        }
+    }
+
+    /// What the truncated field says of a point; saturated where it is a constant.
+    pub(super) fn truncated(&self, p: [f64; 2]) -> Answer<Sample> {
+        match self.truncated.distance_and_gradient(p) {
+            Answer::Known(sample) if sample.0.abs() >= self.limit => Answer::Saturated(sample),
+            answer => answer,
+        }
+    }
+
+    /// Gradients of many points; `None` where a field has no answer.
+    pub(super) fn gradients(&self, which: Which, points: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
+        let n = points.len();
+        let (mut distance, mut gradient) = (vec![0.0; n], vec![[0.0; 2]; n]);
+        let mut status = vec![Status::Unknown; n];
+        let out = FieldSlots { distance: &mut distance, gradient: &mut gradient, status: &mut status };
+        match which {
+            Which::Truncated => self.truncated.distances_and_gradients(points, Interpolation::Linear, out),
+            Which::Euclidean => self.euclidean.distances_and_gradients(points, Interpolation::Linear, out),
+        }
+        let answered = |s: Status| matches!(s, Status::Known | Status::Saturated);
+        gradient.into_iter().zip(status).map(|(g, s)| answered(s).then_some(g)).collect()
+    }
+
+    /// Least and largest known distance of the Euclidean field; 0 where nothing is.
+    pub(super) fn extremes(&self) -> [f32; 2] {
+        let known = self.dense.distances.iter().zip(&self.dense.status).filter(|(_, s)| **s == 1);
+        known.fold([0.0, 0.0], |[low, high], (&d, _)| [d.min(low), d.max(high)])
+    }
+
+    pub(super) fn memory_bytes(&self) -> usize {
+        let cells = self.grid().len();
+        // Samples of both, and a status.
+        self.euclidean.memory_bytes() + 9 * cells
+    }
+}
+
+/// Length of a gradient, where there is one.
+pub(super) fn length(gradient: Option<[f64; 2]>) -> Option<f64> {
+    gradient.map(norm)
+}
