@@ -36,7 +36,7 @@ impl Radiance {
     /// Answers.
     pub(in crate::engine) fn ask(&mut self, ask: &Ask) -> Result<Reply, Refusal> {
         match *ask {
-            Ask::Open {} => self.frame(0.0, true),
+            Ask::Open {} => self.frame((0, 0.0), true),
             Ask::Start { seed, channels, optimizer } => {
                 if seed > MOST_SEED {
                     return Err(Refusal::new(format!(
@@ -45,11 +45,11 @@ impl Radiance {
                 }
                 self.run = Some(Run::new(&self.scene, seed, channels, optimizer)?);
                 // Another seed has measured something else.
-                self.frame(0.0, true)
+                self.frame((0, 0.0), true)
             }
             Ask::GoOn { channels, optimizer } => {
                 self.run()?.go_on(channels, optimizer)?;
-                self.frame(0.0, false)
+                self.frame((0, 0.0), false)
             }
             Ask::Step { steps } => {
                 if !(1..=MOST_STEPS).contains(&steps) {
@@ -60,7 +60,7 @@ impl Radiance {
                 let clock = self.clock.clone();
                 let run = self.run()?;
                 let ((), seconds) = clock.time(|| run.step(steps));
-                self.frame(seconds, false)
+                self.frame((steps, seconds), false)
             }
             Ask::Look { ray, bin } => {
                 let rays = self.scene.training.len() + self.scene.held_out.len();
@@ -72,7 +72,7 @@ impl Radiance {
                     return Err(Refusal::new(format!("there is no bin {bin}; they are 0 to {}", bins - 1)));
                 }
                 self.look = Look { ray, bin };
-                self.frame(0.0, false)
+                self.frame((0, 0.0), false)
             }
         }
     }
@@ -86,12 +86,12 @@ impl Radiance {
         self.run.as_mut().ok_or_else(|| Refusal::new("there is no run"))
     }
 
-    fn frame(&mut self, seconds: f64, all: bool) -> Result<Reply, Refusal> {
+    fn frame(&mut self, made: (usize, f64), all: bool) -> Result<Reply, Refusal> {
         let look = self.look;
         self.run()?;
         let Some(run) = &mut self.run else { return Err(Refusal::new("there is no run")) };
         let all = all.then(|| tell::scene(&self.scene, run));
-        tell::frame(&self.scene, run, look, seconds, all)
+        tell::frame(&self.scene, run, look, made, all)
     }
 
     pub(in crate::engine) fn memory_bytes(&self) -> usize {

@@ -49,12 +49,12 @@ pub(super) fn scene(scene: &Scene, run: &mut Run) -> Value {
     })
 }
 
-/// The fit as it stands.
+/// The fit as it stands, after so many steps in so many seconds.
 pub(super) fn frame(
     scene: &Scene,
     run: &mut Run,
     look: Look,
-    seconds: f64,
+    (made, seconds): (usize, f64),
     all: Option<Value>,
 ) -> Result<Reply, Refusal> {
     let progress = run.progress();
@@ -67,6 +67,7 @@ pub(super) fn frame(
         "seed": run.seed,
         "phases": run.phases,
         "step": run.steps(),
+        "made": made,
         "seconds": seconds,
         "objective": progress.objective,
         "training": residuals(&progress.training),
@@ -164,7 +165,32 @@ fn explained(run: &Run, gradient: &[f64], bin: usize) -> Value {
         "terms": terms.iter().map(row).collect::<Vec<_>>(),
         "pulls": sum.pulls, "chain": sum.chain, "prior": sum.prior, "sum": sum.gradient(),
         "gradient": gradient[bin],
+        "by_reflectance": gradient[line.bins() + bin],
+        "says": says(&terms, sum.chain * line.resolution),
     })
+}
+
+/// What is worth seeing in the terms of a bin; `free`: how much of a change of `θ` is one of `σδ`.
+fn says(terms: &[Terms], free: f64) -> Option<&'static str> {
+    let pulls = || terms.iter().flat_map(|t| [t.depth.pull, t.reflectance.pull, t.second_moment.pull]);
+    let (net, gross) = (pulls().sum::<f64>().abs(), pulls().map(f64::abs).sum::<f64>());
+    if terms.is_empty() {
+        Some("No training ray crosses this bin: only the prior speaks.")
+    } else if terms.iter().all(|t| t.passes < 0.01) {
+        Some(
+            "Next to no light passes this bin. That factor is common to all channels of a ray: none of them can \
+             tell what is behind.",
+        )
+    } else if net < 0.1 * gross {
+        Some(
+            "The pulls on its density cancel: with what is behind it, this bin has the mean that was measured along \
+             its rays.",
+        )
+    } else if free < 0.02 {
+        Some("Next to no density is here: whatever pulls, θ must move far before σ does.")
+    } else {
+        None
+    }
 }
 
 fn term(t: &Term) -> Value {

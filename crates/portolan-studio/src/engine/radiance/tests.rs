@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use portolan::radiance::{
-    AMBIGUOUS, Channels, Experiment, Fit, NAMED_SEEDS, PARKED, Scene, Settings, TWO_NOT_ENOUGH, transmittance,
+    AMBIGUOUS, Channels, Experiment, Fit, NAMED_SEEDS, OPAQUE, PARKED, Scene, Settings, TWO_NOT_ENOUGH,
+    transmittance,
 };
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -150,6 +151,22 @@ fn parked_matter_leaves_when_reflectance_arrives() {
     ask(&mut session, &json!({ "op": "go_on", "channels": "reflectance", "optimizer": "descent" }));
     let cleared = go(&mut session, 6);
     assert!(parked > 0.5 && cleared < 0.5 * parked, "{parked} {cleared}");
+}
+
+/// The words below the terms are those of the named seeds.
+#[test]
+fn words_say_what_the_terms_show() {
+    for (named, says) in [(PARKED, "cancel"), (OPAQUE, "Next to no light passes")] {
+        let mut session = session();
+        ask(&mut session, &start(named.seed, "depth"));
+        let mut worst = Value::Null;
+        for _ in 0..10 {
+            worst = ask(&mut session, &json!({ "op": "step", "steps": 2000 })).body["worst"].clone();
+        }
+        let body = ask(&mut session, &json!({ "op": "look", "bin": worst })).body;
+        assert!(body["bin"]["says"].as_str().unwrap().contains(says), "{}: {}", named.name, body["bin"]);
+        assert_eq!(body["bin"]["by_reflectance"], 0.0, "depth alone does not move reflectance");
+    }
 }
 
 #[test]
