@@ -21,12 +21,12 @@ export class Curves {
       { label: "training rays", color: "beam", width: 2 }, { label: "held-out rays", color: "contour", width: 2 }, { label: "noise of a measurement", color: "truth", dashed: true },
     ];
     this.depth = plot({
-      id: "radiance-depth", label: "Root mean square residual of depth over the steps: training rays, held-out rays, noise", x: "step", y: "residual of depth (m)",
+      id: "radiance-depth", label: "Root mean square residual of depth over the steps: training rays, held-out rays, noise", x: "step", y: "RMS depth (m)",
       height: 178, log: true, series: lines, marks,
     });
     this.reflectance = plot({
       id: "radiance-reflectance", label: "Root mean square residual of reflectance over the steps: training rays, held-out rays, noise", x: "step",
-      y: "residual of reflectance", height: 178, log: true, series: lines, marks,
+      y: "RMS reflectance", height: 178, log: true, series: lines, marks,
     });
     this.objective = plot({
       id: "radiance-objective", label: "Objective over the steps: negative logarithm of the posterior", x: "step", y: "objective J", height: 178, log: true,

@@ -6,7 +6,7 @@ export function digits(v) {
   if (v === null || v === undefined) return "–";
   if (v === 0) return "0";
   const size = Math.abs(v);
-  const text = size >= 1e5 || size < 1e-3 ? v.toExponential(1) : v.toPrecision(3);
+  const text = size >= 1e5 || size < 1e-3 ? v.toExponential(size < 1e-9 ? 0 : 1) : v.toPrecision(3);
   return text.replaceAll("-", "−").replace("e+", "e");
 }
 
@@ -30,11 +30,12 @@ export class Explanation {
     this.tables = CHANNELS.map(({ key, title, units }) => {
       const unit = (/** @type {string} */ u) => (u ? el("span", { class: "unit" }, ` ${u}`) : "");
       const head = el("tr", {}, ...[
-        ["ray"], ["passes", "%"], ["residual", "s"], ["contrast", units[0]], ["slope", units[1]], ["pull", "m"],
+        ["ray"], ["passes", "%"], ["residual", "× s"], ["contrast", units[0]], ["slope", units[1]], ["pull", "m"],
       ].map(([name, u]) => el("th", { scope: "col" }, name, u ? el("br") : "", unit(u ?? ""))));
+      const caption = el("caption", {}, title);
       const body = el("tbody", { id: `terms-${key.replace("_", "-")}` });
-      const table = el("table", { class: "terms" }, el("caption", {}, title), el("thead", {}, head), body);
-      return { key, table, body };
+      const table = el("table", { class: "terms" }, caption, el("thead", {}, head), body);
+      return { key, title, unit: units[0], caption, table, body };
     });
     this.sums = facts([
       ["bin-pulls", "sum of pulls, ∂J/∂σ"], ["bin-chain", "× ∂σ/∂θ"], ["bin-prior", "+ prior"], ["bin-sum", "= ∂J/∂θ"], ["bin-gradient", "the optimiser has"],
@@ -45,11 +46,16 @@ export class Explanation {
     this.close = el("button", { type: "button", id: "bin-close", title: "Look at no bin (Esc)", onclick: close, hidden: true }, "Close");
     this.details = el(
       "div", { class: "group", hidden: true }, this.facts.node,
-      el("p", { class: "note" }, "slope = δ × passes × contrast, pull = residual ÷ s × slope, with s the noise of the channel. A pull below zero asks for more density."),
+      el("p", { class: "note" }, "Residuals count noises s. Slope = δ × passes × contrast; pull = residual × slope ÷ s. A pull below zero asks for more density."),
       ...this.tables.map((t) => t.table), this.unused, this.sums.node, this.says,
     );
     this.node = group("Why a bin moves, or does not", this.title,
       el("div", { class: "row" }, el("button", { type: "button", id: "bin-worst", title: "The bin with the most matter in empty space (W)", onclick: worst }, "Most misplaced bin"), this.close), this.details);
+  }
+
+  /** How well each channel is measured. @param {Record<string, number>} noise */
+  setNoise(noise) {
+    for (const { key, title, unit, caption } of this.tables) set(caption, `${title}, s = ${noise[key]}${unit && ` ${unit}`}`);
   }
 
   /** @param {any} bin what the engine says of it, or null @param {string} channels */

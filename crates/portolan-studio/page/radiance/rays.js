@@ -33,8 +33,8 @@ export function drawRays(g, f, scene, fit, c) {
   g.fillStyle = c.muted;
   g.textAlign = "right";
   g.fillText("rendered − measured", f.right + f.left - 8, f.rays.top - 2);
-  turned(g, "training", 12, (f.row(0) + f.row(6)) / 2, c.beam);
-  turned(g, "held out", 12, (f.row(7) + f.row(9)) / 2, c.contour);
+  turned(g, "training", 12, (f.row(0) + f.row(6)) / 2, c.muted);
+  turned(g, "held out", 12, (f.row(7) + f.row(9)) / 2, c.muted);
 }
 
 /** @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene["rays"][number]} ray @param {number} y @param {string} color @param {boolean} chosen */

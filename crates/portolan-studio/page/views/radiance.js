@@ -77,6 +77,7 @@ export default {
       for (const { body, arrays } of arrived.splice(0)) {
         if (body.all) {
           picture.scene = body.all;
+          explanation.setNoise(body.all.noise);
           panel.show(body.all.named, body.seed);
           if (ray.node.querySelectorAll("option").length === 1) {
             ray.node.querySelector("select")?.append(...body.all.rays.map((/** @type {any} */ r, /** @type {number} */ i) =>
