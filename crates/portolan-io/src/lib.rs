@@ -79,9 +79,13 @@ pub use map_file::{
     sweep_word, weights_of, weights_word,
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
-pub use mesh::{MeshCounts, MeshFormat, mesh_counts, write_glb, write_obj, write_ply_mesh};
+pub use mesh::{
+    MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, ply_mesh_to_bytes, write_glb, write_obj, write_ply_mesh,
+};
 pub use numpy::{NpyArray, NpyValues, read_npy, read_npz, write_npy, write_npz};
-pub use octomap::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, write_octomap_bt, write_octomap_ot};
+pub use octomap::{
+    OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, octomap_bt_to_bytes, write_octomap_bt, write_octomap_ot,
+};
 pub use pcd::{read_pcd, write_pcd};
 pub use pgm::Pgm;
 pub use ply::{PlyMesh, read_ply_cloud, read_ply_mesh, write_ply_cloud};

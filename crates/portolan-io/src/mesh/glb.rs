@@ -31,6 +31,24 @@ const ELEMENTS: u32 = 34963;
 /// As [`write_ply_mesh`](super::write_ply_mesh), and where the file would be longer than the 4 GiB that the format holds.
 pub fn write_glb(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
     let path = path.as_ref();
+    let (layout, text, total) = prepared(path, mesh)?;
+    write_atomic(path, |w| write_to(w, mesh, &layout, &text, total))
+}
+
+/// The same in memory, for who hands files on in another way.
+///
+/// # Errors
+/// [`IoError::Unwritable`] as [`write_glb`].
+pub fn glb_to_bytes(mesh: &Mesh) -> Result<Vec<u8>, IoError> {
+    let name = Path::new("mesh.glb");
+    let (layout, text, total) = prepared(name, mesh)?;
+    let mut bytes = Vec::with_capacity(total as usize);
+    write_to(&mut bytes, mesh, &layout, &text, total).map_err(|e| IoError::os(name, "write it", e))?;
+    Ok(bytes)
+}
+
+/// Where everything goes, the padded document, and the length of the file.
+fn prepared(path: &Path, mesh: &Mesh) -> Result<(Layout, Vec<u8>, u32), IoError> {
     check(path, mesh)?;
     let layout = if mesh.triangles.is_empty() { Layout::EMPTY } else { Layout::of(mesh) };
     let mut text = document(mesh, &layout).to_string().into_bytes();
@@ -40,7 +58,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
         let advice = "write PLY, or mesh at a coarser resolution";
         return Err(IoError::unwritable(path, "the file's length (bytes)", total.to_string(), advice));
     };
-    write_atomic(path, |w| write_to(w, mesh, &layout, &text, total))
+    Ok((layout, text, total))
 }
 
 /// Where the arrays lie in the binary chunk (bytes); each starts at a multiple of four.
@@ -167,6 +185,7 @@ mod tests {
         let path = folder.path().join("mesh.glb");
         write_glb(&path, mesh).unwrap();
         let file = std::fs::read(path).unwrap();
+        assert_eq!(file, glb_to_bytes(mesh).unwrap());
         let mut bytes = Bytes(&file);
         assert_eq!((bytes.take(), bytes.u32(), bytes.u32()), (*b"glTF", 2, file.len() as u32));
         let text = bytes.u32() as usize;

@@ -7,9 +7,9 @@ mod ply;
 
 pub(crate) use format::mesh_format;
 pub use format::{MeshCounts, MeshFormat, mesh_counts};
-pub use glb::write_glb;
+pub use glb::{glb_to_bytes, write_glb};
 pub use obj::write_obj;
-pub use ply::write_ply_mesh;
+pub use ply::{ply_mesh_to_bytes, write_ply_mesh};
 
 use std::path::Path;
 

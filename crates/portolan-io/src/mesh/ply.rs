@@ -26,6 +26,18 @@ pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError
     write_atomic(path, |w| write_to(w, mesh))
 }
 
+/// The same in memory, for who hands files on in another way.
+///
+/// # Errors
+/// [`IoError::Unwritable`] as [`write_ply_mesh`].
+pub fn ply_mesh_to_bytes(mesh: &Mesh) -> Result<Vec<u8>, IoError> {
+    let name = Path::new("mesh.ply");
+    check(name, mesh)?;
+    let mut bytes = Vec::new();
+    write_to(&mut bytes, mesh).map_err(|e| IoError::os(name, "write it", e))?;
+    Ok(bytes)
+}
+
 fn write_to(w: &mut impl Write, mesh: &Mesh) -> io::Result<()> {
     let bounds = mesh.bounds();
     let far = bounds.min.iter().chain(&bounds.max).any(|c| c.abs() > NEAR) && !mesh.vertices.is_empty();
@@ -75,6 +87,7 @@ mod tests {
         let path = folder.path().join("mesh.ply");
         write_ply_mesh(&path, mesh).unwrap();
         let bytes = std::fs::read(path).unwrap();
+        assert_eq!(bytes, ply_mesh_to_bytes(mesh).unwrap());
         let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
         (String::from_utf8(bytes[..end].to_vec()).unwrap(), bytes[end..].to_vec())
     }

@@ -34,7 +34,7 @@ mod tests;
 mod write;
 
 pub use file::OctomapTree;
-pub use write::{write_octomap_bt, write_octomap_ot};
+pub use write::{octomap_bt_to_bytes, write_octomap_bt, write_octomap_ot};
 
 /// Levels below the root.
 const DEPTH: u32 = 16;

@@ -82,6 +82,7 @@ fn a_binary_file_byte_by_byte() {
     // The same cells, fused elsewhere: a small tree whose origin is no multiple of eight cells.
     let small = tree.moved_to([HALF - 3, HALF - 5, HALF], 3).unwrap();
     assert_eq!(written(|p| write_octomap_bt(p, &small)), bytes);
+    assert_eq!(octomap_bt_to_bytes(&small).unwrap(), bytes);
     let p = |l: f32| 1.0 / (1.0 + (-f64::from(l)).exp());
     assert!((p(OCTOMAP_FREE) - 0.1192).abs() < 1e-7 && (p(OCTOMAP_OCCUPIED) - 0.971).abs() < 1e-7);
 }

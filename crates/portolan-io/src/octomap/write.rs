@@ -1,5 +1,6 @@
 //! Writing the nodes.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -20,12 +21,36 @@ use crate::{IoError, write_atomic};
 /// of OctoMap's 65,536 cells about the world's zero; else as [`write_atomic`].
 pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 3>) -> Result<(), IoError> {
     let path = path.as_ref();
+    let (header, tree, stored) = bt(tree, path)?;
+    write(&header, &tree, &stored, path)
+}
+
+/// The same in memory, for who hands files on in another way.
+///
+/// # Errors
+/// [`IoError::Unwritable`] as [`write_octomap_bt`].
+pub fn octomap_bt_to_bytes<V: LogOddsValue>(tree: &Tree<V, 3>) -> Result<Vec<u8>, IoError> {
+    let name = Path::new("octree.bt");
+    let (header, tree, stored) = bt(tree, name)?;
+    let mut bytes = Vec::new();
+    write_to(&mut bytes, &header, &tree, &stored).map_err(|e| IoError::os(name, "write it", e))?;
+    Ok(bytes)
+}
+
+/// What a `.bt` of a tree holds.
+fn bt<V: LogOddsValue>(
+    tree: &Tree<V, 3>,
+    path: &Path,
+) -> Result<(Header, Tree<LogOdds32, 3>, Stored), IoError> {
     let tree = likeliest(tree);
-    let tree = placed(&tree, path)?;
+    let moved = match placed(&tree, path)? {
+        Cow::Owned(moved) => Some(moved),
+        Cow::Borrowed(_) => None,
+    };
+    let tree = moved.unwrap_or(tree);
     let stored = open_root(&tree);
     let size = tree.nodes() as u64 + if stored.root_open { 8 } else { 0 };
-    let header = Header::new(Kind::Bt, size, tree.lattice().resolution);
-    write(&header, &tree, &stored, path)
+    Ok((Header::new(Kind::Bt, size, tree.lattice().resolution), tree, stored))
 }
 
 /// Writes a tree as OctoMap's `.ot`. `quantum` is the log odds of one unit of a value: that of the rule for bytes
@@ -85,21 +110,28 @@ fn open_root(tree: &Tree<LogOdds32, 3>) -> Stored {
 }
 
 fn write(header: &Header, tree: &Tree<LogOdds32, 3>, stored: &Stored, path: &Path) -> Result<(), IoError> {
+    write_atomic(path, |out| write_to(out, header, tree, stored))
+}
+
+fn write_to(
+    out: &mut impl Write,
+    header: &Header,
+    tree: &Tree<LogOdds32, 3>,
+    stored: &Stored,
+) -> io::Result<()> {
     let records = tree.records();
-    write_atomic(path, |out| {
-        out.write_all(header.bytes())?;
-        let mut nodes = Nodes { out, records: &records, next: 0, cursor: Cursor::of(stored) };
-        let root = match (records.masks.is_empty(), stored.root_open) {
-            (false, _) => Node::Inner,
-            (true, true) => Node::Open,
-            (true, false) => Node::Leaf,
-        };
-        match header.kind {
-            _ if header.size == 0 => Ok(()),
-            Kind::Bt => nodes.bt(root, records.root_value),
-            Kind::Ot => nodes.ot(root, records.root_value),
-        }
-    })
+    out.write_all(header.bytes())?;
+    let mut nodes = Nodes { out, records: &records, next: 0, cursor: Cursor::of(stored) };
+    let root = match (records.masks.is_empty(), stored.root_open) {
+        (false, _) => Node::Inner,
+        (true, true) => Node::Open,
+        (true, false) => Node::Leaf,
+    };
+    match header.kind {
+        _ if header.size == 0 => Ok(()),
+        Kind::Bt => nodes.bt(root, records.root_value),
+        Kind::Ot => nodes.ot(root, records.root_value),
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]

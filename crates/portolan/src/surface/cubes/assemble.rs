@@ -1,7 +1,7 @@
 //! Pieces of bricks joined into one mesh.
 
 use super::parallel::for_each;
-use super::piece::{Attributes, EdgeCode, Part, Piece, WORDS, bits};
+use super::piece::{Attributes, Part, Piece, WORDS, bits, place_of};
 use crate::surface::Mesh;
 
 /// Where nodes sit: node `i` at `origin + (i + offset) * resolution`.
@@ -191,11 +191,6 @@ impl Joint<'_> {
         }
         numbers.extend(start + own..start + own + piece.centres);
     }
-}
-
-/// Word and bit of an edge in its brick.
-fn place_of(code: EdgeCode) -> (usize, u32) {
-    (usize::from(code >> 6 & 31), u32::from(code & 63))
 }
 
 /// The upper neighbours of every piece. Keys ascend, so that one walk per octant finds those of many pieces.

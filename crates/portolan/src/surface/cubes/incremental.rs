@@ -3,7 +3,7 @@
 use super::assemble::{Placement, assemble};
 use super::extract::{MeshSettings, neighbour, order};
 use super::parallel::map;
-use super::piece::{Attributes, Numbers, Part};
+use super::piece::{Attributes, Numbers, Part, Piece, place_of};
 use super::samples::{BrickSamples, threshold};
 use super::signs::{Layers, Signs, signs_of_brick};
 use crate::cell::{Color, SignedDistance};
@@ -93,6 +93,69 @@ impl IncrementalMesh {
         assemble(&pieces, placement, self.settings.attributes(self.colored))
     }
 
+    /// The keys of all pieces, ascending. O(n log n).
+    pub fn keys(&self) -> Vec<BlockKey<3>> {
+        let mut keys: Vec<_> = self.pieces.keys().copied().collect();
+        keys.sort_unstable_by_key(|key| order(*key));
+        keys
+    }
+
+    /// How many vertices and triangles [`IncrementalMesh::piece`] has; zeros where there is no surface. O(1).
+    pub fn piece_size(&self, key: BlockKey<3>) -> [usize; 2] {
+        let piece = self.pieces.get(&key).and_then(|part| part.pieces.first());
+        piece.map_or([0; 2], |p| [(p.own + p.foreign + p.centres) as usize, p.triangles as usize])
+    }
+
+    /// The piece of one brick as a mesh that stands alone, for who draws a map brick by brick: triangles and places are those
+    /// of [`IncrementalMesh::mesh`], but vertices at the brick's upper sides are there once more than in the whole. Relative
+    /// to the corner of the brick `first`. Empty where there is no surface. O(triangles of the brick).
+    pub fn piece(&self, key: BlockKey<3>, first: BlockKey<3>) -> Mesh {
+        let (Some(placement), Some(part)) = (&self.placement, self.pieces.get(&key)) else {
+            return Mesh::default();
+        };
+        let Some(piece) = part.pieces.first() else { return Mesh::default() };
+        let want = self.settings.attributes(self.colored);
+        let scale = placement.resolution;
+        let mut mesh = Mesh {
+            origin: std::array::from_fn(|k| placement.origin[k] + f64::from(first.0[k]) * 8.0 * scale),
+            ..Mesh::default()
+        };
+        let mut add = |part: &Part, piece: &Piece, i: usize| {
+            // The same operations as where pieces are joined, so that vertices have the same bits.
+            let place = |k: usize| {
+                let base =
+                    8.0 * (f64::from(piece.key.0[k]) - f64::from(first.0[k])) + placement.offset;
+                ((base + f64::from(part.vertices[i][k])) * scale) as f32
+            };
+            mesh.vertices.push([place(0), place(1), place(2)]);
+            if want.normals {
+                mesh.normals.push(super::normals::unit(part.gradients[i]));
+            }
+            if want.colors {
+                mesh.colors.push(part.colors[i]);
+            }
+        };
+        let (start, own) = (piece.first_vertex as usize, piece.own as usize);
+        (start..start + own).for_each(|i| add(part, piece, i));
+        let foreign = piece.first_foreign as usize;
+        for &code in &part.foreign[foreign..foreign + piece.foreign as usize] {
+            let octant = i32::from(code >> 11);
+            let at = BlockKey(std::array::from_fn(|k| key.0[k] + (octant >> k & 1)));
+            let owner = self.pieces.get(&at).and_then(|part| Some((part, part.pieces.first()?)));
+            // A crossing that a cube uses is its owner's, too: both were meshed from the same cells.
+            let Some((part, owner)) = owner else { return Mesh::default() };
+            let (word, bit) = place_of(code);
+            let below = (owner.crossing[word] & ((1 << bit) - 1)).count_ones();
+            add(part, owner, owner.first_vertex as usize + usize::from(owner.rank[word]) + below as usize);
+        }
+        (start + own..start + own + piece.centres as usize).for_each(|i| add(part, piece, i));
+        let triangles = piece.first_triangle as usize;
+        let triangles = &part.triangles[triangles..triangles + piece.triangles as usize];
+        mesh.triangles = triangles.iter().map(|t| t.map(u32::from)).collect();
+        super::normals::complete(&mut mesh);
+        mesh
+    }
+
     /// Bytes that the pieces hold.
     pub fn memory_bytes(&self) -> usize {
         self.pieces.values().map(Part::memory_bytes).sum::<usize>()
@@ -148,6 +211,36 @@ mod tests {
         ColorBrick::from_words(&words)
     }
 
+    /// The corners of all triangles with all that they carry, sorted.
+    fn corners(mesh: &Mesh) -> Vec<[[u32; 6]; 3]> {
+        let corner = |v: u32| {
+            let v = v as usize;
+            let [r, g, b] = mesh.colors.get(v).map_or([0; 3], |c| c.map(u32::from));
+            let [x, y, z] = mesh.vertices[v].map(f32::to_bits);
+            // Normals that come from triangles differ where the triangles of a brick are not all.
+            let n = mesh.normals.get(v).map_or(0, |n| n.map(f32::to_bits).iter().fold(0, |h: u32, b| h.rotate_left(7) ^ b));
+            [x, y, z, r << 16 | g << 8 | b, n, 0]
+        };
+        let mut all: Vec<_> = mesh.triangles.iter().map(|t| t.map(corner)).collect();
+        all.sort_unstable();
+        all
+    }
+
+    /// The pieces one by one, relative to where the mesh is.
+    fn pieces_joined(incremental: &IncrementalMesh, mesh: &Mesh) -> Vec<[[u32; 6]; 3]> {
+        let first = |k: usize| incremental.keys().iter().map(|key| key.0[k]).min().unwrap_or(0);
+        let first = BlockKey(std::array::from_fn(first));
+        let mut all = Vec::new();
+        for key in incremental.keys() {
+            let piece = incremental.piece(key, first);
+            assert_eq!(incremental.piece_size(key), [piece.vertices.len(), piece.triangles.len()]);
+            assert_eq!(piece.origin, mesh.origin);
+            all.extend(corners(&piece));
+        }
+        all.sort_unstable();
+        all
+    }
+
     fn random_key(random: &mut Random) -> BlockKey<3> {
         BlockKey(std::array::from_fn(|_| (random.next() % 4) as i32 - 2))
     }
@@ -174,6 +267,7 @@ mod tests {
                 prop_assert_eq!(whole.edge_counts().faulty, 0);
                 prop_assert_eq!(whole.colors.len(), if colored { whole.vertices.len() } else { 0 });
                 prop_assert!(mesh == whole);
+                prop_assert_eq!(pieces_joined(&incremental, &mesh), corners(&mesh));
                 // Nothing changed: nothing is done.
                 prop_assert!(incremental.update(&store, colors).is_empty());
             }

@@ -19,6 +19,11 @@ pub(super) const WORDS: usize = 24;
 /// in the bits from 11 on.
 pub(super) type EdgeCode = u16;
 
+/// Word and bit of an edge in its brick.
+pub(super) fn place_of(code: EdgeCode) -> (usize, u32) {
+    (usize::from(code >> 6 & 31), u32::from(code & 63))
+}
+
 /// What one brick adds to a [`Part`]: how many entries, and where they start.
 ///
 /// The vertices of a piece are numbered: crossings of its own edges (those that start at its nodes) in the order of the
