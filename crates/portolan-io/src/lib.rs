@@ -80,7 +80,8 @@ pub use map_file::{
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{
-    MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, ply_mesh_to_bytes, write_glb, write_obj, write_ply_mesh,
+    MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, ply_mesh_to_bytes, write_glb, write_obj,
+    write_ply_mesh,
 };
 pub use numpy::{NpyArray, NpyValues, read_npy, read_npz, write_npy, write_npz};
 pub use octomap::{

@@ -6,6 +6,7 @@ import { save } from "./ui/files.js";
 import clearance from "./views/clearance.js";
 import fusion from "./views/fusion.js";
 import radiance from "./views/radiance.js";
+import space from "./views/space.js";
 
 /**
  * A view: made when it is first shown, then shown and hidden.
@@ -35,7 +36,7 @@ import radiance from "./views/radiance.js";
  */
 
 /** @type {View[]} */
-const VIEWS = [fusion, clearance, radiance];
+const VIEWS = [fusion, clearance, radiance, space];
 
 const $ = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const status = $("status");

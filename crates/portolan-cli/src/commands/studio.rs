@@ -200,6 +200,7 @@ fn shown_in_space(logs: &Logs) -> String {
     match &logs.space {
         SpaceSource::Building => "the simulated building".into(),
         SpaceSource::Recorded(log) => format!("{}, {} scans", log.name(), log.len()),
+        SpaceSource::Map { name, .. } => name.clone(),
     }
 }
 

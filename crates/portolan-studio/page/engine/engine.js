@@ -3,7 +3,7 @@
  * The one thing that the page knows of what computes: it is asked and it answers. Today a socket to the server stands
  * behind it; the library compiled to WebAssembly can.
  *
- * @typedef {Float32Array | Uint32Array | Uint8Array | Int8Array} Values
+ * @typedef {Float32Array | Uint32Array | Uint16Array | Uint8Array | Int8Array} Values
  *
  * @typedef {object} Answer
  * @property {any} body what is said in words and numbers
@@ -15,7 +15,7 @@
  */
 
 /** @type {Record<string, any>} */
-const KINDS = { f32: Float32Array, u32: Uint32Array, u8: Uint8Array, i8: Int8Array };
+const KINDS = { f32: Float32Array, u32: Uint32Array, u16: Uint16Array, u8: Uint8Array, i8: Int8Array };
 
 /**
  * An answer with arrays, as `protocol.rs` lays it out.

@@ -1,6 +1,7 @@
 //! What the studio shows: a log of the plane and one of space, recorded or simulated.
 
 use portolan::geom::Pose;
+use portolan::map::SparseTsdf;
 use portolan::scan::Scan;
 use portolan_io::space_log::SpaceLog;
 
@@ -36,4 +37,11 @@ pub enum SpaceSource {
     Building,
     /// A log whose frames are read when they are asked for.
     Recorded(Box<SpaceLog>),
+    /// A map that was made before: nothing is left to fuse, all can be looked at.
+    Map {
+        /// Its name, for people.
+        name: String,
+        /// Every session has a snapshot of it.
+        tsdf: Box<SparseTsdf>,
+    },
 }

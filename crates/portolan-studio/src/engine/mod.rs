@@ -8,6 +8,7 @@ mod logs;
 mod protocol;
 mod radiance;
 mod session;
+mod space;
 
 pub use clock::Clock;
 pub use logs::{Logs, PlaneLog, SpaceSource};

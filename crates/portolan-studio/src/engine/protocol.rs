@@ -35,6 +35,7 @@ pub(super) enum View {
     Fusion,
     Clearance,
     Radiance,
+    Space,
 }
 
 /// An answer.
@@ -62,6 +63,8 @@ pub enum Values {
     F32(Vec<f32>),
     /// `Uint32Array`
     U32(Vec<u32>),
+    /// `Uint16Array`
+    U16(Vec<u16>),
     /// `Uint8Array`
     U8(Vec<u8>),
     /// `Int8Array`
@@ -115,6 +118,12 @@ impl From<Vec<u32>> for Values {
     }
 }
 
+impl From<Vec<u16>> for Values {
+    fn from(values: Vec<u16>) -> Self {
+        Self::U16(values)
+    }
+}
+
 impl From<Vec<u8>> for Values {
     fn from(values: Vec<u8>) -> Self {
         Self::U8(values)
@@ -132,6 +141,7 @@ impl Values {
         match self {
             Self::F32(_) => "f32",
             Self::U32(_) => "u32",
+            Self::U16(_) => "u16",
             Self::U8(_) => "u8",
             Self::I8(_) => "i8",
         }
@@ -141,6 +151,7 @@ impl Values {
         match self {
             Self::F32(v) => v.len(),
             Self::U32(v) => v.len(),
+            Self::U16(v) => v.len(),
             Self::U8(v) => v.len(),
             Self::I8(v) => v.len(),
         }
@@ -149,17 +160,28 @@ impl Values {
     fn bytes(&self) -> usize {
         match self {
             Self::F32(_) | Self::U32(_) => 4 * self.len(),
+            Self::U16(_) => 2 * self.len(),
             Self::U8(_) | Self::I8(_) => self.len(),
         }
     }
 
     fn append_to(&self, out: &mut Vec<u8>) {
         match self {
-            Self::F32(v) => out.extend(v.iter().flat_map(|x| x.to_le_bytes())),
-            Self::U32(v) => out.extend(v.iter().flat_map(|x| x.to_le_bytes())),
+            Self::F32(v) => append(out, v, |x| x.to_le_bytes()),
+            Self::U32(v) => append(out, v, |x| x.to_le_bytes()),
+            Self::U16(v) => append(out, v, |x| x.to_le_bytes()),
             Self::U8(v) => out.extend_from_slice(v),
             Self::I8(v) => out.extend(v.iter().map(|x| x.to_le_bytes()[0])),
         }
+    }
+}
+
+/// Whole chunks, so that it is a copy: megabytes of a mesh go through here.
+fn append<T: Copy, const N: usize>(out: &mut Vec<u8>, values: &[T], bytes: impl Fn(T) -> [u8; N]) {
+    let start = out.len();
+    out.resize(start + N * values.len(), 0);
+    for (place, &value) in out[start..].as_chunks_mut::<N>().0.iter_mut().zip(values) {
+        *place = bytes(value);
     }
 }
 

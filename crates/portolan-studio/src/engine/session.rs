@@ -6,6 +6,7 @@ use super::clearance::Clearance;
 use super::fusion::Fusion;
 use super::protocol::{Message, Refusal, Reply, View, Wire, encode};
 use super::radiance::Radiance;
+use super::space::Space;
 use super::{Clock, Logs};
 
 /// What one session may take.
@@ -36,6 +37,7 @@ pub struct Session {
     fusion: Fusion,
     clearance: Clearance,
     radiance: Radiance,
+    space: Space,
 }
 
 impl Session {
@@ -46,6 +48,7 @@ impl Session {
             fusion: Fusion::new(logs, limits, clock),
             clearance: Clearance::new(limits, clock),
             radiance: Radiance::new(clock),
+            space: Space::new(logs, limits, clock),
         }
     }
 
@@ -63,6 +66,7 @@ impl Session {
             View::Fusion => self.fusion.ask(serde_json::from_str(ask)?),
             View::Clearance => self.clearance.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Radiance => self.radiance.ask(&serde_json::from_str(ask)?),
+            View::Space => self.space.ask(serde_json::from_str(ask)?),
         }?;
         let held = self.memory_bytes();
         if held > self.limits.memory {
@@ -79,7 +83,8 @@ impl Session {
 
     /// Bytes of all maps of this tab.
     pub fn memory_bytes(&self) -> usize {
-        self.fusion.memory_bytes() + self.clearance.memory_bytes() + self.radiance.memory_bytes()
+        let plane = self.fusion.memory_bytes() + self.clearance.memory_bytes();
+        plane + self.radiance.memory_bytes() + self.space.memory_bytes()
     }
 
     fn forget(&mut self, view: View) {
@@ -87,6 +92,7 @@ impl Session {
             View::Fusion => self.fusion.forget(),
             View::Clearance => self.clearance.forget(),
             View::Radiance => self.radiance.forget(),
+            View::Space => self.space.forget(),
         }
     }
 }

@@ -123,8 +123,7 @@ impl IncrementalMesh {
         let mut add = |part: &Part, piece: &Piece, i: usize| {
             // The same operations as where pieces are joined, so that vertices have the same bits.
             let place = |k: usize| {
-                let base =
-                    8.0 * (f64::from(piece.key.0[k]) - f64::from(first.0[k])) + placement.offset;
+                let base = 8.0 * (f64::from(piece.key.0[k]) - f64::from(first.0[k])) + placement.offset;
                 ((base + f64::from(part.vertices[i][k])) * scale) as f32
             };
             mesh.vertices.push([place(0), place(1), place(2)]);
@@ -218,7 +217,10 @@ mod tests {
             let [r, g, b] = mesh.colors.get(v).map_or([0; 3], |c| c.map(u32::from));
             let [x, y, z] = mesh.vertices[v].map(f32::to_bits);
             // Normals that come from triangles differ where the triangles of a brick are not all.
-            let n = mesh.normals.get(v).map_or(0, |n| n.map(f32::to_bits).iter().fold(0, |h: u32, b| h.rotate_left(7) ^ b));
+            let n = mesh
+                .normals
+                .get(v)
+                .map_or(0, |n| n.map(f32::to_bits).iter().fold(0, |h: u32, b| h.rotate_left(7) ^ b));
             [x, y, z, r << 16 | g << 8 | b, n, 0]
         };
         let mut all: Vec<_> = mesh.triangles.iter().map(|t| t.map(corner)).collect();

@@ -1,0 +1,260 @@
+// @ts-check
+import * as THREE from "../vendor/three.js";
+import { colors, rgb } from "../ui/theme.js";
+import { Cut } from "./cut.js";
+import { Surface } from "./surface.js";
+
+/** Radians that an arrow key turns the eye. */
+const TURN = Math.PI / 24;
+
+/** @param {string} name of style.css */
+const raw = (name) => rgb(colors()[name]).map((v) => v / 255);
+
+/**
+ * The scene: surface, slice, way of the sensor, its last points, the voxel that is looked at; and the eye that goes round it.
+ */
+export class Stage {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {import("../ui/meter.js").Meter} meter
+   * @throws where the browser has no WebGL
+   */
+  constructor(canvas, meter) {
+    this.canvas = canvas;
+    this.meter = meter;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    // Colours are what style.css says: nothing is converted on the way.
+    this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(45, 1, 0.05, 500);
+    this.surface = new Surface();
+    this.cut = new Cut();
+    this.way = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
+    this.points = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size: 2, sizeAttenuation: false }));
+    this.sensor = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size: 9, sizeAttenuation: false }));
+    this.voxel = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ depthTest: false, transparent: true }));
+    this.voxel.renderOrder = 3;
+    this.cut.quad.renderOrder = 1;
+    for (const o of [this.way, this.points, this.sensor, this.voxel]) {
+      o.frustumCulled = false;
+      o.visible = false;
+    }
+    this.scene.add(this.surface.mesh, this.cut.quad, this.cut.frame, this.way, this.points, this.sensor, this.voxel);
+    this.up = new THREE.Vector3(0, 0, 1);
+    /** @type {any} */
+    this.controls = undefined;
+    this.#orbit();
+    /** Nobody has turned the eye yet: it sees all that there is. */
+    this.fitted = true;
+    /** When the last pictures were drawn (milliseconds). @type {number[]} */
+    this.times = [];
+    this.waiting = false;
+    this.shown = false;
+    this.moved = () => {};
+    this.name = rendererName(this.renderer.getContext());
+    new ResizeObserver(() => this.#resize()).observe(/** @type {HTMLElement} */ (canvas.parentElement));
+    this.redraw();
+  }
+
+  #orbit() {
+    const target = this.controls?.target.clone() ?? new THREE.Vector3();
+    this.controls?.dispose();
+    this.camera.up.copy(this.up);
+    this.controls = new THREE.OrbitControls(this.camera, this.canvas);
+    this.controls.target.copy(target);
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("start", () => (this.fitted = false));
+    this.controls.addEventListener("change", () => (this.draw(), this.moved()));
+  }
+
+  /** @param {number[]} up */
+  setUp(up) {
+    if (this.up.x === up[0] && this.up.y === up[1] && this.up.z === up[2]) return;
+    this.up.set(up[0], up[1], up[2]);
+    this.#orbit();
+    this.surface.setUp(up);
+  }
+
+  #resize() {
+    const { clientWidth: w, clientHeight: h } = /** @type {HTMLElement} */ (this.canvas.parentElement);
+    if (w === 0 || h === 0) return;
+    this.renderer.setSize(w, h, false);
+    this.camera.aspect = w / h;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  /** Draws before the next picture of the screen; `work` of the page before it belongs to the same picture. */
+  draw() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame((now) => {
+      this.waiting = false;
+      this.meter.measure(() => this.renderer.render(this.scene, this.camera));
+      this.times.push(now);
+      if (this.times.length > 30) this.times.shift();
+      this.meter.note = this.rate();
+      this.meter.picture();
+    });
+  }
+
+  /** Pictures a second of those that followed each other, and who draws them. */
+  rate() {
+    const gaps = this.times.slice(1).map((t, i) => t - this.times[i]).filter((gap) => gap < 400).sort((a, b) => a - b);
+    const middle = gaps[gaps.length >> 1];
+    return `${middle ? `${(1000 / middle).toFixed(0)} pictures/s · ` : ""}${this.name}`;
+  }
+
+  /** Sees a box from obliquely above. @param {number[][]} box lower and upper corner */
+  fit(box) {
+    const [a, b] = box.map((p) => new THREE.Vector3(...p));
+    const middle = a.clone().add(b).multiplyScalar(0.5);
+    const radius = Math.max(0.5 * a.distanceTo(b), 0.1);
+    // Any two directions across `up`.
+    const side = new THREE.Vector3(1, 0, 0);
+    if (Math.abs(this.up.x) > 0.9) side.set(0, 1, 0);
+    side.addScaledVector(this.up, -side.dot(this.up)).normalize();
+    const ahead = side.clone().cross(this.up).normalize();
+    const from = side.multiplyScalar(0.35).add(ahead.multiplyScalar(0.72)).addScaledVector(this.up, 1.05).normalize();
+    const narrow = Math.min(1, this.camera.aspect);
+    const far = (0.86 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+    this.controls.target.copy(middle);
+    this.camera.position.copy(middle).addScaledVector(from, far);
+    this.#clip(radius + far);
+    this.controls.update();
+    this.draw();
+  }
+
+  /** @param {number} far */
+  #clip(far) {
+    this.camera.near = far / 2000;
+    this.camera.far = far * 20;
+    this.camera.updateProjectionMatrix();
+  }
+
+  /** Where the eye is and where it looks. @returns {number[]} */
+  eye() {
+    return [...this.camera.position.toArray(), ...this.controls.target.toArray()];
+  }
+
+  /** @param {number[]} eye */
+  setEye(eye) {
+    this.fitted = false;
+    this.camera.position.set(eye[0], eye[1], eye[2]);
+    this.controls.target.set(eye[3], eye[4], eye[5]);
+    this.#clip(2 * this.camera.position.distanceTo(this.controls.target));
+    this.controls.update();
+    this.draw();
+  }
+
+  /** Goes round by keys. @param {KeyboardEvent} event @returns {boolean} whether the key meant something */
+  key(event) {
+    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    const zoom = { "+": 0.85, "=": 0.85, "-": 1 / 0.85, _: 1 / 0.85 }[event.key];
+    if (!arrow && !zoom) return false;
+    this.fitted = false;
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const side = this.up.clone().cross(offset).normalize();
+    if (zoom) offset.multiplyScalar(zoom);
+    else if (arrow && event.shiftKey) {
+      const step = 0.06 * offset.length();
+      const over = offset.clone().cross(side).normalize();
+      const move = side.multiplyScalar(arrow[0] * step).addScaledVector(over, arrow[1] * step);
+      this.controls.target.add(move);
+    } else if (arrow) {
+      offset.applyAxisAngle(this.up, arrow[0] * TURN);
+      const turned = offset.clone().applyAxisAngle(this.up.clone().cross(offset).normalize(), -arrow[1] * TURN);
+      const high = turned.angleTo(this.up);
+      if (high > 0.05 && high < Math.PI - 0.05) offset.copy(turned);
+    }
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.draw();
+    this.moved();
+    return true;
+  }
+
+  /**
+   * The ray from the eye through a place of the canvas, -1 to 1 to the right and up.
+   * @param {number} x @param {number} y
+   */
+  ray(x, y) {
+    this.camera.updateMatrixWorld();
+    const through = new THREE.Vector3(x, y, 0.5).unproject(this.camera);
+    return { origin: this.camera.position.toArray(), direction: through.sub(this.camera.position).normalize().toArray() };
+  }
+
+  /** @param {number[][]} places */
+  showWay(places) {
+    line(this.way, places.flat());
+  }
+
+  /** @param {Float32Array} points @param {number[] | null} sensor */
+  showScan(points, sensor) {
+    line(this.points, points);
+    line(this.sensor, sensor ?? []);
+  }
+
+  /** The edges of a voxel; none: of none. @param {number[] | null} corner @param {number} edge */
+  showVoxel(corner, edge) {
+    /** @type {number[]} */
+    const ends = [];
+    for (let axis = 0; corner && axis < 3; axis++)
+      for (let k = 0; k < 4; k++) {
+        const p = [0, 0, 0];
+        p[(axis + 1) % 3] = k & 1;
+        p[(axis + 2) % 3] = k >> 1;
+        const q = [...p];
+        q[axis] = 1;
+        ends.push(...p.map((v, i) => corner[i] + v * edge), ...q.map((v, i) => corner[i] + v * edge));
+      }
+    line(this.voxel, ends);
+    this.draw();
+  }
+
+  /** With the colours of the theme. */
+  redraw() {
+    const set = (/** @type {any} */ o, /** @type {string} */ name) => o.material.color.setRGB(...raw(name));
+    set(this.way, "truth");
+    set(this.points, "beam");
+    set(this.sensor, "robot");
+    set(this.voxel, "chair");
+    const [r, g, b] = raw("paper");
+    this.renderer.setClearColor(new THREE.Color().setRGB(r, g, b), 1);
+    this.surface.redraw();
+    this.cut.redraw();
+    this.draw();
+  }
+
+  /** What is seen, as a picture of its own. */
+  picture() {
+    this.renderer.render(this.scene, this.camera);
+    const out = document.createElement("canvas");
+    out.width = this.canvas.width;
+    out.height = this.canvas.height;
+    // In the same task as it was drawn: afterwards the browser may clear it.
+    out.getContext("2d")?.drawImage(this.canvas, 0, 0);
+    return out;
+  }
+}
+
+/** @param {any} object @param {ArrayLike<number>} values x, y, z of each place */
+function line(object, values) {
+  object.visible = values.length > 0;
+  const held = object.geometry.getAttribute("position");
+  if (held && held.count * 3 >= values.length) {
+    held.array.set(values);
+    held.needsUpdate = true;
+  } else {
+    object.geometry.dispose();
+    object.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(values), 3));
+  }
+  object.geometry.setDrawRange(0, values.length / 3);
+}
+
+/** @param {any} gl */
+function rendererName(gl) {
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  return String(info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
+}

@@ -1,0 +1,134 @@
+//! A layer of cells of a field, as an image.
+
+use portolan::field::SparseEsdf;
+use portolan::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
+use portolan::map::{SparseOccupancy, SparseTsdf};
+use portolan::store::Store;
+
+use super::ask::{Field, Slice};
+use crate::engine::Refusal;
+
+/// Cells along a side of the image; of larger layers every so many cells are shown.
+const LONGEST: usize = 1536;
+
+/// The cells of all bricks: the first, and the one behind the last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Extent {
+    pub(super) first: [i32; 3],
+    pub(super) end: [i32; 3],
+}
+
+impl Extent {
+    /// `None` where nothing was observed. O(bricks).
+    pub(super) fn of(tsdf: &SparseTsdf) -> Option<Self> {
+        let keys = || tsdf.store().bricks_by_age().map(|(key, _)| key);
+        let side = |k: usize| Some((keys().map(|key| key.0[k]).min()?, keys().map(|key| key.0[k]).max()?));
+        let [x, y, z] = [side(0)?, side(1)?, side(2)?];
+        Some(Self {
+            first: BlockKey([x.0, y.0, z.0]).first_cell(),
+            end: BlockKey([x.1, y.1, z.1]).first_cell().map(|c| c + BLOCK_EDGE as i32),
+        })
+    }
+
+    /// In the world (metres).
+    pub(super) fn aabb(&self, lattice: &Lattice<3>) -> Aabb<3> {
+        lattice.aabb(self.first, self.end)
+    }
+}
+
+/// The values of a layer.
+pub(super) struct Layer {
+    /// The layer's index along its axis.
+    pub(super) cell: i32,
+    /// Its middle on the axis (world, metres).
+    pub(super) at: f64,
+    /// Values to the right, and up.
+    pub(super) shape: [usize; 2],
+    /// Cells from one value to the next.
+    pub(super) step: usize,
+    /// The lower corner of the first cell (world, metres).
+    pub(super) corner: [f64; 3],
+    /// First to the right, then up; NaN where nothing is known.
+    pub(super) values: Vec<f32>,
+}
+
+/// The axes of an image across an axis.
+pub(super) const AXES: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
+/// The layer's index; the place is kept within the map.
+pub(super) fn layer_index(
+    slice: &Slice,
+    at_world: f64,
+    extent: &Extent,
+    lattice: &Lattice<3>,
+) -> Result<i32, Refusal> {
+    if slice.axis > 2 {
+        return Err(Refusal::new(format!("axes are 0, 1 and 2; there is no axis {}", slice.axis)));
+    }
+    if !at_world.is_finite() {
+        return Err(Refusal::new("a slice must lie at a finite place"));
+    }
+    let k = slice.axis;
+    let cells = ((at_world - lattice.origin[k]) / lattice.resolution).floor();
+    Ok(cells.clamp(f64::from(extent.first[k]), f64::from(extent.end[k] - 1)) as i32)
+}
+
+/// What a field says of a cell; NaN: nothing.
+pub(super) fn value_of<'a>(
+    field: Field,
+    tsdf: &'a SparseTsdf,
+    occupancy: Option<&'a SparseOccupancy>,
+    esdf: Option<&'a SparseEsdf<3>>,
+) -> impl Fn([i32; 3]) -> f32 + 'a {
+    move |cell| {
+        let value = match field {
+            Field::Tsdf => tsdf.store().cell(cell).map(|c| c.distance),
+            Field::Esdf => esdf.and_then(|esdf| esdf.cell(cell).known_or_saturated()),
+            Field::Occupancy => occupancy
+                .and_then(|map| map.probability(map.store().lattice().center(cell)).known())
+                .map(|p| p as f32),
+        };
+        value.unwrap_or(f32::NAN)
+    }
+}
+
+/// What is said with a number, be it as far as is maintained.
+pub(super) trait KnownOrSaturated<T> {
+    fn known_or_saturated(self) -> Option<T>;
+}
+
+impl<T> KnownOrSaturated<T> for portolan::Answer<T> {
+    fn known_or_saturated(self) -> Option<T> {
+        match self {
+            Self::Known(v) | Self::Saturated(v) => Some(v),
+            Self::Unknown | Self::Outside => None,
+        }
+    }
+}
+
+/// Cuts.
+pub(super) fn layer(
+    axis: usize,
+    cell: i32,
+    extent: &Extent,
+    lattice: &Lattice<3>,
+    value: impl Fn([i32; 3]) -> f32,
+) -> Layer {
+    let axes = AXES[axis];
+    let cells = axes.map(|k| (extent.end[k] - extent.first[k]) as usize);
+    let step = cells.map(|n| n.div_ceil(LONGEST)).into_iter().max().unwrap_or(1).max(1);
+    let shape = cells.map(|n| n.div_ceil(step));
+    let mut values = Vec::with_capacity(shape[0] * shape[1]);
+    let mut at = extent.first;
+    at[axis] = cell;
+    for v in 0..shape[1] {
+        at[axes[1]] = extent.first[axes[1]] + (v * step) as i32;
+        for u in 0..shape[0] {
+            at[axes[0]] = extent.first[axes[0]] + (u * step) as i32;
+            values.push(value(at));
+        }
+    }
+    let mut first = extent.first;
+    first[axis] = cell;
+    Layer { cell, at: lattice.center(first)[axis], shape, step, corner: lattice.corner(first), values }
+}
