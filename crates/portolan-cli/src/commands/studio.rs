@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
+use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan_io::{AnyMapFile, FileKind, detect};
 use portolan_studio::engine::{Limits, Logs, PlaneLog, SpaceSource, check};
 use portolan_studio::server::{Server, Settings};
 use serde_json::json;
@@ -19,12 +21,17 @@ use crate::output::Output;
 #[derive(clap::Args)]
 #[command(
     after_help = "Open the address that it prints in a browser. Every tab has maps of its own; closing it frees them. \
-                  Ctrl-C stops the studio.\n\nExamples:\n  portolan studio\n  portolan studio \
-                  intel-corrected.log.gz --every 2"
+                  Ctrl-C stops the studio.
+
+Examples:
+  portolan studio
+  portolan studio \
+                  intel-corrected.log.gz --every 2
+  portolan studio out/kitchen"
 )]
 pub(crate) struct Args {
-    /// Log of range scans with poses, planar or of space; its kind is recognised. Without one, and in the views that
-    /// it is not for, simulated scans are shown
+    /// Log of range scans with poses, planar or of space, or a map of space that `map` has written; its kind is
+    /// recognised. Without one, and in the views that it is not for, simulated scans are shown
     log: Option<PathBuf>,
     /// Port to listen at; 0: any that is free
     #[arg(long, value_name = "PORT", default_value = "7700")]
@@ -75,7 +82,39 @@ impl Args {
             self.check_no_log()?;
             return Ok(Logs::default());
         };
+        if self.source.format.is_none()
+            && matches!(detect(path)?, FileKind::Portolan | FileKind::PortolanFolder)
+        {
+            return self.map(path);
+        }
         if self.source.is_space(path)? { self.space(path) } else { self.plane(path) }
+    }
+
+    /// A map of space that was made before.
+    fn map(&self, path: &Path) -> anyhow::Result<Logs> {
+        if self.every.is_some() || self.limits.is_given() {
+            return Err(bad_call("--every, --min-range and the like are about a log; this is a map"));
+        }
+        let shown = path.display();
+        let file = if path.is_dir() { path.join("map.portolan") } else { path.into() };
+        let AnyMapFile::Space(file) = AnyMapFile::read_within(file, self.memory)? else {
+            bail!(
+                "{shown}: a map of the plane; give the log that it was made of, and the studio makes it again"
+            );
+        };
+        let Some(held) = file.tsdf else {
+            bail!("{shown}: the map holds no distances, and so no surface; make it with --maps tsdf");
+        };
+        let config = SparseTsdfConfig {
+            truncation: held.truncation,
+            w_max: held.w_max,
+            carve_weight: held.carve_weight,
+            weights: held.weights,
+            ..SparseTsdfConfig::default()
+        };
+        let tsdf = SparseTsdf::from_stores(held.store, file.colors.map(|c| c.store), config)?;
+        let space = SpaceSource::Map { name: name(path), tsdf: Box::new(tsdf) };
+        Ok(Logs { space, ..Logs::default() })
     }
 
     fn plane(&self, path: &Path) -> anyhow::Result<Logs> {

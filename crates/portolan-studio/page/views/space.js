@@ -289,14 +289,16 @@ export default {
       legendRamp.style.display = ramp ? "inline-block" : "none";
       if (!ramp) return;
       legendRamp.style.background = gradient(stops(by));
-      const words = (/** @type {number | null} */ v) => (v === null ? "" : by === "error" ? `${v > 0 ? "+" : "−"}${cm(Math.abs(v))}` : `${v.toFixed(by === "height" ? 2 : 0)}${ramp.unit && ` ${ramp.unit}`}`);
+      const words = (/** @type {number | null} */ v) => (v === null ? "" : by === "error" ? `${v > 0 ? "+" : "−"}${cm(Math.abs(v))}` : `${by === "height" ? (v + all.height).toFixed(2) : v.toFixed(0)}${ramp.unit && ` ${ramp.unit}`}`);
       low.textContent = words(ramp.low);
       high.textContent = words(ramp.high);
     }
 
     // --- the slice -----------------------------------------------------------------------------------------------
     const sliceNow = () => (slice.field === "none" || slice.at === null ? null : { field: slice.field, axis: slice.axis, at: slice.at });
-    const cutWords = () => (cut && slice.field !== "none" ? `${"xyz"[slice.axis]} = ${cut.body.world.toFixed(3)} m` : "");
+    function cutWords() {
+      return cut && slice.field !== "none" ? `${"xyz"[slice.axis]} = ${cut.body.world.toFixed(3)} m` : "";
+    }
 
     /** @param {Partial<typeof slice>} change */
     function cutThrough(change) {

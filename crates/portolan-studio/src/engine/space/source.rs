@@ -159,10 +159,12 @@ impl Source {
 
 impl Walk {
     fn new(kind: Sensor) -> Self {
+        // Downwards further than most lidars look, so that floors are whole; what escapes through the windows is not followed
+        // far, since it is not what one wants to see.
+        let lidar =
+            SpaceLidar { columns: 720, elevation: [-0.95, 0.4], max_range: 9.0, ..SpaceLidar::default() };
         let (scans, sensor) = match kind {
-            Sensor::Lidar => {
-                (LIDAR_SCANS, SpaceSensor::Lidar(SpaceLidar { columns: 720, ..SpaceLidar::default() }))
-            }
+            Sensor::Lidar => (LIDAR_SCANS, SpaceSensor::Lidar(lidar)),
             Sensor::Camera => {
                 (CAMERA_FRAMES, SpaceSensor::Camera(DepthCamera::default().scaled(CAMERA_SHARE)))
             }

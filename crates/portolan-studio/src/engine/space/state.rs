@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use portolan::field::SparseEsdf;
 use portolan::geom::BLOCK_EDGE;
-use portolan::geom::vector::{add, sub};
+use portolan::geom::vector::{add, dot, sub};
 use portolan::map::SparseOccupancy;
 use serde_json::{Value, json};
 
@@ -246,6 +246,7 @@ impl Space {
                 "truncation": tsdf.rule().truncation,
                 "origin": made.origin,
                 "up": self.source.up(),
+                "height": dot(made.origin, self.source.up()),
                 "way": self.source.way().into_iter().map(local).collect::<Vec<_>>(),
                 "colors": colors,
                 "occupancy": made.occupancy.is_some(),
