@@ -5,6 +5,7 @@ import { applyTheme, nextTheme } from "./ui/theme.js";
 import { save } from "./ui/files.js";
 import clearance from "./views/clearance.js";
 import fusion from "./views/fusion.js";
+import gallery from "./views/gallery.js";
 import radiance from "./views/radiance.js";
 
 /**
@@ -35,7 +36,7 @@ import radiance from "./views/radiance.js";
  */
 
 /** @type {View[]} */
-const VIEWS = [fusion, clearance, radiance];
+const VIEWS = [fusion, gallery, clearance, radiance];
 
 const $ = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const status = $("status");
