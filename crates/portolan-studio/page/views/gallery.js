@@ -1,9 +1,10 @@
 // @ts-check
 import { Picture } from "../gallery/layers.js";
-import { bytesOf, length, time, timeOf, whole } from "../gallery/format.js";
+import { bytesOf, time, timeOf, whole } from "../gallery/format.js";
 import { panels } from "../gallery/panels.js";
 import { cloudPanel, costTable, errorTable, fieldTable, treePanel } from "../gallery/tables.js";
-import { choice, el, facts, group, legend } from "../ui/controls.js";
+import { answersOf, decades, legendOf, ofFusion, verdict } from "../gallery/words.js";
+import { choice, el, facts, group } from "../ui/controls.js";
 import { compose } from "../ui/picture.js";
 
 /** What can be asked of a map: name in the engine, on the button, in a sentence. @type {[string, string, string][]} */
@@ -30,6 +31,8 @@ export default {
     let busy = false;
     /** Whether the middle of the picture is asked about. */
     let middle = false;
+    /** The theme that the pictures have the colours of. */
+    let theme = document.documentElement.dataset.theme;
 
     const six = panels(app.meter, { oncamera: () => (app.changed(), middle && pointAtMiddle()), onhover: (p) => !middle && point(p) });
     const probes = choice({ id: "gallery-probes", label: "Points to ask at", value: "100000", options: PROBES.map((n) => [n, whole(Number(n))]), onchange: () => app.changed() });
@@ -82,12 +85,7 @@ export default {
         "gallery-truncation": `${settings.truncation.toFixed(2)} m`, "gallery-clamp": settings.w_max === null ? "none" : String(settings.w_max),
         "gallery-fused": `${settings.sweep}, ${settings.weights}`, "gallery-seconds": time(body.seconds),
       });
-      moved.textContent = [
-        "The scans and settings are those of Fusion: change them there.",
-        settings.carve ? "" : "Here the TSDF carves free space, though Fusion does not now.",
-        of.moved ? "The chair was moved: the truth is as it is now." : "",
-        body.picture.every > 1 ? `The cloud is drawn with every ${body.picture.every}th point.` : "",
-      ].filter(Boolean).join(" ");
+      moved.textContent = ofFusion(body);
       const truth = body.picture.truth !== null;
       theLegend.replaceChildren(legendOf(truth));
       errorNote.textContent = truth
@@ -120,12 +118,7 @@ export default {
       const winner = ran === undefined ? undefined : costs.winners.find((/** @type {any} */ w) => w.workload === ran);
       six.frames(winner, costs.rows);
       WORKLOADS.forEach(([name], i) => buttons[i].setAttribute("aria-pressed", String(name === ran)));
-      if (!winner) return (result.textContent = "");
-      const names = winner.level.map((/** @type {number} */ i) => costs.rows[i].name);
-      const spent = costs.rows[winner.row][winner.workload].seconds;
-      const level = names.length > 1 ? ` Level with it (within 1.3 times): ${names.slice(1).join("; ")}.` : "";
-      const ahead = winner.ahead === null ? "" : ` The next takes ${winner.ahead.toFixed(1)} times as long.`;
-      result.textContent = spent === 0 ? `${names[0]}: it is the answer already.` : `${names[0]} answers fastest, in ${time(spent)}.${level}${ahead}`;
+      result.textContent = winner ? verdict(winner, costs.rows) : "";
     }
 
     /** Asks the engine while the buttons rest. @param {string} what @param {object} question */
@@ -208,8 +201,17 @@ export default {
       point(six.plane.camera().toWorld(w / 2, h / 2));
     };
 
+    function recolor() {
+      theme = document.documentElement.dataset.theme;
+      picture?.recolor();
+      tree.curve.redraw();
+      cloud.curve.redraw();
+      six.draw();
+    }
+
     return {
       async show(state) {
+        if (theme !== document.documentElement.dataset.theme) recolor();
         if (PROBES.includes(state.get("probes") ?? "")) probes.value = state.get("probes") ?? "";
         await open();
         const workload = WORKLOADS.find(([name]) => name === state.get("run"))?.[0];
@@ -235,44 +237,7 @@ export default {
         return six.plane.key(event);
       },
       keys: [["O D S", "run occupancy, distance, surface"], ["X", "ask at the middle of the picture, and stop"], ["Arrows", "move all pictures"], ["+ − 0", "larger, smaller, all"]],
-      redraw() {
-        picture?.recolor();
-        tree.curve.redraw();
-        cloud.curve.redraw();
-        six.draw();
-      },
+      redraw: recolor,
     };
   },
 };
-
-/** Powers of ten around all values. @param {number[]} values @param {[number, number]} otherwise @returns {[number, number]} */
-function decades(values, otherwise) {
-  if (values.length === 0) return otherwise;
-  const logs = values.map(Math.log10);
-  const low = Math.floor(Math.min(...logs) - 0.05);
-  return [low, Math.max(low + 1, Math.ceil(Math.max(...logs)))];
-}
-
-/** What each representation answers, in words. @param {any} a @returns {Record<string, string>} */
-function answersOf(a) {
-  const chance = (/** @type {number | null} */ p) => (p === null ? "never observed" : `occupied ${(100 * p).toFixed(1)} %`);
-  const far = (/** @type {number | null} */ d) => (d === null ? "not known" : length(d));
-  return {
-    grid: `${chance(a.grid.occupied)}; ring search ${far(a.grid.searched)}`,
-    tree: chance(a.tree.occupied),
-    tsdf: a.tsdf.weight === null ? "never observed" : `D ${far(a.tsdf.distance)}, W ${a.tsdf.weight.toFixed(1)}`,
-    esdf: `d ${a.esdf.distance === null ? a.esdf.status : far(a.esdf.distance)}${a.truth === null ? "" : `; true ${far(a.truth)}`}`,
-    contour: `${a.contour.inside === null ? "" : a.contour.inside ? "inside, " : "outside, "}${far(a.contour.distance)} away`,
-    cloud: `nearest point ${far(a.cloud.distance)}`,
-  };
-}
-
-/** @param {boolean} truth */
-function legendOf(truth) {
-  return legend([
-    { color: "", text: "free … occupied", ramp: "linear-gradient(90deg, var(--paper), var(--ink))" }, { color: "unknown", text: "never observed" },
-    { color: "", text: "distance below … above zero", ramp: "linear-gradient(90deg, var(--negative), transparent, var(--positive))" },
-    { color: "positive", text: "borders of leaves" }, { color: "contour", text: "contour" }, { color: "beam", text: "end points" },
-    ...(truth ? [{ color: "truth", text: "truth", dashed: true }] : []),
-  ]);
-}
