@@ -170,7 +170,7 @@ export default {
       if (!answer) return;
       const { every, sizes } = answer.body;
       tree.sizes(sizes);
-      treesNote.textContent = `Lines: the formula; dots: trees fused just now${every > 1 ? ` of every ${every}th scan` : ""}. Orange: the chapter's 20 bytes a node; blue: ours, 9 an inner one. Below the dashed 1 a tree is the smaller one. A tree is refined along the border of what was never seen, too, which the formula leaves out.`;
+      treesNote.textContent = `Lines: the formula; dots: trees fused just now${every > 1 ? ` of one scan in ${every}` : ""}. Orange: the chapter's 20 bytes a node; blue: ours, 9 an inner one. Below the dashed 1 a tree is the smaller one. A tree is refined along the border of what was never seen, too, which the formula leaves out.`;
       app.say("");
     }
 

@@ -27,7 +27,7 @@ const LEAVES: [f64; 6] = [0.10, 0.075, 0.05, 0.0375, 0.025, 0.0175];
 /// Bytes that a tree may take for a cell of the dense array that it is held against.
 const BYTES_PER_LEAF_CELL: f64 = 16.0;
 /// Scans that these trees are fused of, at most; of a longer log every n-th.
-const MOST_SCANS: usize = 400;
+const MOST_SCANS: usize = 1000;
 
 /// The view of all representations.
 pub(in crate::engine) struct Gallery {
