@@ -5,6 +5,7 @@ import { applyTheme, nextTheme } from "./ui/theme.js";
 import { save } from "./ui/files.js";
 import clearance from "./views/clearance.js";
 import fusion from "./views/fusion.js";
+import gallery from "./views/gallery.js";
 import radiance from "./views/radiance.js";
 import space from "./views/space.js";
 
@@ -36,7 +37,7 @@ import space from "./views/space.js";
  */
 
 /** @type {View[]} */
-const VIEWS = [fusion, clearance, radiance, space];
+const VIEWS = [fusion, gallery, clearance, radiance, space];
 
 const $ = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const status = $("status");

@@ -34,6 +34,8 @@ export class Plane {
     /** Pointers that are down. @type {Map<number, [number, number]>} */
     this.pointers = new Map();
     this.asked = false;
+    /** Whether a length is drawn at the lower left. */
+    this.bar = true;
     /** A click that was no drag: world x, y. @type {((p: [number, number], event: PointerEvent) => void) | undefined} */
     this.onclick = undefined;
     /** The pointer moves over the canvas: world x, y; `undefined`: it has left. @type {((p: [number, number] | undefined) => void) | undefined} */
@@ -106,7 +108,7 @@ export class Plane {
       layer(g, camera);
       g.restore();
     }
-    scaleBar(g, camera, canvas.clientHeight);
+    if (this.bar) scaleBar(g, camera, canvas.clientHeight);
   }
 
   /** Zooms about a point of the canvas. @param {number} factor @param {number} px @param {number} py */

@@ -4,6 +4,7 @@ mod clearance;
 mod clock;
 mod exports;
 mod fusion;
+mod gallery;
 mod logs;
 mod protocol;
 mod radiance;

@@ -33,6 +33,7 @@ pub(super) struct Message {
 #[serde(rename_all = "lowercase")]
 pub(super) enum View {
     Fusion,
+    Gallery,
     Clearance,
     Radiance,
     Space,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::clearance::Clearance;
 use super::fusion::Fusion;
+use super::gallery::Gallery;
 use super::protocol::{Message, Refusal, Reply, View, Wire, encode};
 use super::radiance::Radiance;
 use super::space::Space;
@@ -35,6 +36,7 @@ pub fn check(logs: &Arc<Logs>, limits: Limits) -> Result<(), Refusal> {
 pub struct Session {
     limits: Limits,
     fusion: Fusion,
+    gallery: Gallery,
     clearance: Clearance,
     radiance: Radiance,
     space: Space,
@@ -46,6 +48,7 @@ impl Session {
         Self {
             limits,
             fusion: Fusion::new(logs, limits, clock),
+            gallery: Gallery::new(limits, clock),
             clearance: Clearance::new(limits, clock),
             radiance: Radiance::new(clock),
             space: Space::new(logs, limits, clock),
@@ -64,6 +67,7 @@ impl Session {
         let ask = message.ask.get();
         let reply = match message.view {
             View::Fusion => self.fusion.ask(serde_json::from_str(ask)?),
+            View::Gallery => self.gallery.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Clearance => self.clearance.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Radiance => self.radiance.ask(&serde_json::from_str(ask)?),
             View::Space => self.space.ask(serde_json::from_str(ask)?),
@@ -83,13 +87,17 @@ impl Session {
 
     /// Bytes of all maps of this tab.
     pub fn memory_bytes(&self) -> usize {
-        let plane = self.fusion.memory_bytes() + self.clearance.memory_bytes();
-        plane + self.radiance.memory_bytes() + self.space.memory_bytes()
+        self.fusion.memory_bytes()
+            + self.gallery.memory_bytes()
+            + self.clearance.memory_bytes()
+            + self.radiance.memory_bytes()
+            + self.space.memory_bytes()
     }
 
     fn forget(&mut self, view: View) {
         match view {
             View::Fusion => self.fusion.forget(),
+            View::Gallery => self.gallery.forget(),
             View::Clearance => self.clearance.forget(),
             View::Radiance => self.radiance.forget(),
             View::Space => self.space.forget(),

@@ -5,6 +5,7 @@
 
 mod chromium;
 mod every_view;
+mod gallery;
 mod keys;
 mod page;
 

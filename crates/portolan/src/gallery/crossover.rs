@@ -1,7 +1,15 @@
 //! Where one representation overtakes another.
 
 use super::probes::{Clock, seconds_per_probe};
-use crate::map::{Cloud, crossover_resolution, memory_ratio};
+use crate::cell::OccupancyModel;
+use crate::geom::{Aabb, Grid, Pose};
+use crate::map::{Cloud, MapError, Quadtree, crossover_resolution, inner_only_node_bytes, memory_ratio};
+use crate::scan::Scan;
+
+/// What the chapter's tree stores a node.
+pub(super) const CHAPTER_NODE: &str = "chapter's node, 20 B";
+/// What ours does.
+pub(super) const OUR_NODE: &str = "our node, 9 B an inner one";
 
 /// The memory of a tree against a dense byte array: the formula beside the measurement.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +45,40 @@ impl TreeCrossover {
             measured_ratio: tree_bytes as f64 / dense_bytes as f64,
         }
     }
+}
+
+/// Fuses a log into a tree of leaves of each of these sizes (metres) over a box that holds `surface` metres of surface:
+/// what the chapter's node and ours take of a dense array over the same cells, by the formula and measured.
+///
+/// # Errors
+/// Where a size or the model is not possible.
+pub fn tree_crossovers_at(
+    log: &[(Pose<2>, Scan<2>)],
+    model: OccupancyModel,
+    bounds: &Aabb<2>,
+    surface: f64,
+    resolutions: &[f64],
+) -> Result<Vec<[TreeCrossover; 2]>, MapError> {
+    let extent = bounds.extent();
+    let of = |&resolution: &f64| {
+        // The small number keeps a rounded-up quotient from making one more column.
+        let shape = extent.map(|metres| (metres / resolution - 1e-9).ceil().max(1.0) as usize);
+        let grid = Grid::new(bounds.min, resolution, shape);
+        let mut tree = Quadtree::covering(&grid, model)?;
+        for (pose, scan) in log {
+            tree.integrate(pose, scan);
+        }
+        let bytes = crate::map::MapRepr::memory_bytes(&tree);
+        let plane = (surface, extent[0] * extent[1]);
+        let against = |name, node_bytes, bytes| {
+            TreeCrossover::new(name, (node_bytes, resolution), plane, (bytes, grid.len()))
+        };
+        Ok([
+            against(CHAPTER_NODE, 20.0, 20 * tree.tree().nodes()),
+            against(OUR_NODE, inner_only_node_bytes::<2>(9.0), bytes),
+        ])
+    };
+    resolutions.iter().map(of).collect()
 }
 
 /// How many points a cloud may have before its distance query is slower than the ESDF's.

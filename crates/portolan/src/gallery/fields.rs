@@ -5,7 +5,6 @@ use super::probes::{Clock, seconds_of};
 use crate::field::{Esdf2, EsdfMethod, EsdfSettings, SparseEsdfSettings};
 use crate::geom::vector;
 use crate::map::Tsdf2;
-use crate::surface::Contour;
 
 /// A distance field of the TSDF, and how far to trust it.
 #[derive(Debug)]
@@ -53,11 +52,15 @@ pub(super) fn fields_of(clock: &mut Clock<'_>, tsdf: &Tsdf2, settings: &EsdfSett
     })
 }
 
-/// Error at these points against the exact distance to the contour, where that is more than 5 cm.
-pub(super) fn against_contour(field: &Esdf2, contour: &Contour, probes: &[[f64; 2]]) -> Option<ErrorSummary> {
-    let error = |&p: &[f64; 2]| {
-        let exact = contour.nearest_distance(p).filter(|d| *d > 0.05)?;
+/// Error at these points against their exact distances to the contour, where those are more than 5 cm.
+pub(super) fn against_contour(
+    field: &Esdf2,
+    probes: &[[f64; 2]],
+    exact: &[Option<f64>],
+) -> Option<ErrorSummary> {
+    let error = |(&p, exact): (&[f64; 2], &Option<f64>)| {
+        let exact = exact.filter(|d| *d > 0.05)?;
         Some(field.distance(p).known()?.abs() - exact)
     };
-    ErrorSummary::of(probes.iter().filter_map(error).collect())
+    ErrorSummary::of(probes.iter().zip(exact).filter_map(error).collect())
 }

@@ -3,6 +3,8 @@
 //! The library reads no clock: the caller passes one. Accuracy needs a [`Truth`], which the simulator has.
 
 mod accuracy;
+mod asker;
+mod costs;
 mod crossover;
 mod fields;
 mod probes;
@@ -11,7 +13,7 @@ mod run;
 mod table;
 
 pub use accuracy::{ErrorSummary, Truth};
-pub use crossover::{CloudCrossover, TreeCrossover};
+pub use crossover::{CloudCrossover, TreeCrossover, tree_crossovers_at};
 pub use fields::MeasuredField;
 pub use probes::Clock;
 pub use row::{Cost, LEVEL, Row, Winner, Workload};

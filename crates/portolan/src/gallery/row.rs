@@ -81,6 +81,14 @@ impl Workload {
             Self::Surface => row.surface,
         }
     }
+
+    pub(super) fn cost_mut(self, row: &mut Row) -> &mut Option<Cost> {
+        match self {
+            Self::Occupancy => &mut row.occupancy,
+            Self::Distance => &mut row.distance,
+            Self::Surface => &mut row.surface,
+        }
+    }
 }
 
 /// Costs within this factor of the best are called level: they change places between runs.

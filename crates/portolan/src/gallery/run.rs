@@ -1,19 +1,22 @@
 //! Builds every representation from one log and measures it.
 
-use super::accuracy::{ErrorSummary, Truth};
-use super::crossover::{CloudCrossover, TreeCrossover, cloud_crossover};
+use super::accuracy::Truth;
+use super::asker::{Asker, gradient, median, observed_free};
+use super::costs::{contour_of_grid, contour_of_tree, zero_of};
+use super::crossover::{CHAPTER_NODE, CloudCrossover, OUR_NODE, TreeCrossover};
 use super::fields::{MeasuredField, against_contour, fields_of};
-use super::probes::{Clock, points, seconds_of, seconds_per_probe};
-use super::row::{Cost, Row, Winner, winners};
+use super::probes::{Clock, points, seconds_of};
+use super::row::{Cost, Row, Winner, Workload};
 use crate::cell::OccupancyModel;
 use crate::field::{Esdf2, EsdfSettings};
-use crate::geom::{Aabb, Grid, Pose, vector};
+use crate::geom::{Grid, Pose, vector};
 use crate::map::{
-    Cloud, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config, inner_only_node_bytes,
+    Cloud, DerivedField, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config,
+    inner_only_node_bytes,
 };
 use crate::scan::{Scan, ScanStats};
 use crate::store::Store;
-use crate::surface::{Ambiguity, Contour, ContourSettings, level_set, marching_squares};
+use crate::surface::{Contour, ContourSettings, marching_squares};
 
 /// What to build and how hard to ask.
 #[derive(Clone, Debug)]
@@ -62,12 +65,23 @@ pub struct Gallery {
     pub contour: Contour,
     /// The cloud, for pictures.
     pub cloud: Cloud<2>,
+    /// The tree with the chapter's leaves.
+    pub(super) chapter_tree: Quadtree,
+    /// The TSDF by the chapter's march.
+    pub(super) marched: Tsdf2,
+    pub(super) contour_settings: ContourSettings,
 }
 
 impl Gallery {
     /// The accurate distance field.
     pub fn distance(&self) -> &Esdf2 {
         &self.fields[0].field
+    }
+
+    /// Bytes of everything that was built.
+    pub fn memory_bytes(&self) -> usize {
+        let others = self.fields[1..].iter().map(|f| DerivedField::memory_bytes(&f.field));
+        self.rows.iter().map(|row| row.memory_bytes).sum::<usize>() + others.sum::<usize>()
     }
 }
 
@@ -79,6 +93,23 @@ pub fn run(
     log: &[(Pose<2>, Scan<2>)],
     settings: &GallerySettings,
     truth: Option<&dyn Truth<2>>,
+    clock: &mut Clock<'_>,
+) -> Result<Gallery, MapError> {
+    let grid = settings.grid;
+    let mut gallery = build(log, settings, clock)?;
+    let everywhere = points(&grid.aabb(), settings.probes);
+    let free = observed_free(&gallery.tsdf, settings.esdf.min_weight, truth);
+    hold_against_truth(&mut gallery, &Asker { truth, free, everywhere: &everywhere, grid });
+    for workload in Workload::ALL {
+        gallery.measure(workload, settings.probes, clock);
+    }
+    Ok(gallery)
+}
+
+/// Fuses and derives everything. What updates cost is known then, and all that needs no probes.
+fn build(
+    log: &[(Pose<2>, Scan<2>)],
+    settings: &GallerySettings,
     clock: &mut Clock<'_>,
 ) -> Result<Gallery, MapError> {
     let grid = settings.grid;
@@ -100,168 +131,136 @@ pub fn run(
     let mut cloud = Cloud::new();
     let cloud_update = fuse_all(clock, log, |at, scan| cloud.integrate(at, scan));
     let (cloud_build, ()) = seconds_of(clock, || cloud.rebuild());
-    let min_weight = settings.esdf.min_weight;
-    let mut fields = fields_of(clock, &tsdf, &settings.esdf);
+    let fields = fields_of(clock, &tsdf, &settings.esdf);
     let (contour_build, contour) = seconds_of(clock, || marching_squares(&tsdf, &settings.contour));
 
-    let everywhere = points(&grid.aabb(), settings.probes);
-    let few = &everywhere[..everywhere.len().div_ceil(50)];
-    let asker = Asker { truth, free: observed_free(&tsdf, min_weight, truth), everywhere: &everywhere, grid };
-
-    let limit = vector::norm(grid.aabb().extent());
-    let mut rows = Vec::new();
-    let (grid_surface, grid_contour) =
-        seconds_of(clock, || occupancy_contour(&grid, |c| occupancy_value(&occupancy, c)));
-    rows.push(Row {
-        name: "occupancy grid, 1 B/cell".into(),
-        memory_bytes: occupancy.memory_bytes(),
-        update: Cost::direct(grid_update),
-        occupancy: Cost::direct(asker.time_occupancy(clock, &occupancy)),
-        distance: Cost::by(
-            seconds_per_probe(clock, few, |p| occupancy.search_distance_by_rings(p, limit).unwrap_or(0.0)),
-            "ring search",
-        ),
-        surface: Cost::by(grid_surface, "marching squares"),
-        occupancy_wrong: asker.occupancy_wrong(&occupancy),
-        distance_error: asker.distance_error(|p| occupancy.search_distance_by_rings(p, limit)),
-        surface_error: asker.surface_error(&grid_contour),
-        note: format!("{} cells observed", occupancy.observed_cells()),
+    let row = |name: &str, memory_bytes: usize, update: Option<Cost>, note: String| Row {
+        name: name.into(),
+        memory_bytes,
+        update,
+        note,
         ..Default::default()
-    });
-    for (name, map, update) in [
-        ("quadtree, 9 B/inner node, same cells", &tree, tree_update),
-        ("quadtree, 6.25 cm leaves, 16 m root", &chapter_tree, chapter_tree_update),
-    ] {
-        let own = Grid { lattice: *map.tree().lattice(), shape: map.tree().grid().shape };
-        let (surface, extracted) =
-            seconds_of(clock, || occupancy_contour(&own, |c| map.tree().cell(c).map(|v| v.0)));
-        rows.push(Row {
-            name: name.into(),
-            memory_bytes: map.memory_bytes(),
-            update: Cost::direct(update),
-            occupancy: Cost::direct(asker.time_occupancy(clock, map)),
-            surface: Cost::by(surface, "marching squares"),
-            occupancy_wrong: asker.occupancy_wrong(map),
-            surface_error: asker.surface_error(&extracted),
-            note: format!("{} nodes, {} of them inner", map.tree().nodes(), map.tree().inner_nodes()),
-            ..Default::default()
-        });
-    }
-    let (marched_build, marched_contour) =
-        seconds_of(clock, || marching_squares(&marched, &settings.contour));
-    let banded_contour = marching_squares(&banded, &settings.contour);
-    for (name, map, update, extraction, extracted, note) in [
-        (
+    };
+    let derived = |row: Row| Row { derived: true, ..row };
+    let nodes =
+        |map: &Quadtree| format!("{} nodes, {} of them inner", map.tree().nodes(), map.tree().inner_nodes());
+    let segments = |map: &Tsdf2| marching_squares(map, &settings.contour).segments.len();
+    // What a workload costs comes in this order, too: `costs.rs`.
+    let rows = vec![
+        row(
+            "occupancy grid, 1 B/cell",
+            occupancy.memory_bytes(),
+            Cost::direct(grid_update),
+            format!("{} cells observed", occupancy.observed_cells()),
+        ),
+        row(
+            "quadtree, 9 B/inner node, same cells",
+            tree.memory_bytes(),
+            Cost::direct(tree_update),
+            nodes(&tree),
+        ),
+        row(
+            "quadtree, 6.25 cm leaves, 16 m root",
+            chapter_tree.memory_bytes(),
+            Cost::direct(chapter_tree_update),
+            nodes(&chapter_tree),
+        ),
+        row(
             "TSDF, f32 D and W",
-            &tsdf,
-            tsdf_update,
-            contour_build,
-            &contour,
-            format!(
-                "{} ms without carving, {} segments there",
-                format_ms(banded_update),
-                banded_contour.segments.len()
-            ),
+            tsdf.memory_bytes(),
+            Cost::direct(tsdf_update),
+            format!("{} ms without carving, {} segments there", format_ms(banded_update), segments(&banded)),
         ),
-        (
+        row(
             "TSDF, the chapter's march",
-            &marched,
-            marched_update,
-            marched_build,
-            &marched_contour,
-            format!("{} segments", marched_contour.segments.len()),
+            marched.memory_bytes(),
+            Cost::direct(marched_update),
+            format!("{} segments", segments(&marched)),
         ),
-    ] {
-        rows.push(Row {
-            name: name.into(),
-            memory_bytes: map.memory_bytes(),
-            update: Cost::direct(update),
-            occupancy: Cost::by(asker.time_occupancy(clock, map), "sign of D"),
-            surface: Cost::by(extraction, "marching squares"),
-            occupancy_wrong: asker.occupancy_wrong(map),
-            surface_error: asker.surface_error(extracted),
-            note,
-            ..Default::default()
-        });
-    }
-    let distance = &fields[0].field;
-    let observed = |i: usize| !distance.samples()[i].is_nan();
-    let (zero_build, zero) =
-        seconds_of(clock, || level_set(&grid, distance.samples(), observed, Ambiguity::Decide));
-    let esdf_occupancy = |p| crate::map::DerivedField::occupancy(distance, p);
-    rows.push(Row {
-        name: "ESDF, f32".into(),
-        memory_bytes: crate::map::DerivedField::memory_bytes(distance),
-        derived: true,
-        update: Cost::by(fields[0].seconds, "full rebuild"),
-        occupancy: Cost::by(
-            seconds_per_probe(clock, &everywhere, |p| esdf_occupancy(p).unwrap_or(0.0)),
-            "sign of d",
+        derived(row(
+            "ESDF, f32",
+            DerivedField::memory_bytes(&fields[0].field),
+            Cost::by(fields[0].seconds, "full rebuild"),
+            "distances to the contour's segments".into(),
+        )),
+        derived(row(
+            "extracted contour",
+            DerivedField::memory_bytes(&contour),
+            Cost::by(contour_build, "marching squares"),
+            format!("{} segments, {:.1} m", contour.segments.len(), contour.length()),
+        )),
+        row(
+            "point cloud, k-d tree",
+            cloud.memory_bytes(),
+            Cost::direct(cloud_update),
+            format!("{} points, tree built in {} ms", cloud.points().len(), format_ms(cloud_build)),
         ),
-        distance: Cost::direct(seconds_per_probe(clock, &everywhere, |p| {
-            distance.distance(p).known().unwrap_or(0.0)
-        })),
-        surface: Cost::by(zero_build, "marching squares"),
-        occupancy_wrong: asker.wrong(esdf_occupancy),
-        distance_error: asker.distance_error(|p| distance.distance(p).known()),
-        surface_error: asker.surface_error(&zero),
-        note: "distances to the contour's segments".into(),
-    });
-    rows.push(Row {
-        name: "extracted contour".into(),
-        memory_bytes: crate::map::DerivedField::memory_bytes(&contour),
-        derived: true,
-        update: Cost::by(contour_build, "marching squares"),
-        occupancy: Cost::by(
-            seconds_per_probe(clock, few, |p| f64::from(u8::from(contour.is_inside(p) == Some(true)))),
-            "crossing count",
-        ),
-        distance: Cost::by(
-            seconds_per_probe(clock, few, |p| contour.nearest_distance(p).unwrap_or(0.0)),
-            "brute force",
-        ),
-        surface: Cost::direct(0.0),
-        occupancy_wrong: asker.wrong(|p| contour.is_inside(p).map(|inside| if inside { 1.0 } else { 0.0 })),
-        distance_error: asker.distance_error(|p| contour.nearest_distance(p)),
-        surface_error: asker.surface_error(&contour),
-        note: format!("{} segments, {:.1} m", contour.segments.len(), contour.length()),
-    });
-    rows.push(Row {
-        name: "point cloud, k-d tree".into(),
-        memory_bytes: cloud.memory_bytes(),
-        update: Cost::direct(cloud_update),
-        distance: Cost::direct(seconds_per_probe(clock, few, |p| cloud.nearest_distance(p).unwrap_or(0.0))),
-        distance_error: asker.distance_error(|p| cloud.nearest_distance(p)),
-        note: format!("{} points, tree built in {} ms", cloud.points().len(), format_ms(cloud_build)),
-        ..Default::default()
-    });
-
-    let esdf_seconds =
-        rows.iter().find(|r| r.name.starts_with("ESDF")).and_then(|r| r.distance).map_or(0.0, |c| c.seconds);
-    let cloud_crossover = cloud_crossover(clock, cloud.points(), few, esdf_seconds);
-    for measured in &mut fields {
-        measured.against_contour = against_contour(&measured.field, &contour, &asker.free);
-        measured.against_truth = asker.distance_error(|p| measured.field.distance(p).known());
-        let norms = asker.free.iter().filter_map(|&p| measured.field.gradient(p).known().map(vector::norm));
-        measured.gradient = median(norms.collect());
-    }
-    let tsdf_gradient = gradient(&tsdf, &asker.free);
-    let (winners, never_win) = winners(&rows);
-    let trees = tree_crossovers(settings, &grid, &contour, &tree, &chapter_tree);
+    ];
     Ok(Gallery {
         rows,
-        winners,
-        never_win,
-        trees,
-        cloud_crossover,
-        tsdf_gradient,
+        winners: Vec::new(),
+        never_win: Vec::new(),
+        trees: tree_crossovers(settings, &grid, &contour, &tree, &chapter_tree),
+        cloud_crossover: CloudCrossover { measured: Vec::new(), points: None },
+        tsdf_gradient: f64::NAN,
         fields,
         occupancy,
         tree,
         tsdf,
         contour,
         cloud,
+        chapter_tree,
+        marched,
+        contour_settings: settings.contour,
     })
+}
+
+/// How wrong the answers are, row by row and field by field.
+fn hold_against_truth(gallery: &mut Gallery, asker: &Asker<'_>) {
+    let limit = vector::norm(asker.grid.aabb().extent());
+    let (occupancy, contour, distance) = (&gallery.occupancy, &gallery.contour, &gallery.fields[0].field);
+    let inside = |p| contour.is_inside(p).map(|inside| if inside { 1.0 } else { 0.0 });
+    let wrong = [
+        asker.occupancy_wrong(occupancy),
+        asker.occupancy_wrong(&gallery.tree),
+        asker.occupancy_wrong(&gallery.chapter_tree),
+        asker.occupancy_wrong(&gallery.tsdf),
+        asker.occupancy_wrong(&gallery.marched),
+        asker.wrong(|p| DerivedField::occupancy(distance, p)),
+        asker.wrong(inside),
+        None,
+    ];
+    let distances = [
+        asker.distance_error(|p| occupancy.search_distance_by_rings(p, limit)),
+        None,
+        None,
+        None,
+        None,
+        asker.distance_error(|p| distance.distance(p).known()),
+        asker.distance_error(|p| contour.nearest_distance(p)),
+        asker.distance_error(|p| gallery.cloud.nearest_distance(p)),
+    ];
+    let surfaces = [
+        asker.surface_error(&contour_of_grid(occupancy)),
+        asker.surface_error(&contour_of_tree(&gallery.tree)),
+        asker.surface_error(&contour_of_tree(&gallery.chapter_tree)),
+        asker.surface_error(contour),
+        asker.surface_error(&marching_squares(&gallery.marched, &gallery.contour_settings)),
+        asker.surface_error(&zero_of(distance)),
+        asker.surface_error(contour),
+        None,
+    ];
+    for (i, row) in gallery.rows.iter_mut().enumerate() {
+        (row.occupancy_wrong, row.distance_error, row.surface_error) = (wrong[i], distances[i], surfaces[i]);
+    }
+    let exact: Vec<Option<f64>> = asker.free.iter().map(|&p| gallery.contour.nearest_distance(p)).collect();
+    for measured in &mut gallery.fields {
+        measured.against_contour = against_contour(&measured.field, &asker.free, &exact);
+        measured.against_truth = asker.distance_error(|p| measured.field.distance(p).known());
+        let norms = asker.free.iter().filter_map(|&p| measured.field.gradient(p).known().map(vector::norm));
+        measured.gradient = median(norms.collect());
+    }
+    gallery.tsdf_gradient = gradient(&gallery.tsdf, &asker.free);
 }
 
 /// Seconds a scan.
@@ -284,99 +283,6 @@ fn chapter_tree(grid: &Grid<2>, model: OccupancyModel) -> Result<Quadtree, MapEr
     Quadtree::new(grid.lattice.origin, 0.0625, 8 + doublings, model)
 }
 
-fn occupancy_value(map: &OccupancyGrid<2>, cell: [i32; 2]) -> Option<i8> {
-    map.store().cell(cell).map(|v| v.0)
-}
-
-/// The boundary between free and occupied cells: log odds as a field, occupied negative.
-fn occupancy_contour(grid: &Grid<2>, value: impl Fn([i32; 2]) -> Option<i8>) -> Contour {
-    let samples: Vec<f32> =
-        (0..grid.len()).map(|i| value(grid.cell(i)).map_or(f32::NAN, |v| 0.5 - f32::from(v))).collect();
-    level_set(grid, &samples, |i| !samples[i].is_nan(), Ambiguity::Decide)
-}
-
-/// Centres of cells that were seen free, more than 5 cm from any surface.
-fn observed_free(tsdf: &Tsdf2, min_weight: f32, truth: Option<&dyn Truth<2>>) -> Vec<[f64; 2]> {
-    let inside = Aabb::new(tsdf.grid().aabb().min, tsdf.grid().aabb().max).grown(-tsdf.config().resolution);
-    let candidates = points(&inside, 16_000).into_iter();
-    let free = |p: &[f64; 2]| {
-        tsdf.grid()
-            .index_of(*p)
-            .and_then(|i| tsdf.store().at(i))
-            .is_some_and(|c| c.weight >= min_weight && c.distance > 0.0)
-    };
-    candidates
-        .filter(free)
-        .filter(|&p| truth.is_none_or(|t| t.signed_distance(p) > 0.05))
-        .take(4000)
-        .collect()
-}
-
-struct Asker<'a> {
-    truth: Option<&'a dyn Truth<2>>,
-    free: Vec<[f64; 2]>,
-    everywhere: &'a [[f64; 2]],
-    grid: Grid<2>,
-}
-
-impl Asker<'_> {
-    fn time_occupancy(&self, clock: &mut Clock<'_>, map: &impl MapRepr<2>) -> f64 {
-        seconds_per_probe(clock, self.everywhere, |p| map.occupancy(p).unwrap_or(0.0))
-    }
-
-    fn occupancy_wrong(&self, map: &impl MapRepr<2>) -> Option<f64> {
-        self.wrong(|p| map.occupancy(p))
-    }
-
-    /// Share of wrong answers among those given clearly on one side of a true surface.
-    fn wrong(&self, occupancy: impl Fn([f64; 2]) -> Option<f64>) -> Option<f64> {
-        let truth = self.truth?;
-        let clear = 0.5 * self.grid.lattice.resolution;
-        let (mut wrong, mut answered) = (0usize, 0usize);
-        for &p in self.everywhere.iter().take(20_000) {
-            let d = truth.signed_distance(p);
-            if let Some(o) = occupancy(p).filter(|_| d.abs() > clear) {
-                answered += 1;
-                wrong += usize::from((o > 0.5) != (d < 0.0));
-            }
-        }
-        (answered > 0).then(|| wrong as f64 / answered as f64)
-    }
-
-    fn distance_error(&self, distance: impl Fn([f64; 2]) -> Option<f64>) -> Option<ErrorSummary> {
-        let truth = self.truth?;
-        let errors =
-            self.free.iter().filter_map(|&p| Some(distance(p)?.abs() - truth.signed_distance(p).abs()));
-        ErrorSummary::of(errors.collect())
-    }
-
-    /// Signed so that a surface in front of the true one is positive.
-    fn surface_error(&self, contour: &Contour) -> Option<ErrorSummary> {
-        let truth = self.truth?;
-        ErrorSummary::of(contour.vertices.iter().map(|&v| truth.signed_distance(v)).collect())
-    }
-}
-
-/// Median gradient norm over probes around which the map was observed.
-fn gradient(tsdf: &Tsdf2, probes: &[[f64; 2]]) -> f64 {
-    let h = tsdf.config().resolution;
-    let value =
-        |p: [f64; 2]| tsdf.grid().index_of(p).and_then(|i| tsdf.store().at(i)).map(|c| f64::from(c.distance));
-    let slope = |p: [f64; 2], k: usize| {
-        let (mut low, mut high) = (p, p);
-        low[k] -= h;
-        high[k] += h;
-        Some((value(high)? - value(low)?) / (2.0 * h))
-    };
-    median(probes.iter().filter_map(|&p| Some(slope(p, 0)?.hypot(slope(p, 1)?))).collect())
-}
-
-/// NaN of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 fn tree_crossovers(
     settings: &GallerySettings,
     grid: &Grid<2>,
@@ -390,13 +296,8 @@ fn tree_crossovers(
     let ours = inner_only_node_bytes::<2>(9.0);
     let (fine, coarse) = (grid.lattice.resolution, chapter_tree.tree().lattice().resolution);
     vec![
-        TreeCrossover::new(
-            "chapter's node, 20 B",
-            (20.0, coarse),
-            plane,
-            (20 * chapter_tree.tree().nodes(), dense),
-        ),
-        TreeCrossover::new("our node, 9 B an inner one", (ours, fine), plane, (tree.memory_bytes(), dense)),
+        TreeCrossover::new(CHAPTER_NODE, (20.0, coarse), plane, (20 * chapter_tree.tree().nodes(), dense)),
+        TreeCrossover::new(OUR_NODE, (ours, fine), plane, (tree.memory_bytes(), dense)),
     ]
 }
 

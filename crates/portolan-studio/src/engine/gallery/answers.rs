@@ -1,0 +1,29 @@
+//! One question to all representations: what is there?
+
+use portolan::geom::vector::norm;
+use portolan::map::{DerivedField, MapRepr};
+use portolan_sim::World;
+use serde_json::{Value, json};
+
+use super::state::Made;
+
+/// What each answers at a point; `null` where it does not know.
+pub(super) fn at(made: &Made, p: [f64; 2]) -> Value {
+    let m = &made.measured;
+    let grid = m.tsdf.grid();
+    let cell = grid.index_of(p).and_then(|i| m.tsdf.store().at(i));
+    let limit = norm(grid.aabb().extent());
+    json!({
+        "at": p,
+        "grid": { "occupied": m.occupancy.occupancy(p), "searched": m.occupancy.search_distance_by_rings(p, limit) },
+        "tree": { "occupied": m.tree.occupancy(p) },
+        "tsdf": { "distance": cell.map(|c| c.distance), "weight": cell.map(|c| c.weight) },
+        "esdf": { "distance": m.distance().distance(p).known(), "status": m.distance().distance(p).status() },
+        "contour": {
+            "distance": m.contour.nearest_distance(p),
+            "inside": DerivedField::occupancy(&m.contour, p).map(|o| o > 0.5),
+        },
+        "cloud": { "distance": m.cloud.nearest_distance(p) },
+        "truth": made.truth.as_ref().map(|world: &World| world.signed_distance(p)),
+    })
+}

@@ -1,0 +1,11 @@
+//! The same log in every representation: what each costs, how true its answers are, who wins which workload.
+
+mod answers;
+mod ask;
+mod picture;
+mod state;
+mod tell;
+#[cfg(test)]
+mod tests;
+
+pub(super) use state::Gallery;

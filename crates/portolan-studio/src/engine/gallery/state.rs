@@ -1,0 +1,176 @@
+//! The representations, and when they are made anew.
+
+use portolan::cell::OccupancyModel;
+use portolan::field::EsdfSettings;
+use portolan::gallery::{
+    Gallery as Measured, GallerySettings, TreeCrossover, Truth, run, tree_crossovers_at,
+};
+use portolan::surface::ContourSettings;
+use portolan_sim::World;
+use serde_json::{Value, json};
+
+use super::ask::Ask;
+use super::{answers, picture, tell};
+use crate::engine::fusion::Fusion;
+use crate::engine::{Clock, Limits, Refusal, Reply};
+
+/// Points that direct answers are timed and compared at when the view is opened: few, so that it opens quickly.
+const FIRST_PROBES: usize = 10_000;
+/// Points that a workload can be run with.
+const PROBES: std::ops::RangeInclusive<usize> = 100..=300_000;
+/// Bytes of a cell in all maps together, with what deriving and sending them takes on top.
+const BYTES_PER_CELL: f64 = 160.0;
+/// Bytes of a beam in the cloud and its tree, while they are made.
+const BYTES_PER_BEAM: f64 = 120.0;
+/// Edges of the leaves that trees are fused with to follow the formula (metres).
+const LEAVES: [f64; 6] = [0.10, 0.075, 0.05, 0.0375, 0.025, 0.0175];
+/// Bytes that a tree may take for a cell of the dense array that it is held against.
+const BYTES_PER_LEAF_CELL: f64 = 16.0;
+/// Scans that these trees are fused of, at most; of a longer log every n-th.
+const MOST_SCANS: usize = 1000;
+
+/// The view of all representations.
+pub(in crate::engine) struct Gallery {
+    limits: Limits,
+    clock: Clock,
+    made: Option<Made>,
+}
+
+/// What was built and measured, and of what.
+pub(super) struct Made {
+    /// Of the map of fusion.
+    pub(super) revision: u64,
+    pub(super) settings: GallerySettings,
+    pub(super) measured: Measured,
+    /// Where and of what it is, for people.
+    pub(super) of: Value,
+    /// Seconds that building and measuring took.
+    pub(super) seconds: f64,
+    pub(super) truth: Option<World>,
+    trees: Option<Vec<[TreeCrossover; 2]>>,
+}
+
+impl Gallery {
+    pub(in crate::engine) fn new(limits: Limits, clock: &Clock) -> Self {
+        Self { limits, clock: clock.clone(), made: None }
+    }
+
+    /// Answers.
+    pub(in crate::engine) fn ask(&mut self, ask: Ask, fusion: &mut Fusion) -> Result<Reply, Refusal> {
+        let clock = self.clock.clone();
+        match ask {
+            Ask::Open { have } => {
+                let made = self.made(fusion)?;
+                match have == Some(made.revision) {
+                    true => Reply::of(json!({ "revision": made.revision, "costs": tell::costs(made) })),
+                    false => picture::everything(made),
+                }
+            }
+            Ask::Run { workload, probes } => {
+                if !PROBES.contains(&probes) {
+                    let (low, high) = (PROBES.start(), PROBES.end());
+                    return Err(Refusal::new(format!(
+                        "probes must be from {low} to {high}, and are {probes}"
+                    )));
+                }
+                let made = self.made(fusion)?;
+                let measure = || made.measured.measure(workload.into(), probes, &mut || clock.now());
+                let ((), seconds) = clock.time(measure);
+                Reply::of(
+                    json!({ "revision": made.revision, "seconds": seconds, "costs": tell::costs(made) }),
+                )
+            }
+            Ask::Answers { at } => match at.iter().all(|v| v.is_finite()) {
+                true => Reply::of(answers::at(self.made(fusion)?, at)),
+                false => Err(Refusal::new("a place has two finite coordinates")),
+            },
+            Ask::Trees {} => self.trees(fusion),
+        }
+    }
+
+    /// What there is of the map of fusion as it is now.
+    fn made(&mut self, fusion: &mut Fusion) -> Result<&mut Made, Refusal> {
+        fusion.finish_if_new()?;
+        if self.made.as_ref().is_none_or(|made| made.revision != fusion.revision()) {
+            self.made = None;
+            self.made = Some(self.make(fusion)?);
+        }
+        self.made.as_mut().ok_or_else(|| Refusal::new("there is no gallery"))
+    }
+
+    fn make(&self, fusion: &mut Fusion) -> Result<Made, Refusal> {
+        let tsdf = fusion.tsdf()?;
+        let (grid, esdf, contour) = (*tsdf.grid(), EsdfSettings::of(tsdf), ContourSettings::of(tsdf));
+        let lap = fusion.lap();
+        let log = lap.first(fusion.at());
+        let beams: usize = log.iter().map(|(_, scan)| scan.len()).sum();
+        self.check_memory(grid.shape, beams, fusion)?;
+        if log.iter().all(|(_, scan)| scan.counts().hit == 0) {
+            return Err(Refusal::new("no beam of these scans hit anything: there is nothing to compare"));
+        }
+        let truth = lap.world(fusion.at());
+        let settings = GallerySettings {
+            grid,
+            tsdf: fusion.settings().config()?,
+            model: OccupancyModel::default(),
+            contour,
+            esdf,
+            probes: FIRST_PROBES,
+            surface_length: truth.map(World::wall_length),
+        };
+        let clock = self.clock.clone();
+        let known = truth.map(|world| world as &dyn Truth<2>);
+        let (measured, seconds) = clock.time(|| run(log, &settings, known, &mut || clock.now()));
+        let measured = measured.map_err(Refusal::new)?;
+        let of = json!({
+            "log": lap.name(), "scans": fusion.at(), "lap": lap.lap_length(), "beams": beams, "settings": fusion.settings(),
+            "probes": FIRST_PROBES, "moved": lap.last_move(fusion.at()).is_some(),
+        });
+        let truth = truth.cloned();
+        Ok(Made { revision: fusion.revision(), settings, measured, of, seconds, truth, trees: None })
+    }
+
+    /// Refuses what would take more than the tab may have, before any of it is made.
+    fn check_memory(&self, shape: [usize; 2], beams: usize, fusion: &Fusion) -> Result<(), Refusal> {
+        let cells: f64 = shape.iter().map(|&n| n as f64).product();
+        let needed = BYTES_PER_CELL * cells + BYTES_PER_BEAM * beams as f64;
+        let left = self.limits.memory.saturating_sub(fusion.memory_bytes());
+        if needed <= left as f64 {
+            return Ok(());
+        }
+        let [needed, left] = [needed, left as f64].map(|bytes| bytes / f64::from(1 << 20));
+        Err(Refusal::new(format!(
+            "all representations together need about {needed:.0} MiB of {left:.0} MiB that are left to this tab; \
+             choose larger cells in Fusion"
+        )))
+    }
+
+    /// Trees of other leaves; once for a map, since nothing of them is a matter of time.
+    fn trees(&mut self, fusion: &mut Fusion) -> Result<Reply, Refusal> {
+        let limit = self.limits.memory.saturating_sub(fusion.memory_bytes()) as f64;
+        let made = self.made(fusion)?;
+        let log = fusion.lap().first(fusion.at());
+        let every = log.len().div_ceil(MOST_SCANS).max(1);
+        if made.trees.is_none() {
+            let bounds = made.settings.grid.aabb();
+            let cells = |r: f64| bounds.extent().iter().map(|metres| (metres / r).ceil()).product::<f64>();
+            let fit: Vec<f64> =
+                LEAVES.into_iter().filter(|&r| BYTES_PER_LEAF_CELL * cells(r) <= limit).collect();
+            let few: Vec<_> = log.iter().step_by(every).cloned().collect();
+            let surface = tell::surface_length(made);
+            let trees = tree_crossovers_at(&few, made.settings.model, &bounds, surface, &fit);
+            made.trees = Some(trees.map_err(Refusal::new)?);
+        }
+        let pairs: Vec<_> = made.trees.iter().flatten().map(tell::tree_pair).collect();
+        Reply::of(json!({ "revision": made.revision, "every": every, "sizes": pairs }))
+    }
+
+    pub(in crate::engine) fn memory_bytes(&self) -> usize {
+        self.made.as_ref().map_or(0, |made| made.measured.memory_bytes())
+    }
+
+    /// Gives everything up.
+    pub(in crate::engine) fn forget(&mut self) {
+        self.made = None;
+    }
+}
