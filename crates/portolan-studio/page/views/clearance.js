@@ -29,6 +29,8 @@ export default {
     let opened;
     let drawing = false;
     let reopening = false;
+    /** The path is the driven way, or will be once there is a map. */
+    let driven = false;
 
     const plane = new Plane({ id: "clearance-canvas", label: "The distance field of the map, a probe into it and a path through it", meter: app.meter });
     const still = new Still(stillLayers(scene));
@@ -70,7 +72,7 @@ export default {
       },
       undo: () => edit(() => scene.waypoints.pop()),
       clear: () => edit(() => (scene.waypoints.length = 0)),
-      way: () => edit(() => (scene.waypoints = (opened?.way ?? []).map((/** @type {Point} */ p) => [...p]))),
+      way: () => (edit(() => (scene.waypoints = way())), (driven = true)),
       draw: (on) => (drawing = on),
     });
     const exportFile = (/** @type {string} */ file, /** @type {string} */ name) =>
@@ -135,8 +137,12 @@ export default {
       if (opened && scene.waypoints.length > 0) askFor.path({ op: "path", points: scene.waypoints, clearance: scene.radius, unknown: shown.unknown });
     }
 
+    /** The way on which the map was made. @returns {Point[]} */
+    const way = () => (opened?.way ?? []).map((/** @type {Point} */ p) => [...p]);
+
     /** Changes the path. @param {() => void} how */
     function edit(how) {
+      driven = false;
       how();
       if (scene.waypoints.length === 0) scene.checked = undefined;
       path.count(scene.waypoints.length);
@@ -184,12 +190,14 @@ export default {
       const image = new FieldImage(body.grid);
       image.samples = { euclidean: arrays.euclidean, truncated: arrays.truncated };
       image.which = shown.field;
-      image.reach = Math.max(body.truncation, body.extremes[1], -body.extremes[0]);
+      image.reach = Math.max(body.truncation, body.usual_length);
       image.paint();
       scene.image = image;
       [scene.contour, scene.lines, scene.truth] = [arrays.contour, arrays.lines, body.truth];
       if (JSON.stringify(before) !== JSON.stringify(body.grid)) plane.setHome(image.box());
-      scene.probe ??= body.start;
+      scene.probe ??= body.start ?? undefined;
+      if (driven) scene.waypoints = way();
+      path.count(scene.waypoints.length);
       shown.tellMap(body, image.reach);
       meter.show(body.meter);
       app.say(`${body.name} after ${body.at} scans: both fields made in ${(1000 * body.seconds).toFixed(0)} ms. Move the pointer, click a path.`);
@@ -219,7 +227,7 @@ export default {
       hide() {},
       state: () => ({
         ...shown.state(), radius: scene.radius.toFixed(2), ...(scene.probe ? { probe: texts([scene.probe]) } : {}),
-        ...(scene.waypoints.length > 0 ? { path: texts(scene.waypoints) } : {}), ...plane.state(),
+        ...(driven ? { path: "driven" } : scene.waypoints.length > 0 ? { path: texts(scene.waypoints) } : {}), ...plane.state(),
       }),
       picture() {
         plane.paint();
@@ -268,7 +276,10 @@ export default {
       if (radius >= 0 && radius <= 1) path.radius.value = scene.radius = radius;
       const [at] = points(state.get("probe"));
       if (at) scene.probe = at;
-      if (state.has("path")) scene.waypoints = points(state.get("path")).slice(0, MOST);
+      if (state.has("path")) {
+        driven = state.get("path") === "driven";
+        scene.waypoints = driven ? way() : points(state.get("path")).slice(0, MOST);
+      }
       path.count(scene.waypoints.length);
       if (opened) {
         scene.image?.show(shown.field);

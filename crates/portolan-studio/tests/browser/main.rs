@@ -4,6 +4,7 @@
 #![allow(dead_code)] // every view's tests use other parts
 
 mod chromium;
+mod clearance;
 mod every_view;
 mod gallery;
 mod keys;

@@ -90,10 +90,13 @@ impl Fields {
         gradient.into_iter().zip(status).map(|(g, s)| answered(s).then_some(g)).collect()
     }
 
-    /// Least and largest known distance of the Euclidean field; 0 where nothing is.
-    pub(super) fn extremes(&self) -> [f32; 2] {
+    /// The length (metres) that all but the longest hundredth of the known distances stay within, the sign aside: what a
+    /// ramp should show, though some beam saw far through a window. 0 where nothing is known.
+    pub(super) fn usual_length(&self) -> f32 {
         let known = self.dense.distances.iter().zip(&self.dense.status).filter(|(_, s)| **s == 1);
-        known.fold([0.0, 0.0], |[low, high], (&d, _)| [d.min(low), d.max(high)])
+        let mut lengths: Vec<f32> = known.map(|(d, _)| d.abs()).collect();
+        let at = lengths.len() * 99 / 100;
+        if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(at, f32::total_cmp).1 }
     }
 
     pub(super) fn memory_bytes(&self) -> usize {

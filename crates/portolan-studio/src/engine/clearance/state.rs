@@ -106,7 +106,7 @@ impl Made {
             "at": at,
             "grid": grid,
             "truncation": config.truncation,
-            "extremes": self.fields.extremes(),
+            "usual_length": self.fields.usual_length(),
             "seconds": self.seconds,
             "bytes": self.fields.memory_bytes(),
             "meter": self.meter,
@@ -122,8 +122,8 @@ impl Made {
     }
 }
 
-/// Points of the driven way, about.
-const WAY_POINTS: usize = 120;
+/// Points of the driven way, at most about: as many as a path may have.
+const WAY_POINTS: usize = 900;
 
 /// Where the sensor was, once around: a path that was free.
 fn way(fusion: &Fusion) -> Vec<[f64; 2]> {
