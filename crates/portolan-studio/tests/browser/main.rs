@@ -5,6 +5,7 @@
 
 mod chromium;
 mod every_view;
+mod fusion;
 mod keys;
 mod page;
 
