@@ -5,6 +5,7 @@ import { applyTheme, nextTheme } from "./ui/theme.js";
 import { save } from "./ui/files.js";
 import clearance from "./views/clearance.js";
 import fusion from "./views/fusion.js";
+import radiance from "./views/radiance.js";
 
 /**
  * A view: made when it is first shown, then shown and hidden.
@@ -34,7 +35,7 @@ import fusion from "./views/fusion.js";
  */
 
 /** @type {View[]} */
-const VIEWS = [fusion, clearance];
+const VIEWS = [fusion, clearance, radiance];
 
 const $ = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
 const status = $("status");

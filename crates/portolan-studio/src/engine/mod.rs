@@ -6,6 +6,7 @@ mod exports;
 mod fusion;
 mod logs;
 mod protocol;
+mod radiance;
 mod session;
 
 pub use clock::Clock;

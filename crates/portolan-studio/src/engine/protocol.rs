@@ -34,6 +34,7 @@ pub(super) struct Message {
 pub(super) enum View {
     Fusion,
     Clearance,
+    Radiance,
 }
 
 /// An answer.

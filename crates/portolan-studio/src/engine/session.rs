@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::clearance::Clearance;
 use super::fusion::Fusion;
 use super::protocol::{Message, Refusal, Reply, View, Wire, encode};
+use super::radiance::Radiance;
 use super::{Clock, Logs};
 
 /// What one session may take.
@@ -34,12 +35,18 @@ pub struct Session {
     limits: Limits,
     fusion: Fusion,
     clearance: Clearance,
+    radiance: Radiance,
 }
 
 impl Session {
     /// Nothing fused yet.
     pub fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
-        Self { limits, fusion: Fusion::new(logs, limits, clock), clearance: Clearance::new(limits, clock) }
+        Self {
+            limits,
+            fusion: Fusion::new(logs, limits, clock),
+            clearance: Clearance::new(limits, clock),
+            radiance: Radiance::new(clock),
+        }
     }
 
     /// Answers one message of the page, whatever it is: what cannot be answered is refused in words.
@@ -55,6 +62,7 @@ impl Session {
         let reply = match message.view {
             View::Fusion => self.fusion.ask(serde_json::from_str(ask)?),
             View::Clearance => self.clearance.ask(serde_json::from_str(ask)?, &mut self.fusion),
+            View::Radiance => self.radiance.ask(&serde_json::from_str(ask)?),
         }?;
         let held = self.memory_bytes();
         if held > self.limits.memory {
@@ -71,13 +79,14 @@ impl Session {
 
     /// Bytes of all maps of this tab.
     pub fn memory_bytes(&self) -> usize {
-        self.fusion.memory_bytes() + self.clearance.memory_bytes()
+        self.fusion.memory_bytes() + self.clearance.memory_bytes() + self.radiance.memory_bytes()
     }
 
     fn forget(&mut self, view: View) {
         match view {
             View::Fusion => self.fusion.forget(),
             View::Clearance => self.clearance.forget(),
+            View::Radiance => self.radiance.forget(),
         }
     }
 }

@@ -145,17 +145,14 @@ impl Outcome {
         self.curve[self.curve.len() - 1]
     }
 
-    /// Optical depth `Σ σδ` that the fit has in bins from which every surface of the scene is more than
-    /// `margin` metres away: matter where there is none.
+    /// [`Scene::misplaced`] of the field that was found.
     pub fn misplaced(&self, scene: &Scene, margin: f64) -> f64 {
-        let line = self.fit.line();
-        scene.empty_bins(margin).map(|bin| line.density[bin] * line.resolution).sum()
+        scene.misplaced(self.fit.line(), margin)
     }
 
-    /// The bin with the most density of those that [`Outcome::misplaced`] counts.
+    /// [`Scene::worst_bin`] of the field that was found.
     pub fn worst_bin(&self, scene: &Scene, margin: f64) -> Option<usize> {
-        let density = &self.fit.line().density;
-        scene.empty_bins(margin).max_by(|a, b| density[*a].total_cmp(&density[*b]))
+        scene.worst_bin(self.fit.line(), margin)
     }
 }
 

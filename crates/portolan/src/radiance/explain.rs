@@ -11,7 +11,7 @@
 //! and the residual in front of it are each channel's own: those a second channel can repair.
 
 use super::fit::{Fit, differences, precisions};
-use super::model::Measurement;
+use super::model::{Measurement, logistic};
 use super::ray::{Passage, Sample, SampleGradient, Upstream, backward, render};
 
 /// One channel's share in the gradient of one bin by one ray.
@@ -42,7 +42,46 @@ pub struct Terms {
     pub second_moment: Term,
 }
 
+/// How the pulls on one bin become its entry in the gradient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sum {
+    /// `∂J/∂σ` by all rays and channels: the sum of their pulls.
+    pub pulls: f64,
+    /// `∂σ/∂θ`: little where there is next to no density, `1 / resolution` where there is much.
+    pub chain: f64,
+    /// What the prior adds to `∂J/∂θ`.
+    pub prior: f64,
+}
+
+impl Sum {
+    /// `∂J/∂θ`: the entry of [`Fit::gradient`].
+    pub fn gradient(&self) -> f64 {
+        self.pulls * self.chain + self.prior
+    }
+}
+
+impl Terms {
+    /// The pulls of all channels.
+    pub fn pull(&self) -> f64 {
+        self.depth.pull + self.reflectance.pull + self.second_moment.pull
+    }
+}
+
 impl Fit {
+    /// Adds up the terms of a bin, as [`Fit::explain`] gave them for the field as it stands.
+    ///
+    /// # Panics
+    /// When there is no such bin.
+    pub fn add_up(&self, bin: usize, terms: &[Terms]) -> Sum {
+        let theta = self.parameters()[bin];
+        let prior = self.settings().prior;
+        Sum {
+            pulls: terms.iter().map(Terms::pull).sum(),
+            chain: logistic(theta) / self.line().resolution,
+            prior: (theta - prior.density_mean) / (prior.density_spread * prior.density_spread),
+        }
+    }
+
     /// The factors of `∂J/∂σ` of a bin at the field as it stands, for every ray to learn from that crosses
     /// it.
     pub fn explain(&self, bin: usize) -> Vec<Terms> {
@@ -101,18 +140,10 @@ mod tests {
         let settings = Settings { channels: Channels::DepthReflectanceSpread, ..Settings::default() };
         let mut fit = Fit::new(line, &[ray(0.05, true), ray(1.1, false)], settings).unwrap();
         for bin in [0, 5, 11] {
-            let by_ray: f64 = fit
-                .explain(bin)
-                .iter()
-                .map(|t| t.depth.pull + t.reflectance.pull + t.second_moment.pull)
-                .sum();
-            // The fit's gradient is by θ: through the parametrisation, and with the prior.
-            let prior = fit.settings().prior;
-            let theta = super::super::softplus_inverse(fit.line().density[bin] * 0.1);
-            let chained = by_ray * super::super::logistic(theta) / 0.1
-                + (theta - prior.density_mean) / prior.density_spread.powi(2);
+            let terms = fit.explain(bin);
+            let sum = fit.add_up(bin, &terms);
             let gradient = fit.gradient()[bin];
-            assert!((chained - gradient).abs() < 1e-9 * gradient.abs().max(1.0), "{chained} {gradient}");
+            assert!((sum.gradient() - gradient).abs() < 1e-12 * gradient.abs(), "{sum:?} {gradient}");
         }
         assert_eq!(fit.explain(11).len(), 1, "the descending ray starts below bin 11");
     }

@@ -93,6 +93,11 @@ impl Fit {
         &self.line
     }
 
+    /// What the optimiser moves: `θ` of every bin, then `φ`, as [`Prior`](super::Prior) describes them.
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
+    }
+
     /// The settings of the fit.
     pub fn settings(&self) -> &Settings {
         &self.settings

@@ -49,7 +49,7 @@ pub use experiment::{
     AMBIGUOUS, Experiment, LUCKY, NAMED_SEEDS, NamedSeed, OPAQUE, Outcome, PARKED, Progress, TWO_NOT_ENOUGH,
     transmittance,
 };
-pub use explain::{Term, Terms};
+pub use explain::{Sum, Term, Terms};
 pub use fit::{Fit, Report, Residuals};
 pub use line::{COLORS, Crossing, Far, Line, LineRay};
 pub use model::{Channels, Measurement, Noise, Prior, logistic, softplus, softplus_inverse};

@@ -102,6 +102,17 @@ impl Scene {
         })
     }
 
+    /// Optical depth `Σ σδ` that a field has in bins from which every surface of the scene is more than
+    /// `margin` metres away: matter where there is none.
+    pub fn misplaced(&self, line: &Line, margin: f64) -> f64 {
+        self.empty_bins(margin).map(|bin| line.density[bin] * line.resolution).sum()
+    }
+
+    /// The bin with the most density of those that [`Scene::misplaced`] counts.
+    pub fn worst_bin(&self, line: &Line, margin: f64) -> Option<usize> {
+        self.empty_bins(margin).max_by(|a, b| line.density[*a].total_cmp(&line.density[*b]))
+    }
+
     /// The field that an opaque scene has: `σδ` = 10 in every bin whose centre lies in a body.
     pub fn truth(&self) -> Line {
         let mut line = self.uniform(0.0);

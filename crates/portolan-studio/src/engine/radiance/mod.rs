@@ -1,0 +1,11 @@
+//! The renderer on a line: a field of eighty bins, fitted through what ten rays render, step by step.
+
+mod ask;
+mod curve;
+mod run;
+mod state;
+mod tell;
+#[cfg(test)]
+mod tests;
+
+pub(super) use state::Radiance;
