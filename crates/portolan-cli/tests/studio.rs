@@ -171,7 +171,8 @@ fn what_cannot_be_shown_is_refused_before_anything_is_served() {
                 + "\n"
         })
         .collect::<String>();
-    assert!(refused(&[arg(&file("free.log", &nothing_hit))]).contains("no beam of 3 scans hit anything"));
+    let free = file("free.log", &nothing_hit);
+    assert!(refused(&[arg(&free), "--no-return", "81"]).contains("no beam of 3 scans hit anything"));
     assert!(refused(&[arg(&log), "--memory", "100K"]).contains("--memory"));
 
     let made = folder.path().join("made");

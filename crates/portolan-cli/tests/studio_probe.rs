@@ -14,7 +14,9 @@ mod support;
 
 /// Header and arrays of an answer.
 fn ask(session: &mut Session, view: &str, question: Value) -> (Value, Vec<u8>) {
-    let (header, arrays) = match session.answer(&json!({ "id": 1, "view": view, "ask": question }).to_string()) {
+    let (header, arrays) = match session
+        .answer(&json!({ "id": 1, "view": view, "ask": question }).to_string())
+    {
         Wire::Text(text) => (serde_json::from_str(&text).unwrap(), Vec::new()),
         Wire::Binary(bytes) => {
             let length = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
@@ -79,5 +81,8 @@ fn of_a_plain_that_is_wider_than_distances_are_kept() {
     };
     let (bearings, beams): (Vec<_>, Vec<_>) = (0..720).map(beam).unzip();
     let scans = vec![(Pose::<2>::new(0.0, 0.0, 0.0), Scan::from_fan(&bearings, beams))];
-    compare(PlaneLog::Recorded { name: "plain".into(), scans }, &["known", "saturated", "unknown", "outside"]);
+    compare(
+        PlaneLog::Recorded { name: "plain".into(), scans },
+        &["known", "saturated", "unknown", "outside"],
+    );
 }

@@ -6,6 +6,7 @@
 mod chromium;
 mod clearance;
 mod every_view;
+mod fusion;
 mod gallery;
 mod keys;
 mod page;

@@ -1,6 +1,6 @@
 //! A page of the studio in the browser, driven as its user would: pointer, keys, what stands on the screen.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -304,6 +304,22 @@ impl Page {
         std::fs::create_dir_all(&folder).unwrap();
         let bytes = base64(picture["data"].as_str().unwrap());
         std::fs::write(folder.join(format!("{name}.png")), bytes).unwrap();
+    }
+
+    /// What the page saves goes into this folder.
+    pub(crate) fn save_into(&self, folder: &Path) {
+        let settings = json!({ "behavior": "allow", "browserContextId": self.context, "downloadPath": folder.to_str().unwrap() });
+        self.chromium.call(None, "Browser.setDownloadBehavior", settings).unwrap();
+    }
+
+    /// The content of a file that the page saves, when it is there.
+    pub(crate) fn wait_saved(&self, path: &Path) -> Vec<u8> {
+        let start = Instant::now();
+        while !path.is_file() {
+            assert!(start.elapsed() < SOON, "{} was never saved; {:#?}", path.display(), self.errors());
+            std::thread::sleep(Duration::from_millis(30));
+        }
+        std::fs::read(path).unwrap()
     }
 
     /// Exceptions, errors of the console, requests that failed.

@@ -17,6 +17,16 @@ const QUESTIONS: &[&str] = &[
     r#"{"id":6,"view":"fusion","ask":{"op":"watch","cell":null}}"#,
     r#"{"id":7,"view":"fusion","ask":{"op":"export","file":"contour"}}"#,
     r#"{"id":8,"view":"fusion","ask":{"op":"set","settings":{"resolution":0.1,"truncation":0.3,"w_max":16,"noise":0.01,"carve":true,"carve_weight":1,"weights":"constant","sweep":"march"}}}"#,
+    r#"{"id":9,"view":"clearance","ask":{"op":"open","have":null}}"#,
+    r#"{"id":10,"view":"clearance","ask":{"op":"rings","field":"truncated","spacing":0.25}}"#,
+    r#"{"id":11,"view":"clearance","ask":{"op":"arrows","field":"euclidean","bounds":[[0,0],[12,9]],"spacing":0.5}}"#,
+    r#"{"id":12,"view":"clearance","ask":{"op":"probe","at":[2.2,4.5],"unknown":"optimistic"}}"#,
+    r#"{"id":13,"view":"clearance","ask":{"op":"path","points":[[2.2,4.5],[6,4.5]],"clearance":0.2,"unknown":"pessimistic"}}"#,
+    r#"{"id":14,"view":"radiance","ask":{"op":"open"}}"#,
+    r#"{"id":15,"view":"radiance","ask":{"op":"start","seed":7,"channels":"depth","optimizer":"adam"}}"#,
+    r#"{"id":16,"view":"radiance","ask":{"op":"go_on","channels":"spread","optimizer":"descent"}}"#,
+    r#"{"id":17,"view":"radiance","ask":{"op":"step","steps":3}}"#,
+    r#"{"id":18,"view":"radiance","ask":{"op":"look","ray":1,"bin":20}}"#,
 ];
 
 /// Values that numbers, words and lists are replaced with.
@@ -115,7 +125,7 @@ fn changed(question: &str, change: &Change) -> String {
 /// Thousands of scans are allowed and take seconds: nothing to be learnt from them here.
 fn takes_long(message: &str) -> bool {
     let Ok(message) = serde_json::from_str::<Value>(message) else { return false };
-    ["scan", "scans"].iter().any(|k| message["ask"][k].as_f64().is_some_and(|n| n > 20.0))
+    ["scan", "scans", "steps"].iter().any(|k| message["ask"][k].as_f64().is_some_and(|n| n > 20.0))
 }
 
 fn logs() -> [Arc<Logs>; 2] {
@@ -152,7 +162,7 @@ fn check(message: &str, answer: &Wire) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     #[test]
     fn every_message_is_answered(
