@@ -220,7 +220,8 @@ export default {
       const clamp = slider({ id: "space-wmax", label: "W_max", values: [1, 2, 4, 8, 16, 32, 64, 128, 256], value: s.w_max, oninput: (v) => setCalmly({ w_max: v }) });
       const carve = toggle({ id: "space-carve", label: "Carve free space", value: s.carve, onchange: (v) => set({ carve: v }) });
       const halfLife = el("p", { class: "note", id: "space-half-life" }, `Half-life of what has gone: ${all.half_life.toFixed(1)} observations.`);
-      settings.replaceChildren(...(all.simulated ? [sensor.node] : []), resolution.node, truncation.node, clamp.node, halfLife, carve.node);
+      const occupancy = toggle({ id: "space-occupancy", label: "Occupancy too (slower)", value: s.occupancy, onchange: (v) => set({ occupancy: v }) });
+      settings.replaceChildren(...(all.simulated ? [sensor.node] : []), resolution.node, truncation.node, clamp.node, halfLife, carve.node, occupancy.node);
     }
 
     // --- answers -------------------------------------------------------------------------------------------------
@@ -236,6 +237,7 @@ export default {
         colorChoice();
         settingsControls();
         octree.disabled = !all.occupancy;
+        octree.title = all.occupancy ? "" : "Switch on occupancy in the settings";
         for (const id of ["play", "step", "restart", "frame"]) /** @type {any} */ (strip.querySelector(`#space-${id}`)).disabled = body.frames === 0;
       }
       by = body.color.by;
@@ -312,6 +314,8 @@ export default {
         flat.getContext("2d")?.clearRect(0, 0, flat.width, flat.height);
       }
       newCut = true;
+      // A map without occupancy is made again with it.
+      if (slice.field === "occupancy" && !all.occupancy && !all.fixed) set({ occupancy: true });
       drive();
     }
 
@@ -499,10 +503,10 @@ export default {
         if (first) {
           const answer = await ask({ op: "open" });
           app.meter.measure(() => take(answer));
-          const set = numbers(params.get("settings"), 4);
+          const set = numbers(params.get("settings"), 5);
           if (set && !all.fixed) {
             const sensor = params.get("sensor") ?? all.settings.sensor;
-            newSettings = { resolution: set[0], truncation: set[1], w_max: set[2], carve: set[3] !== 0, sensor };
+            newSettings = { resolution: set[0], truncation: set[1], w_max: set[2], carve: set[3] !== 0, occupancy: set[4] !== 0, sensor };
           }
           if (frameWanted !== null) goal = Math.max(0, Math.min(frameWanted, body.frames));
           else if (body.frames > 0) setPlaying(true);
@@ -526,7 +530,7 @@ export default {
         return {
           frame: String(body.at),
           color: by,
-          ...(all.fixed ? {} : { settings: [s.resolution, s.truncation, s.w_max, Number(s.carve)].map((v) => Number(v.toFixed(4))).join(","), sensor: s.sensor }),
+          ...(all.fixed ? {} : { settings: [s.resolution, s.truncation, s.w_max, Number(s.carve), Number(s.occupancy)].map((v) => Number(v.toFixed(4))).join(","), sensor: s.sensor }),
           ...(sliceNow() ? { slice: `${slice.field},${slice.axis},${/** @type {number} */ (slice.at).toFixed(3)}` } : {}),
           ...(voxel ? { voxel: voxel.cell.join(",") } : {}),
           ...(stage && !stage.fitted ? { eye: stage.eye().map((v) => v.toFixed(2)).join(",") } : {}),
