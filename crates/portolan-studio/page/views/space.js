@@ -21,8 +21,10 @@ const FIELDS = /** @type {[string, string][]} */ ([
   ["esdf", "ESDF"],
   ["occupancy", "occupancy"],
 ]);
-/** Milliseconds between pictures while a large mesh comes in: drawing it again for every part would take longer than it. */
+/** Milliseconds between pictures while a mesh comes in. */
 const LOADING = 300;
+/** A mesh of more triangles is drawn when all of it is there: drawing it again for every part would take longer than it. */
+const LARGE = 800_000;
 
 const cm = (/** @type {number} */ m) => `${(100 * m).toFixed(1).replace(/\.0$/, "")} cm`;
 const bytes = (/** @type {number | null} */ n) => (n === null ? "—" : n >= 1 << 20 ? `${(n / (1 << 20)).toFixed(1)} MiB` : `${(n / 1024).toFixed(0)} KiB`);
@@ -276,11 +278,11 @@ export default {
       }
       const now = performance.now();
       if (news || !before) {
-        if (body.mesh.pending === 0 || now - lastPicture > LOADING) {
+        if (body.mesh.pending === 0 || (now - lastPicture > LOADING && body.mesh.triangles < LARGE)) {
           lastPicture = now;
           stage?.draw();
         } else app.meter.picture();
-      } else stage?.draw();
+      } else if (body.mesh.pending === 0) stage?.draw();
       canvas.dataset.pending = String(body.mesh.pending);
     }
 
@@ -433,10 +435,12 @@ export default {
           if (!load.started) load.started = started;
           const answer = await ask(question);
           const arrived = performance.now();
-          await nextPicture();
+          // One answer per picture, so that the page stays light; a large mesh does not wait for pictures.
+          await (body?.mesh.triangles < LARGE ? nextPicture() : wait(0));
+          const taken = performance.now();
           app.meter.measure(() => take(answer));
           load.transfer += arrived - started;
-          load.take += performance.now() - arrived;
+          load.take += performance.now() - taken;
           load.bytes += Object.values(answer.arrays).reduce((n, a) => n + a.byteLength, 0);
           load.done = performance.now();
           if (goal === body.at) goal = null;

@@ -153,9 +153,7 @@ impl Made {
         if changed.is_empty() {
             return Ok(());
         }
-        self.drawn.change(&changed, &self.mesh)?;
-        self.drawn.count(&self.mesh);
-        Ok(())
+        self.drawn.change(&changed, &self.mesh)
     }
 
     /// The Euclidean field of the map as it is now. Gives the seconds that it took.

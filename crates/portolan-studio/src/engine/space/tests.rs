@@ -125,7 +125,8 @@ fn what_the_page_has_is_the_mesh() {
     drain(&mut space, &mut page, reply);
     assert!(page.triangles() == whole(&space));
     let (mut other, reply) = (Page::default(), ask(&mut space, json!({ "op": "open" })).unwrap());
-    drain(&mut space, &mut other, reply);
+    let reply = drain(&mut space, &mut other, reply);
+    assert_eq!(reply.body["mesh"]["triangles"], other.triangles().len());
     assert!(other.triangles() == page.triangles());
     // Other colours in the same places.
     for by in ["weight", "error", "height"] {
