@@ -12,7 +12,7 @@ export function image({ body, arrays }, field) {
   const [w, h] = body.shape;
   const values = /** @type {Float32Array} */ (arrays.values);
   const c = colors();
-  const ramp = diverging(c.negative, c.positive, [0.95, 0.75]);
+  const ramp = diverging(c.negative, c.positive);
   const words = new Uint32Array(w * h);
   for (let i = 0; i < values.length; i++) {
     const v = values[i];

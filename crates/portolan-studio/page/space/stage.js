@@ -253,8 +253,10 @@ function line(object, values) {
   object.geometry.setDrawRange(0, values.length / 3);
 }
 
-/** @param {any} gl */
+/** Who draws, without the layers between: of `ANGLE (vendor, Vulkan 1.3.0 (device (0x…)), driver)` the device. @param {any} gl */
 function rendererName(gl) {
   const info = gl.getExtension("WEBGL_debug_renderer_info");
-  return String(info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
+  const whole = String(info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
+  const device = /^ANGLE \([^,]*, (.*?)(, [^,]*)?\)$/.exec(whole)?.[1] ?? whole;
+  return device.replace(/ ?\(0x[0-9a-fA-F]+\)/, "").replace(/^Vulkan [\d.]+ \((.*)\)$/, "$1").slice(0, 60);
 }

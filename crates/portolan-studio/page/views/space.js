@@ -21,8 +21,10 @@ const FIELDS = /** @type {[string, string][]} */ ([
   ["esdf", "ESDF"],
   ["occupancy", "occupancy"],
 ]);
-/** Milliseconds between pictures while a large mesh comes in: drawing it again for every part would take longer than it. */
+/** Milliseconds between pictures while a mesh comes in. */
 const LOADING = 300;
+/** A mesh of more triangles is drawn when all of it is there: drawing it again for every part would take longer than it. */
+const LARGE = 800_000;
 
 const cm = (/** @type {number} */ m) => `${(100 * m).toFixed(1).replace(/\.0$/, "")} cm`;
 const bytes = (/** @type {number | null} */ n) => (n === null ? "—" : n >= 1 << 20 ? `${(n / (1 << 20)).toFixed(1)} MiB` : `${(n / 1024).toFixed(0)} KiB`);
@@ -220,7 +222,8 @@ export default {
       const clamp = slider({ id: "space-wmax", label: "W_max", values: [1, 2, 4, 8, 16, 32, 64, 128, 256], value: s.w_max, oninput: (v) => setCalmly({ w_max: v }) });
       const carve = toggle({ id: "space-carve", label: "Carve free space", value: s.carve, onchange: (v) => set({ carve: v }) });
       const halfLife = el("p", { class: "note", id: "space-half-life" }, `Half-life of what has gone: ${all.half_life.toFixed(1)} observations.`);
-      settings.replaceChildren(...(all.simulated ? [sensor.node] : []), resolution.node, truncation.node, clamp.node, halfLife, carve.node);
+      const occupancy = toggle({ id: "space-occupancy", label: "Occupancy too (slower)", value: s.occupancy, onchange: (v) => set({ occupancy: v }) });
+      settings.replaceChildren(...(all.simulated ? [sensor.node] : []), resolution.node, truncation.node, clamp.node, halfLife, carve.node, occupancy.node);
     }
 
     // --- answers -------------------------------------------------------------------------------------------------
@@ -236,6 +239,7 @@ export default {
         colorChoice();
         settingsControls();
         octree.disabled = !all.occupancy;
+        octree.title = all.occupancy ? "" : "Switch on occupancy in the settings";
         for (const id of ["play", "step", "restart", "frame"]) /** @type {any} */ (strip.querySelector(`#space-${id}`)).disabled = body.frames === 0;
       }
       by = body.color.by;
@@ -274,11 +278,11 @@ export default {
       }
       const now = performance.now();
       if (news || !before) {
-        if (body.mesh.pending === 0 || now - lastPicture > LOADING) {
+        if (body.mesh.pending === 0 || (now - lastPicture > LOADING && body.mesh.triangles < LARGE)) {
           lastPicture = now;
           stage?.draw();
         } else app.meter.picture();
-      } else stage?.draw();
+      } else if (body.mesh.pending === 0) stage?.draw();
       canvas.dataset.pending = String(body.mesh.pending);
     }
 
@@ -312,6 +316,8 @@ export default {
         flat.getContext("2d")?.clearRect(0, 0, flat.width, flat.height);
       }
       newCut = true;
+      // A map without occupancy is made again with it.
+      if (slice.field === "occupancy" && !all.occupancy && !all.fixed) set({ occupancy: true });
       drive();
     }
 
@@ -429,10 +435,12 @@ export default {
           if (!load.started) load.started = started;
           const answer = await ask(question);
           const arrived = performance.now();
-          await nextPicture();
+          // One answer per picture, so that the page stays light; a large mesh does not wait for pictures.
+          await (body?.mesh.triangles < LARGE ? nextPicture() : wait(0));
+          const taken = performance.now();
           app.meter.measure(() => take(answer));
           load.transfer += arrived - started;
-          load.take += performance.now() - arrived;
+          load.take += performance.now() - taken;
           load.bytes += Object.values(answer.arrays).reduce((n, a) => n + a.byteLength, 0);
           load.done = performance.now();
           if (goal === body.at) goal = null;
@@ -499,10 +507,10 @@ export default {
         if (first) {
           const answer = await ask({ op: "open" });
           app.meter.measure(() => take(answer));
-          const set = numbers(params.get("settings"), 4);
+          const set = numbers(params.get("settings"), 5);
           if (set && !all.fixed) {
             const sensor = params.get("sensor") ?? all.settings.sensor;
-            newSettings = { resolution: set[0], truncation: set[1], w_max: set[2], carve: set[3] !== 0, sensor };
+            newSettings = { resolution: set[0], truncation: set[1], w_max: set[2], carve: set[3] !== 0, occupancy: set[4] !== 0, sensor };
           }
           if (frameWanted !== null) goal = Math.max(0, Math.min(frameWanted, body.frames));
           else if (body.frames > 0) setPlaying(true);
@@ -526,7 +534,7 @@ export default {
         return {
           frame: String(body.at),
           color: by,
-          ...(all.fixed ? {} : { settings: [s.resolution, s.truncation, s.w_max, Number(s.carve)].map((v) => Number(v.toFixed(4))).join(","), sensor: s.sensor }),
+          ...(all.fixed ? {} : { settings: [s.resolution, s.truncation, s.w_max, Number(s.carve), Number(s.occupancy)].map((v) => Number(v.toFixed(4))).join(","), sensor: s.sensor }),
           ...(sliceNow() ? { slice: `${slice.field},${slice.axis},${/** @type {number} */ (slice.at).toFixed(3)}` } : {}),
           ...(voxel ? { voxel: voxel.cell.join(",") } : {}),
           ...(stage && !stage.fitted ? { eye: stage.eye().map((v) => v.toFixed(2)).join(",") } : {}),

@@ -100,6 +100,7 @@ impl Drawn {
             }
             self.pending.insert(key);
         }
+        self.triangles = self.places.keys().map(|&key| mesh.piece_size(key)[1]).sum();
         Ok(())
     }
 
@@ -150,11 +151,6 @@ impl Drawn {
             delta.indices.extend(piece.triangles.iter().flatten().map(|&v| v as u16));
         }
         delta
-    }
-
-    /// Counts triangles; once per change of the mesh.
-    pub(super) fn count(&mut self, mesh: &IncrementalMesh) {
-        self.triangles = self.places.keys().map(|&key| mesh.piece_size(key)[1]).sum();
     }
 
     /// Triangles of the whole.

@@ -25,7 +25,9 @@ pub(super) fn file(made: &Made, file: ExportFile) -> Result<Reply, Refusal> {
         }
         ExportFile::Octree => {
             let map = made.occupancy.as_ref().ok_or_else(|| {
-                Refusal::new("this map holds distances only; an octree is made of one that holds occupancy")
+                Refusal::new(
+                    "this map holds distances only; switch on occupancy in the settings for an octree",
+                )
             })?;
             let tree = Tree::from_bricks(map.store())
                 .ok_or_else(|| Refusal::new("an octree spans 2^28 cells at most, and the map is larger"))?;

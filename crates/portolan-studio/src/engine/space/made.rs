@@ -70,8 +70,8 @@ impl Made {
                 let anchor = start.map(|v| if (v / r).abs() < FAR_CELLS { 0.0 } else { (v / r).round() * r });
                 let config = settings.config(anchor, source.has_color())?;
                 let tsdf = SparseTsdf::new(config).map_err(Refusal::new)?;
-                let occupancy = settings.occupancy(*tsdf.lattice())?;
-                (tsdf, Some(occupancy))
+                let occupancy = settings.occupancy.then(|| settings.empty_occupancy(*tsdf.lattice()));
+                (tsdf, occupancy.transpose()?)
             }
         };
         let near = match source.map() {
@@ -153,9 +153,7 @@ impl Made {
         if changed.is_empty() {
             return Ok(());
         }
-        self.drawn.change(&changed, &self.mesh)?;
-        self.drawn.count(&self.mesh);
-        Ok(())
+        self.drawn.change(&changed, &self.mesh)
     }
 
     /// The Euclidean field of the map as it is now. Gives the seconds that it took.

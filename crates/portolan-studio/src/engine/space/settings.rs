@@ -26,6 +26,8 @@ pub(in crate::engine) struct Settings {
     pub(super) w_max: f64,
     /// Whether free space is fused, too.
     pub(super) carve: bool,
+    /// Whether a map that is occupied or free is made beside that of distances; it takes three times as long.
+    pub(super) occupancy: bool,
     /// What is carried through the simulated building; does nothing to recorded logs.
     pub(super) sensor: Sensor,
 }
@@ -50,6 +52,7 @@ impl Default for Settings {
             truncation: config.truncation,
             w_max: config.w_max.into(),
             carve: true,
+            occupancy: false,
             sensor: Sensor::default(),
         }
     }
@@ -82,7 +85,7 @@ impl Settings {
     }
 
     /// A map that is occupied or free beside that of distances.
-    pub(super) fn occupancy(&self, lattice: Lattice<3>) -> Result<SparseOccupancy, Refusal> {
+    pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<SparseOccupancy, Refusal> {
         SparseOccupancy::new(lattice, OccupancyModel::default(), OccupancySweep::Auto).map_err(Refusal::new)
     }
 }

@@ -17,7 +17,7 @@ use super::settings::Sensor;
 use crate::engine::{Logs, Refusal, SpaceSource};
 
 /// Scans of the lidar on its way through the building.
-const LIDAR_SCANS: usize = 60;
+const LIDAR_SCANS: usize = 40;
 /// Pictures of the camera on its way.
 const CAMERA_FRAMES: usize = 160;
 /// The camera's pixels along each side, as a share of 640 x 480.
@@ -162,7 +162,7 @@ impl Walk {
         // Downwards further than most lidars look, so that floors are whole; what escapes through the windows is not followed
         // far, since it is not what one wants to see.
         let lidar =
-            SpaceLidar { columns: 720, elevation: [-0.95, 0.4], max_range: 9.0, ..SpaceLidar::default() };
+            SpaceLidar { columns: 600, elevation: [-0.95, 0.4], max_range: 9.0, ..SpaceLidar::default() };
         let (scans, sensor) = match kind {
             Sensor::Lidar => (LIDAR_SCANS, SpaceSensor::Lidar(lidar)),
             Sensor::Camera => {

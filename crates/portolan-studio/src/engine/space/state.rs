@@ -275,7 +275,7 @@ impl Space {
         let seconds = if slice.field == Field::Esdf { self.measure()? } else { 0.0 };
         let made = self.made()?;
         if slice.field == Field::Occupancy && made.occupancy.is_none() {
-            return Err(Refusal::new("this map holds distances only, no occupancy"));
+            return Err(Refusal::new("this map holds distances only; switch on occupancy in the settings"));
         }
         let lattice = *made.tsdf.lattice();
         let Some(extent) = Extent::of(&made.tsdf) else {

@@ -19,7 +19,7 @@ fn ask(space: &mut Space, ask: Value) -> Result<Reply, Refusal> {
 }
 
 fn coarse() -> Value {
-    json!({ "op": "set", "settings": { "resolution": 0.2, "truncation": 0.6, "w_max": 64.0, "carve": true, "sensor": "lidar" } })
+    json!({ "op": "set", "settings": { "resolution": 0.2, "truncation": 0.6, "w_max": 64.0, "carve": true, "occupancy": true, "sensor": "lidar" } })
 }
 
 /// The page: it writes what it is told where it is told.
@@ -125,7 +125,8 @@ fn what_the_page_has_is_the_mesh() {
     drain(&mut space, &mut page, reply);
     assert!(page.triangles() == whole(&space));
     let (mut other, reply) = (Page::default(), ask(&mut space, json!({ "op": "open" })).unwrap());
-    drain(&mut space, &mut other, reply);
+    let reply = drain(&mut space, &mut other, reply);
+    assert_eq!(reply.body["mesh"]["triangles"], other.triangles().len());
     assert!(other.triangles() == page.triangles());
     // Other colours in the same places.
     for by in ["weight", "error", "height"] {
@@ -268,11 +269,11 @@ fn what_cannot_be_is_refused_in_words() {
     let mut session = Session::new(&Arc::new(Logs::default()), Limits::default(), &Clock::new(|| 0.0));
     for (ask, words) in [
         (
-            json!({ "op": "set", "settings": { "resolution": 0.0, "truncation": 0.6, "w_max": 64.0, "carve": true, "sensor": "lidar" } }),
+            json!({ "op": "set", "settings": { "resolution": 0.0, "truncation": 0.6, "w_max": 64.0, "carve": true, "occupancy": true, "sensor": "lidar" } }),
             "resolution",
         ),
         (
-            json!({ "op": "set", "settings": { "resolution": 0.1, "truncation": 9.0, "w_max": 64.0, "carve": true, "sensor": "lidar" } }),
+            json!({ "op": "set", "settings": { "resolution": 0.1, "truncation": 9.0, "w_max": 64.0, "carve": true, "occupancy": true, "sensor": "lidar" } }),
             "truncation",
         ),
         (json!({ "op": "pick", "origin": [0, 0, 0], "direction": [0, 0, 0], "slice": null }), "direction"),
