@@ -10,6 +10,7 @@ mod fusion;
 mod gallery;
 mod keys;
 mod page;
+mod radiance;
 
 use portolan_studio::engine::Logs;
 use portolan_studio::server::{Server, Settings};
