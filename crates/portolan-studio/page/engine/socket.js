@@ -14,17 +14,21 @@ export function connect(url = `ws://${location.host}/engine`) {
   /** @type {((why: string) => void)[]} */
   const listeners = [];
   let next = 1;
+  /** How many answers are awaited, for whoever must know that the page is at rest. */
+  const count = () => (document.body.dataset.awaited = String(waiting.size));
 
   socket.onmessage = ({ data }) => {
     if (typeof data !== "string") {
       const { id, answer } = decode(data);
       waiting.get(id)?.resolve(answer);
       waiting.delete(id);
+      count();
       return;
     }
     const message = JSON.parse(data);
     const who = waiting.get(message.id);
     waiting.delete(message.id);
+    count();
     if (message.error !== undefined) who?.reject(new Error(message.error));
     else who?.resolve({ body: message.ok, arrays: {} });
   };
@@ -44,6 +48,7 @@ export function connect(url = `ws://${location.host}/engine`) {
           const id = next++;
           return new Promise((resolve, reject) => {
             waiting.set(id, { resolve, reject });
+            count();
             socket.send(JSON.stringify({ id, view, ask }));
           });
         },

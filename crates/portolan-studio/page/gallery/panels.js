@@ -29,7 +29,7 @@ export function panels(meter, o) {
     const badge = el("span", { class: "badge", id: `gallery-${name}-badge` });
     const answer = el("p", { class: "answer", id: `gallery-${name}-answer` });
     const rows = METERS.map(([key, text]) => {
-      const bar = el("i");
+      const bar = el("i", { style: "width: 0" });
       const value = el("output", { id: `gallery-${name}-${key}` }, "–");
       const by = el("span", { class: "note" });
       const head = el("dt", { "data-meter": key }, text, by);

@@ -293,7 +293,20 @@ impl Page {
         self.wait_for(&format!(
             "document.getElementById({tab}).ariaSelected === 'true' && document.getElementById({section})?.checkVisibility()"
         ));
-        self.settle();
+        self.rest();
+    }
+
+    /// Waits until nothing is awaited of the engine, and all of it is drawn.
+    pub(crate) fn rest(&self) {
+        const AT_REST: &str = "document.body.dataset.awaited === '0'";
+        loop {
+            self.wait_for(AT_REST);
+            self.settle();
+            // What came may have been a reason to ask again.
+            if self.truth(AT_REST) {
+                return;
+            }
+        }
     }
 
     /// Saves a picture of the page, where `PORTOLAN_SCREENSHOTS` names a folder for them.
