@@ -1,4 +1,5 @@
 //! The studio's probe prints what `query` prints of the map that it exports.
+#![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
