@@ -3,6 +3,8 @@
 ({
   /** Texts with less contrast than WCAG 2.1 asks for (1.4.3, AA): 4.5, or 3 where the text is large. */
   contrast() {
+    // What fades from one colour to another is judged where it rests.
+    for (const animation of document.getAnimations()) if (Number.isFinite(animation.effect?.getComputedTiming().endTime)) animation.finish();
     const canvas = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
     /** Any CSS colour as [r, g, b, alpha], each from 0 to 1. */
     const parsed = new Map();
@@ -65,9 +67,15 @@
   /** What the keyboard must reach: a number for each, kept as `data-stop`. Tabs that are not open are reached by arrows. */
   stops() {
     const all = [...document.querySelectorAll("button, select, input, textarea, a[href], summary, canvas[tabindex]")];
+    for (const e of all) delete e.dataset.stop;
     const reached = all.filter((e) => e.checkVisibility({ visibilityProperty: true }) && !e.disabled && !e.matches("[role=tab][aria-selected=false], dialog *"));
     reached.forEach((e, i) => (e.dataset.stop = String(i)));
     return reached.map((e) => `${e.tagName.toLowerCase()}#${e.id}`);
+  },
+
+  /** Those that can still be used: a view that plays takes some away, and gives others. */
+  usable() {
+    return [...document.querySelectorAll("[data-stop]")].filter((e) => e.checkVisibility({ visibilityProperty: true }) && !e.disabled).map((e) => Number(e.dataset.stop));
   },
 
   /** Which of them has the focus now, and whether one sees it. */

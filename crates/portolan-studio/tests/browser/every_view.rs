@@ -111,7 +111,8 @@ fn the_keyboard_reaches_every_control_and_gets_away_again() {
                 break;
             }
         }
-        let missed: Vec<_> = missed.into_iter().map(|i| &stops[i]).collect();
+        let usable: BTreeSet<usize> = serde_json::from_value(audit(&page, "usable")).unwrap();
+        let missed: Vec<_> = missed.into_iter().filter(|i| usable.contains(i)).map(|i| &stops[i]).collect();
         assert!(missed.is_empty(), "{view}: Tab does not reach {missed:?}");
     }
     page.assert_no_errors();

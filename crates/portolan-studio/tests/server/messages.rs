@@ -27,6 +27,17 @@ const QUESTIONS: &[&str] = &[
     r#"{"id":16,"view":"radiance","ask":{"op":"go_on","channels":"spread","optimizer":"descent"}}"#,
     r#"{"id":17,"view":"radiance","ask":{"op":"step","steps":3}}"#,
     r#"{"id":18,"view":"radiance","ask":{"op":"look","ray":1,"bin":20}}"#,
+    r#"{"id":19,"view":"gallery","ask":{"op":"open","have":null}}"#,
+    r#"{"id":20,"view":"gallery","ask":{"op":"run","workload":"distance","probes":100}}"#,
+    r#"{"id":21,"view":"gallery","ask":{"op":"answers","at":[2.2,4.5]}}"#,
+    r#"{"id":22,"view":"gallery","ask":{"op":"trees"}}"#,
+    r#"{"id":23,"view":"space","ask":{"op":"open"}}"#,
+    r#"{"id":24,"view":"space","ask":{"op":"step","frames":1}}"#,
+    r#"{"id":25,"view":"space","ask":{"op":"color","by":"error"}}"#,
+    r#"{"id":26,"view":"space","ask":{"op":"slice","slice":{"field":"tsdf","axis":2,"at":1.0}}}"#,
+    r#"{"id":27,"view":"space","ask":{"op":"pick","origin":[1,1,1],"direction":[1,0,0],"slice":{"field":"occupancy","axis":0,"at":2.0}}}"#,
+    r#"{"id":28,"view":"space","ask":{"op":"voxel","cell":[10,10,10]}}"#,
+    r#"{"id":29,"view":"space","ask":{"op":"history"}}"#,
 ];
 
 /// Values that numbers, words and lists are replaced with.
@@ -125,7 +136,9 @@ fn changed(question: &str, change: &Change) -> String {
 /// Thousands of scans are allowed and take seconds: nothing to be learnt from them here.
 fn takes_long(message: &str) -> bool {
     let Ok(message) = serde_json::from_str::<Value>(message) else { return false };
-    ["scan", "scans", "steps"].iter().any(|k| message["ask"][k].as_f64().is_some_and(|n| n > 20.0))
+    ["scan", "scans", "steps", "frame", "frames"]
+        .iter()
+        .any(|k| message["ask"][k].as_f64().is_some_and(|n| n > 20.0))
 }
 
 fn logs() -> [Arc<Logs>; 2] {
@@ -162,7 +175,7 @@ fn check(message: &str, answer: &Wire) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
 
     #[test]
     fn every_message_is_answered(
