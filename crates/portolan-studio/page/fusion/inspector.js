@@ -107,7 +107,7 @@ export class Inspector {
     });
     this.plot.set([events.map((_, i) => i + 1), events.map((e) => e[3]), events.map((e) => e[5]), closed]);
     this.note.textContent = decay
-      ? `Since the chair was moved: D decays to ${decay.target.toFixed(3)} m with λ = W_max / (W_max + w) = ${decay.lambda.toFixed(4)}, half of it in ${decay.half_life.toFixed(2)} observations of weight ${decay.weight.toFixed(2)} (dashed).`
+      ? `Since the chair was moved: D decays to ${decay.target.toFixed(3)} m with λ = W_max / (W_max + w) = ${decay.lambda.toFixed(4)}, half of it in ${decay.half_life.toFixed(2)} observations of weight ${decay.weight.toFixed(2)} (dashed). It had W = ${events[decay.since][2].toFixed(2)} then; below W_max a cell forgets faster than that.`
       : "";
   }
 
