@@ -32,6 +32,7 @@
 //! and whatever the bytes are, the result is a value or an [`IoError`] whose one line names file, place, field,
 //! value, and what to do. Every writer goes through [`write_atomic`], so that no half file is left behind.
 
+mod answer_row;
 mod bytes;
 mod carmen;
 mod container;
@@ -61,6 +62,9 @@ mod svg;
 mod testing;
 mod xyz;
 
+pub use answer_row::{
+    AnswerRow, AnswerStatus, HELD_BACK, certified_reach, write_answer, write_answer_header,
+};
 pub use bytes::{Compression, Input, open, write_atomic};
 pub use carmen::{
     CarmenLog, CarmenScan, CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage, TimeOrder,
@@ -93,7 +97,7 @@ pub use ply::{PlyMesh, read_ply_cloud, read_ply_mesh, write_ply_cloud};
 pub use points::{
     CloudGrid, PointCloudFile, PointFormat, RefusedPoints, Viewpoint, parse_points, point_format, read_points,
 };
-pub use points_csv::{AnswerRow, AnswerStatus, QueryPoints, write_answer, write_answer_header};
+pub use points_csv::QueryPoints;
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};
 pub use scan_graph::{ScanGraphNode, read_scan_graph};
 pub use svg::{SvgStyle, write_svg};

@@ -1,6 +1,5 @@
-//! Points to ask at, and rows of answers, as CSV.
+//! Points to ask at, as CSV.
 
-use std::io::{self, Write};
 use std::path::Path;
 
 use crate::IoError;
@@ -94,86 +93,13 @@ impl QueryPoints {
     }
 }
 
-/// What a row says about its distance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AnswerStatus {
-    /// The distance is known.
-    Known,
-    /// The map does not know.
-    Unknown,
-    /// At least so far.
-    Saturated,
-    /// Outside of the map.
-    Outside,
-}
-
-impl AnswerStatus {
-    /// The word in the file.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Known => "known",
-            Self::Unknown => "unknown",
-            Self::Saturated => "saturated",
-            Self::Outside => "outside",
-        }
-    }
-}
-
-/// One row of answers; `None` becomes an empty field.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AnswerRow<const D: usize> {
-    /// The query point (metres).
-    pub point: [f64; D],
-    /// What is known about the distance.
-    pub status: AnswerStatus,
-    /// Probability of being occupied.
-    pub occupancy: Option<f64>,
-    /// Signed distance (metres).
-    pub distance: Option<f64>,
-    /// Certified lower bound (metres).
-    pub lower: Option<f64>,
-    /// Certified upper bound (metres).
-    pub upper: Option<f64>,
-    /// Gradient of the distance.
-    pub gradient: Option<[f64; D]>,
-}
-
-/// Writes the header line of [`write_answer`]'s rows.
-///
-/// # Errors
-/// Those of the writer.
-pub fn write_answer_header<const D: usize>(w: &mut impl Write) -> io::Result<()> {
-    let (z, gz) = if D == 3 { (",z", ",gz") } else { ("", "") };
-    writeln!(w, "x,y{z},status,occupancy,distance,lower,upper,gx,gy{gz}")
-}
-
-/// Writes one row: `x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz]`. Numbers are written so that
-/// reading gives the same double.
-///
-/// # Errors
-/// Those of the writer.
-pub fn write_answer<const D: usize>(w: &mut impl Write, row: &AnswerRow<D>) -> io::Result<()> {
-    for (k, v) in row.point.iter().enumerate() {
-        write!(w, "{}{v}", if k == 0 { "" } else { "," })?;
-    }
-    write!(w, ",{}", row.status.word())?;
-    let gradient = (0..D).map(|k| row.gradient.map(|g| g[k]));
-    for field in [row.occupancy, row.distance, row.lower, row.upper].into_iter().chain(gradient) {
-        match field {
-            Some(v) => write!(w, ",{v}")?,
-            None => write!(w, ",")?,
-        }
-    }
-    writeln!(w)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::bad_bytes;
 
     fn parse(text: impl Into<Vec<u8>>) -> Result<QueryPoints, IoError> {
-        QueryPoints::parse(Input::from_reader(io::Cursor::new(text.into()), "q.csv".as_ref())?)
+        QueryPoints::parse(Input::from_reader(std::io::Cursor::new(text.into()), "q.csv".as_ref())?)
     }
 
     #[test]
@@ -201,36 +127,6 @@ mod tests {
             let error = parse(text).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");
         }
-    }
-
-    #[test]
-    fn missing_answers_are_empty_fields() {
-        let mut out = Vec::new();
-        write_answer_header::<2>(&mut out).unwrap();
-        let row = AnswerRow {
-            point: [0.1, 2.0],
-            status: AnswerStatus::Known,
-            occupancy: Some(0.25),
-            distance: Some(-1.5),
-            lower: Some(-1.6),
-            upper: None,
-            gradient: Some([0.0, 1.0]),
-        };
-        write_answer(&mut out, &row).unwrap();
-        let none = AnswerRow {
-            point: [1.0, 2.0, 3.0],
-            status: AnswerStatus::Outside,
-            occupancy: None,
-            distance: None,
-            lower: None,
-            upper: None,
-            gradient: None,
-        };
-        write_answer_header::<3>(&mut out).unwrap();
-        write_answer(&mut out, &none).unwrap();
-        let expected = "x,y,status,occupancy,distance,lower,upper,gx,gy\n0.1,2,known,0.25,-1.5,-1.6,,0,1\n\
-                        x,y,z,status,occupancy,distance,lower,upper,gx,gy,gz\n1,2,3,outside,,,,,,,\n";
-        assert_eq!(String::from_utf8(out).unwrap(), expected);
     }
 
     #[test]

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Clearance, ClearanceField, Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
+use portolan::field::{Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map::{MapRepr, OccupancySweep, SparseOccupancy};
 use portolan::store::Store;
 use portolan_io::{
-    AnswerRow, AnswerStatus, EsdfBin, EsdfFile, Input, MapCell, MapFile, MapServerMap, OctomapTree,
-    QueryPoints, SpaceMapFile, write_answer, write_answer_header,
+    AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
+    SpaceMapFile, certified_reach, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
@@ -146,34 +146,6 @@ struct Certified<const D: usize> {
     limit: f64,
 }
 
-/// Cells that a field is maintained beyond what is said of it, so that a saturated answer is a certified one: bounds fall
-/// short of distances by less.
-const BEYOND: f64 = 2.0;
-
-impl<const D: usize> Certified<D> {
-    fn bounds(&self, p: [f64; D], unknown: UnknownSpace) -> Option<Clearance> {
-        match self.field.clearance(p, unknown) {
-            Answer::Known(c) | Answer::Saturated(c) => Some(c),
-            Answer::Unknown | Answer::Outside => None,
-        }
-    }
-
-    /// Fills in the bounds, and what nothing is nearer than.
-    fn complete(&self, p: [f64; D], row: &mut AnswerRow<D>) {
-        let surface = self.bounds(p, UnknownSpace::Optimistic);
-        let far = surface.is_some_and(|c| c.lower >= self.limit);
-        if far {
-            row.status = AnswerStatus::Saturated;
-            row.distance = row.distance.map(|d| self.limit.copysign(d));
-            row.gradient = None;
-        }
-        let surface_only = self.unknown == UnknownSpace::Optimistic;
-        let asked = if surface_only { surface } else { self.bounds(p, self.unknown) };
-        row.lower = asked.map(|c| if far { c.lower.min(self.limit) } else { c.lower });
-        row.upper = asked.map(|c| c.upper).filter(|u| u.is_finite() && !(far && surface_only));
-    }
-}
-
 /// What a field in bricks answers. Only the accurate method certifies.
 fn sparse<const D: usize>(
     field: SparseEsdf<D>,
@@ -182,7 +154,7 @@ fn sparse<const D: usize>(
 ) -> (Distance<D>, Option<Certified<D>>) {
     let unknown = args.unknown.map_or(UnknownSpace::Optimistic, UnknownArg::space);
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
-    let reach = f64::from(field.max_distance()) - BEYOND * field.lattice().resolution;
+    let reach = certified_reach(&field);
     // Bricks are shared.
     let certified = certifies.then(|| Certified { field: field.clone(), unknown, limit: limit.min(reach) });
     (Box::new(move |p| field.distance_and_gradient(p)), certified)
@@ -250,7 +222,7 @@ fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
         how.method = args.esdf.unwrap_or_default().method();
         how.unknown = args.unknown == Some(UnknownArg::Pessimistic);
         if how.method == EsdfMethod::Accurate {
-            how.max_distance += BEYOND * map.store.lattice().resolution;
+            how.max_distance += HELD_BACK * map.store.lattice().resolution;
         }
         sparse(SparseEsdf::of(&map.store, &how), max_distance, args)
     });
@@ -330,40 +302,14 @@ impl<const D: usize> Field<D> {
     fn answer(&self, point: [f64; D]) -> AnswerRow<D> {
         let p = self.world_from_field.inverse().transform_point(point);
         let occupancy = (self.occupancy)(p);
-        let mut row = AnswerRow {
-            point,
-            status: AnswerStatus::Unknown,
-            occupancy: occupancy.known(),
-            distance: None,
-            lower: None,
-            upper: None,
-            gradient: None,
-        };
         let Some(distance) = &self.distance else {
-            if occupancy == Answer::Outside {
-                row.status = AnswerStatus::Outside;
-            }
-            return row;
+            let nothing = if occupancy == Answer::Outside { Answer::Outside } else { Answer::Unknown };
+            return AnswerRow::of(point, occupancy.known(), nothing);
         };
-        match distance(p) {
-            Answer::Known((d, gradient)) => {
-                row.status = AnswerStatus::Known;
-                row.distance = Some(d);
-                row.gradient = Some(self.world_from_field.rotate(gradient));
-            }
-            Answer::Saturated((d, _)) => {
-                row.status = AnswerStatus::Saturated;
-                row.distance = Some(d);
-                // Bounds are about the magnitude; the side is the distance's sign.
-                row.lower = Some(d.abs());
-            }
-            Answer::Unknown => {}
-            Answer::Outside => row.status = AnswerStatus::Outside,
-        }
-        if matches!(row.status, AnswerStatus::Known | AnswerStatus::Saturated)
-            && let Some(certified) = &self.clearance
-        {
-            certified.complete(p, &mut row);
+        let distance = distance(p).map(|(d, gradient)| (d, self.world_from_field.rotate(gradient)));
+        let mut row = AnswerRow::of(point, occupancy.known(), distance);
+        if let Some(certified) = &self.clearance {
+            row.certify(&certified.field, p, certified.unknown, certified.limit);
         }
         row
     }

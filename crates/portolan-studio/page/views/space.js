@@ -396,12 +396,15 @@ export default {
     async function drive() {
       if (driving || !visible) return;
       driving = true;
+      /** The next part of a large mesh, which the engine makes while this one is taken in. @type {ReturnType<typeof ask> | null} */
+      let ahead = null;
       try {
-        while (visible) {
+        while (visible || ahead) {
           const started = performance.now();
           /** @type {object | null} */
           let question = null;
-          if (!all) question = { op: "open" };
+          if (ahead) question = { op: "mesh" };
+          else if (!all) question = { op: "open" };
           else if (newSettings) {
             const at = body.at;
             question = { op: "set", settings: newSettings };
@@ -433,8 +436,14 @@ export default {
             continue;
           }
           if (!load.started) load.started = started;
-          const answer = await ask(question);
+          const answer = await (ahead ?? ask(question));
           const arrived = performance.now();
+          ahead = null;
+          if (answer.body.mesh.pending > 0 && answer.body.mesh.triangles >= LARGE && !newSettings && !newColor) {
+            ahead = ask({ op: "mesh" });
+            // It is waited for below; until then nobody else need hear that it failed.
+            ahead.catch(() => {});
+          }
           // One answer per picture, so that the page stays light; a large mesh does not wait for pictures.
           await (body?.mesh.triangles < LARGE ? nextPicture() : wait(0));
           const taken = performance.now();
@@ -491,7 +500,6 @@ export default {
         const first = !all;
         const wanted = params.get("frame");
         const frameWanted = wanted !== null && Number.isInteger(Number(wanted)) ? Number(wanted) : null;
-        if (params.has("color")) newColor = params.get("color");
         const cutWanted = (params.get("slice") ?? "").split(",");
         const cutAtWanted = Number(cutWanted[2]);
         if (FIELDS.some(([id]) => id === cutWanted[0]) && ["0", "1", "2"].includes(cutWanted[1]) && Number.isFinite(cutAtWanted)) {
@@ -516,6 +524,9 @@ export default {
           else if (body.frames > 0) setPlaying(true);
           app.say(all.fixed ? `${all.name}: a map that was made before.` : `${all.name}: ${body.frames} frames.`);
         } else if (frameWanted !== null) goal = Math.max(0, Math.min(frameWanted, body.frames));
+        const color = params.get("color");
+        // A link may come from another log, whose surface can be coloured in other ways.
+        if (all.colors.some((/** @type {any} */ c) => c.by === color && !c.refused)) newColor = color;
         drive();
         stage?.draw();
       },

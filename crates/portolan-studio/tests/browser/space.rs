@@ -1,0 +1,114 @@
+//! The view of space: it plays, a voxel tells what the engine knows of it, slices and links show what they say.
+
+use serde_json::{Value, json};
+
+use super::{Page, Studio};
+
+/// Metres as the view writes them.
+fn metres(value: &Value) -> String {
+    match value.as_f64() {
+        None => "unknown".into(),
+        Some(v) => format!("{}{:.4} m", if v >= 0.0 { '+' } else { '\u{2212}' }, v.abs()),
+    }
+}
+
+/// Waits until all frames that were asked for are fused, and all of the mesh is drawn.
+fn wait_drawn(page: &Page, at: &str) {
+    page.wait_text("space-at", at);
+    page.wait_for("document.getElementById('space-canvas').dataset.pending === '0'");
+    page.rest();
+}
+
+fn cell_shown(page: &Page) -> Vec<i32> {
+    page.text("voxel-cell").split(", ").map(|n| n.parse().unwrap()).collect()
+}
+
+#[test]
+fn plays_and_a_voxel_in_the_middle_tells_its_filter() {
+    let Some(studio) = Studio::start() else { return };
+    let page = studio.open("view=space&frame=4");
+    wait_drawn(&page, "4 of 40");
+    assert!(page.ask("space", json!({ "op": "mesh" }))["mesh"]["triangles"].as_u64().unwrap() > 1000);
+    page.focus("space-canvas");
+    page.press("Enter");
+    page.wait_for("document.getElementById('voxel-cell').checkVisibility()");
+    page.press("n");
+    wait_drawn(&page, "5 of 40");
+    page.wait_text("voxel-told", "of the frames observed it");
+    let cell = cell_shown(&page);
+    let told = page.ask("space", json!({ "op": "voxel", "cell": cell }));
+    assert_eq!(page.text("voxel-distance"), metres(&told["distance"]));
+    assert_eq!(page.text("voxel-weight"), format!("{:.2}", told["weight"].as_f64().unwrap()));
+    assert_eq!(page.text("voxel-truth"), metres(&told["truth"]));
+    let history = page.ask("space", json!({ "op": "history" }));
+    let last = history["events"].as_array().unwrap().last().unwrap();
+    assert_eq!(page.text("event-observation"), metres(&last[3]));
+    assert_eq!(page.text("event-gain"), format!("{:.4}", last[4].as_f64().unwrap()));
+    assert_eq!(page.text("event-posterior"), metres(&last[5]));
+    // What the filter came to is what the map holds.
+    assert_eq!(page.text("event-posterior"), page.text("voxel-distance"));
+    page.press("x");
+    page.wait_for(&format!(
+        "document.getElementById('voxel-cell').textContent.startsWith('{}, ')",
+        cell[0] + 1
+    ));
+    page.press("Escape");
+    page.wait_for("!document.getElementById('voxel-cell').checkVisibility()");
+    page.assert_no_errors();
+}
+
+#[test]
+fn slices_through_every_field_and_colours_of_the_surface() {
+    let Some(studio) = Studio::start() else { return };
+    let page = studio.open("view=space&frame=3");
+    wait_drawn(&page, "3 of 40");
+    for field in ["tsdf", "esdf", "occupancy"] {
+        page.choose("space-slice", field);
+        // A map without occupancy is made again with it.
+        page.wait_for(&format!("location.hash.includes('slice={field}')"));
+        wait_drawn(&page, "3 of 40");
+        page.wait_text("space-legend", "Slice, ");
+        page.screenshot(&format!("space-slice-{field}"));
+    }
+    let before = page.text("space-cut-note");
+    page.focus("space-canvas");
+    page.press("]");
+    page.rest();
+    assert_eq!(page.text("space-cut-note"), before);
+    for color in ["weight", "error", "height"] {
+        page.choose("space-color", color);
+        page.wait_for(&format!("location.hash.includes('color={color}')"));
+        wait_drawn(&page, "3 of 40");
+    }
+    page.choose("space-slice", "none");
+    page.press("ArrowLeft");
+    page.assert_no_errors();
+}
+
+#[test]
+fn a_link_shows_the_same_and_files_can_be_taken_away() {
+    let Some(studio) = Studio::start() else { return };
+    let page = studio.open("view=space&frame=3&color=error&slice=tsdf,2,1.0");
+    wait_drawn(&page, "3 of 40");
+    page.focus("space-canvas");
+    page.press("Enter");
+    page.wait_for("location.hash.includes('voxel=')");
+    let link = page.eval("location.hash.slice(1)");
+    let other = studio.open(link.as_str().unwrap());
+    wait_drawn(&other, "3 of 40");
+    other.wait_text("voxel-cell", &page.text("voxel-cell"));
+    for id in ["voxel-distance", "voxel-weight", "space-triangles"] {
+        assert_eq!(other.text(id), page.text(id), "{id}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    page.save_into(folder.path());
+    for (file, name) in [("ply", "mesh.ply"), ("glb", "mesh.glb"), ("esdf", "esdf.bin")] {
+        page.click(&format!("space-{file}"));
+        assert!(page.wait_saved(&folder.path().join(name)).len() > 1000);
+    }
+    page.assert_no_errors();
+    // A colour that nobody can show is passed over.
+    let strange = studio.open("view=space&frame=1&color=plaid");
+    wait_drawn(&strange, "1 of 40");
+    strange.assert_no_errors();
+}
