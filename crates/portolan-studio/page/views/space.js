@@ -429,9 +429,11 @@ export default {
             if (slice.field !== "none" && cutAt !== body.revision && body.bounds) await askCut();
             else if (voxel && voxelAt !== body.revision) await askVoxel();
             else if (voxel?.history && voxel.history.looked_at !== null) {
+              const watched = voxel;
               const { body: history } = await ask({ op: "history" });
-              voxel.history = history;
-              app.meter.measure(() => inspector.history(history, voxel.recorded));
+              watched.history = history;
+              // Another may have been chosen meanwhile, or none.
+              if (voxel === watched) app.meter.measure(() => inspector.history(history, watched.recorded));
             } else break;
             continue;
           }
@@ -563,7 +565,7 @@ export default {
         if (event.key === "Home") return restart.click(), true;
         if (event.key === "End") return setPlaying(false), seek(body?.frames ?? 0), true;
         if (event.key === "Enter") return pick(0, 0), true;
-        if (event.key === "Escape" && voxel) return (voxel = null), look(null), true;
+        if (event.key === "Escape" && voxel) return look(null), true;
         const axis = "xyz".indexOf(k);
         if (k.length === 1 && axis >= 0 && voxel) {
           const cell = [...voxel.cell];

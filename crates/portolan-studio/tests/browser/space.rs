@@ -67,7 +67,7 @@ fn slices_through_every_field_and_colours_of_the_surface() {
         // A map without occupancy is made again with it.
         page.wait_for(&format!("location.hash.includes('slice={field}')"));
         wait_drawn(&page, "3 of 40");
-        page.wait_text("space-legend", "Slice, ");
+        page.wait_text("space-cut-legend", "Slice, ");
         page.screenshot(&format!("space-slice-{field}"));
     }
     let before = page.text("space-cut-note");
