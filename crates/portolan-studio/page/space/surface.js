@@ -3,6 +3,8 @@ import * as THREE from "../vendor/three.js";
 import { colors, rgb } from "../ui/theme.js";
 import { stops, texels } from "./ramps.js";
 
+/** A mesh of more triangles is drawn when all of it is there: drawing it again for every part would take longer than it. */
+export const LARGE = 800_000;
 const MODES = ["height", "color", "weight", "error"];
 /** Parts of the buffers that lie no further apart than this are sent to the graphics card in one go. */
 const GAP = 4096;
@@ -159,6 +161,8 @@ export class Surface {
     }
     for (const [start, end] of together(joined)) this.#touch("index", start, end - start);
     this.geometry.setDrawRange(0, indices);
+    // Whatever else is drawn meanwhile must not wait for triangles that are still to come.
+    this.mesh.visible = body.mesh.pending === 0 || body.mesh.triangles < LARGE;
     this.#color(body.color);
     return fresh || runs.length > 0 || holes.length > 0;
   }

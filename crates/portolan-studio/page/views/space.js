@@ -6,6 +6,7 @@ import { image, rampCss } from "../space/cut.js";
 import { Inspector } from "../space/inspector.js";
 import { gradient, stops } from "../space/ramps.js";
 import { Stage } from "../space/stage.js";
+import { LARGE } from "../space/surface.js";
 
 const SPEEDS = [2, 5, 10, 30, Infinity];
 const RESOLUTIONS = [0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3];
@@ -23,8 +24,6 @@ const FIELDS = /** @type {[string, string][]} */ ([
 ]);
 /** Milliseconds between pictures while a mesh comes in. */
 const LOADING = 300;
-/** A mesh of more triangles is drawn when all of it is there: drawing it again for every part would take longer than it. */
-const LARGE = 800_000;
 
 const cm = (/** @type {number} */ m) => `${(100 * m).toFixed(1).replace(/\.0$/, "")} cm`;
 const bytes = (/** @type {number | null} */ n) => (n === null ? "—" : n >= 1 << 20 ? `${(n / (1 << 20)).toFixed(1)} MiB` : `${(n / 1024).toFixed(0)} KiB`);
@@ -259,7 +258,7 @@ export default {
         "space-bytes-occupancy": bytes(body.bytes.occupancy),
         "space-bytes-esdf": bytes(body.bytes.esdf),
         "space-bytes-mesh": bytes(body.bytes.mesh),
-        "space-time": `${ms(body.seconds.tsdf)} + occupancy ${ms(body.seconds.occupancy)}`,
+        "space-time": body.bytes?.occupancy ? `${ms(body.seconds.tsdf)} + occupancy ${ms(body.seconds.occupancy)}` : ms(body.seconds.tsdf),
         "space-time-mesh": ms(body.seconds.mesh),
       });
       const why = body.full ?? (body.left_out.frames ? `${body.left_out.frames} frames were left out; the first: ${body.left_out.why}` : "");
@@ -515,6 +514,7 @@ export default {
         const cell = numbers(params.get("voxel"), 3);
         if (cell) newVoxel = cell;
         if (first) {
+          load.started = performance.now();
           const answer = await ask({ op: "open" });
           app.meter.measure(() => take(answer));
           const set = numbers(params.get("settings"), 5);

@@ -1,5 +1,11 @@
 //! The view of space: it plays, a voxel tells what the engine knows of it, slices and links show what they say.
 
+use portolan::cell::DistanceBrick;
+use portolan::geom::{BlockKey, Lattice};
+use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::store::Bricks;
+use portolan_studio::engine::{Logs, SpaceSource};
+use portolan_studio::server::Settings;
 use serde_json::{Value, json};
 
 use super::{Page, Studio};
@@ -111,4 +117,46 @@ fn a_link_shows_the_same_and_files_can_be_taken_away() {
     let strange = studio.open("view=space&frame=1&color=plaid");
     wait_drawn(&strange, "1 of 40");
     strange.assert_no_errors();
+}
+
+/// A surface that fills space, of four million triangles.
+fn gyroid() -> SparseTsdf {
+    const CELLS: i32 = 184;
+    const PERIOD: f64 = 16.0;
+    let mut store = Bricks::new(Lattice::new([0.0; 3], 0.05));
+    let bricks = CELLS / 8;
+    for i in 0..bricks * bricks * bricks {
+        let key = BlockKey([i % bricks, i / bricks % bricks, i / bricks / bricks]);
+        let value = |i: usize| {
+            let [x, y, z] = key.cell(i).map(|v| std::f64::consts::TAU * f64::from(v) / PERIOD);
+            (0.1 * (x.sin() * y.cos() + y.sin() * z.cos() + z.sin() * x.cos())) as f32
+        };
+        let distances: Vec<f32> = (0..512).map(value).collect();
+        store.insert(key, DistanceBrick::from_parts(&distances, &[4.0; 512]).unwrap()).unwrap();
+    }
+    SparseTsdf::from_stores(store, None, SparseTsdfConfig::default()).unwrap()
+}
+
+#[test]
+fn millions_of_triangles_are_one_draw_call() {
+    let space = SpaceSource::Map { name: "a gyroid".into(), tsdf: Box::new(gyroid()) };
+    let Some(studio) = Studio::with(Logs { space, ..Logs::default() }, &Settings::default()) else { return };
+    let page = studio.open("view=space");
+    page.wait_for("document.getElementById('space-canvas').dataset.pending === '0'");
+    page.rest();
+    let told = page.eval(
+        "(() => {
+            const { load, info } = document.getElementById('space-canvas');
+            const { calls, triangles } = info().render;
+            return { calls, triangles, seconds: (load.done - load.started) / 1000, transfer: load.transfer / 1000,
+                take: load.take / 1000, bytes: load.bytes, renderer: document.getElementById('meter').textContent };
+        })()",
+    );
+    // Said, not asserted: it is the machine's affair.
+    eprintln!("a large mesh: {told}");
+    eprintln!("bytes: {}", page.ask("space", json!({ "op": "mesh" }))["bytes"]);
+    assert!(told["triangles"].as_u64().unwrap() > 4_000_000, "{told}");
+    // The mesh, and the box around it.
+    assert!(told["calls"].as_u64().unwrap() <= 2, "{told}");
+    page.assert_no_errors();
 }
