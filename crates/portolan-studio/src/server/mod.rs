@@ -2,7 +2,7 @@
 //!
 //! | what a hostile or broken peer does | what happens |
 //! |---|---|
-//! | another web page sends its visitors here | refused: `Host` and `Origin` are checked ([`guard`]) |
+//! | another web page sends its visitors here | refused: `Host` and `Origin` are checked (`guard.rs`) |
 //! | a message is no JSON, of no view, of impossible values, or too long | an error in words, or the socket is closed |
 //! | too many tabs | refused with a reason, the others go on |
 //! | a tab asks for too large maps | refused before they are made |
