@@ -31,7 +31,15 @@ pub fn write_atomic(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), IoError> {
-    let path = path.as_ref();
+    let mut write = Some(write);
+    // Not generic from here on: compiled once, not once for each thing that is written.
+    replace(path.as_ref(), &mut |file| write.take().map_or(Ok(()), |write| write(file)))
+}
+
+fn replace(
+    path: &Path,
+    write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), IoError> {
     let failed = |e| IoError::os(path, "write it", e);
     // Through a symbolic link the file behind it is replaced, not the link.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -65,7 +73,7 @@ pub fn write_atomic(
     Ok(())
 }
 
-fn finish(file: File, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+fn finish(file: File, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     let mut writer = BufWriter::with_capacity(1 << 16, file);
     write(&mut writer)?;
     writer.flush()

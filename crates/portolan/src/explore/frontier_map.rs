@@ -5,7 +5,7 @@ use super::faces::BrickFrontier;
 use super::frontier::{Pieces, join};
 use crate::cell::SignedDistance;
 use crate::geom::{BlockKey, Lattice};
-use crate::in_order::in_order;
+use crate::parallel;
 use crate::store::{Bricks, Store};
 
 /// Settings of a [`FrontierMap`].
@@ -118,7 +118,7 @@ impl<const D: usize> FrontierMap<D> {
         dirty.dedup();
         dirty.retain(|key| store.brick(*key).is_some());
         let min_weight = self.settings.min_weight;
-        let pieces = in_order(&dirty, 16, |key| BrickFrontier::of(store, *key, min_weight));
+        let pieces = parallel::map(&dirty, 16, |key| BrickFrontier::of(store, *key, min_weight));
         for (key, piece) in dirty.iter().zip(pieces) {
             if piece.cells.is_empty() {
                 self.pieces.remove(key);

@@ -4,7 +4,7 @@ use super::cells::{Known, Reader};
 use crate::cell::SignedDistance;
 use crate::geom::vector::unit;
 use crate::geom::{Aabb, BlockKey, Pose, RayWalk};
-use crate::in_order::in_order;
+use crate::parallel;
 use crate::store::{Bricks, Store};
 use crate::sweep::clip;
 use rustc_hash::FxHashMap;
@@ -113,7 +113,7 @@ pub fn expected_gains<const D: usize>(
     directions_sensor: &[[f64; D]],
     settings: &GainSettings<D>,
 ) -> Vec<ViewGain> {
-    in_order(poses, 1, |pose| expected_gain(store, pose, directions_sensor, settings))
+    parallel::map(poses, 1, |pose| expected_gain(store, pose, directions_sensor, settings))
 }
 
 enum End {

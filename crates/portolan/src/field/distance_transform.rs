@@ -1,6 +1,7 @@
 //! The exact Euclidean distance transform of sampled functions.
 
 use super::envelope::{Envelope, lower_envelope};
+use crate::parallel;
 
 /// Lines per transposed tile: two tiles of 64 x 64 doubles fit into a level-two cache.
 const TILE: usize = 64;
@@ -33,28 +34,13 @@ pub fn squared_distance_transform<const D: usize>(f: &mut [f64], shape: [usize; 
     }
 }
 
-#[cfg(feature = "parallel")]
 fn lines(f: &mut [f64], n: usize) {
-    use rayon::prelude::*;
-    // Fewer lines than this are not worth another core.
     let chunk = n * TILE;
-    if f.len() < 8 * chunk {
-        serial_lines(f, n);
-    } else {
-        f.par_chunks_mut(chunk).for_each(|lines| serial_lines(lines, n));
-    }
-}
-
-#[cfg(not(feature = "parallel"))]
-fn lines(f: &mut [f64], n: usize) {
-    serial_lines(f, n);
-}
-
-fn serial_lines(f: &mut [f64], n: usize) {
-    let mut scratch = Envelope::default();
-    for line in f.chunks_exact_mut(n) {
-        lower_envelope(line, &mut scratch);
-    }
+    // Fewer lines than this are not worth another core.
+    let chunk = if f.len() < 8 * chunk { f.len().max(1) } else { chunk };
+    parallel::for_each(f.chunks_mut(chunk), Envelope::default, |lines, scratch| {
+        lines.chunks_exact_mut(n).for_each(|line| lower_envelope(line, scratch));
+    });
 }
 
 /// Moves the fastest axis, of `n` samples, to be the slowest.

@@ -6,9 +6,10 @@ use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
 use crate::cell::{LogOdds8, LogOddsValue, OccupancyModel, Planes};
 use crate::geom::{Aabb, Lattice, Pose, block_cells};
+use crate::parallel;
 use crate::scan::{Frame, LayoutFinder, Origin, PointScan, RangeImage, Scan, ScanStats, SphericalLayout};
 use crate::store::{Bricks, BricksFull, Store};
-use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, LONGEST_RAY, Projective, Ray, join};
+use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, LONGEST_RAY, Projective, Ray};
 use std::borrow::Cow;
 
 /// Boxes of more bricks than this are not searched for free space: single readings from far away are cheaper as rays.
@@ -224,7 +225,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         let full = BricksFull { limit, bricks: self.store.len(), bytes: self.store.memory_bytes() };
         let guard = std::mem::take(&mut self.guard);
         let exact = &mut self.exact;
-        let (planned, view) = join(
+        let (planned, view) = parallel::join(
             || exact.plan(lattice, bounds, count, &ray, &further, most),
             || view.map(|(pose, image)| Projective::new(image, pose, lattice, guard)),
         );

@@ -3,7 +3,7 @@
 use super::{Body, BodyCheck, Demand, Motion, MotionCheck, check_motion, check_pose};
 use crate::field::ClearanceField;
 use crate::geom::Pose;
-use crate::in_order::in_order;
+use crate::parallel;
 
 /// [`check_pose`] of many poses (world from body), in their order. On all cores with the feature `parallel`: the same
 /// answers.
@@ -37,7 +37,7 @@ pub fn check_poses<const D: usize>(
     poses: &[Pose<D>],
     demand: &Demand,
 ) -> Vec<BodyCheck> {
-    in_order(poses, 64, |pose| check_pose(field, body, pose, demand))
+    parallel::map(poses, 64, |pose| check_pose(field, body, pose, demand))
 }
 
 /// [`check_motion`] of many motions, in their order: the edges of a roadmap. On all cores with the feature `parallel`: the
@@ -48,5 +48,5 @@ pub fn check_motions<const D: usize>(
     motions: &[Motion<D>],
     demand: &Demand,
 ) -> Vec<MotionCheck> {
-    in_order(motions, 4, |motion| check_motion(field, body, motion, demand))
+    parallel::map(motions, 4, |motion| check_motion(field, body, motion, demand))
 }

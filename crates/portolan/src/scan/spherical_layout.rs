@@ -3,6 +3,7 @@
 use super::angles::atan2;
 use super::rings::{columns, extent, rings};
 use super::{Projection, RangeImage, RefusedBeams, Spherical};
+use crate::parallel;
 use std::f64::consts::TAU;
 
 /// Fewer points than this are no scan of rows and columns.
@@ -157,7 +158,9 @@ impl SphericalLayout {
 
     /// The same, and how many points have a pixel.
     pub(super) fn image_and_placed(&self, points: &[[f32; 3]], origin: [f64; 3]) -> (RangeImage, usize) {
-        let parts = each(points, |points| {
+        const TOGETHER: usize = 4096;
+        let chunks: Vec<_> = points.chunks(TOGETHER).collect();
+        let parts = parallel::map(&chunks, 1, |points| {
             let polar = Polar::of(points, origin);
             let pixels: Vec<u32> =
                 (0..points.len()).map(|i| self.pixel(&polar, i).map_or(NO_PIXEL, |p| p as u32)).collect();
@@ -215,24 +218,6 @@ impl Polar {
         }
         polar
     }
-}
-
-/// Points that are worth a thread.
-#[cfg(feature = "parallel")]
-const POINTS_A_PART: usize = 4096;
-
-#[cfg(feature = "parallel")]
-fn each<R: Send>(points: &[[f32; 3]], job: impl Fn(&[[f32; 3]]) -> R + Sync + Send) -> Vec<R> {
-    use rayon::prelude::*;
-    if rayon::current_num_threads() == 1 || points.len() <= POINTS_A_PART {
-        return vec![job(points)];
-    }
-    points.par_chunks(POINTS_A_PART).map(job).collect()
-}
-
-#[cfg(not(feature = "parallel"))]
-fn each<R>(points: &[[f32; 3]], job: impl Fn(&[[f32; 3]]) -> R) -> Vec<R> {
-    vec![job(points)]
 }
 
 #[cfg(test)]

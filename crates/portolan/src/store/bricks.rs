@@ -3,6 +3,7 @@
 use super::Store;
 use crate::cell::{Cell, Planes};
 use crate::geom::{BlockKey, Lattice, block_cells};
+use crate::parallel;
 use rustc_hash::FxHashMap;
 
 /// Keys that are taken out, fused and put back together: enough for every core, few enough that what is allocated
@@ -167,7 +168,9 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
                 let bytes = brick.as_ref().map_or(0, Planes::bytes);
                 Work { position: chunk * TOGETHER + i, slot, bytes, brick, cells: 0 }
             }));
-            each(&mut work, &scratch, |w, s| w.cells = change(w.position, &mut w.brick, s));
+            parallel::change_each(&mut work, 16, &scratch, |w, s| {
+                w.cells = change(w.position, &mut w.brick, s)
+            });
             let mut full = Ok(());
             for (w, &key) in work.drain(..).zip(keys) {
                 match (w.slot, w.brick) {
@@ -207,38 +210,16 @@ fn find<const D: usize>(
     keys: &[BlockKey<D>],
     found: &mut Vec<Option<u32>>,
 ) {
-    #[cfg(feature = "parallel")]
-    if keys.len() >= 1024 && rayon::current_num_threads() > 1 {
-        use rayon::prelude::*;
-        let each = keys.par_iter().with_min_len(256).map(|key| slots.get(key).copied());
-        return each.collect_into_vec(found);
-    }
+    const TOGETHER: usize = 256;
     found.clear();
-    found.extend(keys.iter().map(|key| slots.get(key).copied()));
-}
-
-#[cfg(feature = "parallel")]
-fn each<T: Send, S: Send>(
-    work: &mut [T],
-    scratch: impl Fn() -> S + Sync + Send,
-    change: impl Fn(&mut T, &mut S) + Sync + Send,
-) {
-    use rayon::prelude::*;
-    if rayon::current_num_threads() == 1 || work.len() < 16 {
-        let mut s = scratch();
-        return work.iter_mut().for_each(|w| change(w, &mut s));
-    }
-    work.par_chunks_mut(16).for_each_init(scratch, |s, chunk| chunk.iter_mut().for_each(|w| change(w, s)));
-}
-
-#[cfg(not(feature = "parallel"))]
-fn each<T: Send, S: Send>(
-    work: &mut [T],
-    scratch: impl Fn() -> S + Sync + Send,
-    change: impl Fn(&mut T, &mut S) + Sync + Send,
-) {
-    let mut s = scratch();
-    work.iter_mut().for_each(|w| change(w, &mut s));
+    found.resize(keys.len(), None);
+    parallel::for_each(
+        keys.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)),
+        || (),
+        |(keys, found), ()| {
+            keys.iter().zip(found).for_each(|(key, found)| *found = slots.get(key).copied());
+        },
+    );
 }
 
 impl<C: Cell, const D: usize> Store<C, D> for Bricks<C, D> {

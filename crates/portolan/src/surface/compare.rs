@@ -2,6 +2,7 @@
 
 use super::{Mesh, NearestSurface};
 use crate::geom::vector::{along, cross3, norm, sub};
+use crate::parallel;
 
 /// What a map is compared with.
 #[derive(Clone, Copy, Debug)]
@@ -180,15 +181,8 @@ fn distances(
 }
 
 /// In the order of the points.
-#[cfg(feature = "parallel")]
 fn measured(points: &[[f64; 3]], to: &NearestSurface) -> Vec<f64> {
-    use rayon::prelude::*;
-    points.par_iter().with_min_len(256).filter_map(|&p| to.distance(p)).collect()
-}
-
-#[cfg(not(feature = "parallel"))]
-fn measured(points: &[[f64; 3]], to: &NearestSurface) -> Vec<f64> {
-    points.iter().filter_map(|&p| to.distance(p)).collect()
+    parallel::map(points, 256, |&p| to.distance(p)).into_iter().flatten().collect()
 }
 
 #[cfg(test)]

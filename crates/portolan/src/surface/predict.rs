@@ -3,7 +3,7 @@
 use super::{RayCast, RayCaster};
 use crate::geom::Pose;
 use crate::geom::vector::{distance, sub, unit};
-use crate::in_order::in_order;
+use crate::parallel;
 use crate::scan::Frame;
 
 /// How measured ranges spread about predicted ones: a Gaussian for the surface that was predicted and a uniform share for
@@ -88,7 +88,7 @@ impl RangePredictions {
         let seen = seen(frame);
         let taken = at_most.min(seen.len());
         let taken: Vec<_> = (0..taken).map(|i| seen[i * seen.len() / taken]).collect();
-        let casts = in_order(&taken, 64, |&(origin, end)| {
+        let casts = parallel::map(&taken, 64, |&(origin, end)| {
             let direction = unit(sub(end, origin))?;
             let origin_world = world_from_sensor.transform_point(origin);
             Some((rays.cast(origin_world, world_from_sensor.rotate(direction)), distance(origin, end)))

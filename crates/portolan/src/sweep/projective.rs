@@ -7,6 +7,7 @@ use super::padded_image::{Cleaning, PaddedImage};
 use super::range_pyramid::RangePyramid;
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
+use crate::parallel;
 use crate::scan::{BeamCounts, RangeImage, RefusedBeams};
 
 /// How a range image becomes distances.
@@ -330,22 +331,11 @@ impl Search<'_> {
                 })
                 .collect();
         }
-        let each = |(node, known): &(Node, [f32; 2])| {
+        let parts = parallel::map(&nodes, 1, |(node, known): &(Node, [f32; 2])| {
             let mut found = Vec::new();
             self.descend(*node, *known, &mut found);
             found
-        };
-        #[cfg(feature = "parallel")]
-        let parts: Vec<Vec<Found>> = {
-            use rayon::prelude::*;
-            if rayon::current_num_threads() == 1 {
-                nodes.iter().map(each).collect()
-            } else {
-                nodes.par_iter().map(each).collect()
-            }
-        };
-        #[cfg(not(feature = "parallel"))]
-        let parts: Vec<Vec<Found>> = nodes.iter().map(each).collect();
+        });
         let mut all = parts.concat();
         all.sort_unstable_by_key(|found| found.0);
         all

@@ -4,8 +4,8 @@ use super::brick::{BrickElements, Scratch};
 use crate::cell::SignedDistance;
 use crate::field::sparse::{BrickCrossings, Crossings};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
+use crate::parallel;
 use crate::store::Bricks;
-use crate::surface::cubes::parallel_map;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -50,8 +50,9 @@ impl<const D: usize> SurfaceElements<D> {
         let threshold = if self.min_weight > 0.0 { self.min_weight } else { SMALLEST };
         // A brick's cells read the nodes of its upper neighbours.
         let dirty = around(changed, -1);
-        let made =
-            in_order(&dirty, Scratch::new, |scratch, key| BrickElements::of(store, key, threshold, scratch));
+        let made = parallel::map_with(&dirty, TOGETHER, Scratch::new, |&key, scratch| {
+            BrickElements::of(store, key, threshold, scratch)
+        });
         let mut touched = Vec::new();
         for (&key, made) in dirty.iter().zip(made) {
             if self.elements.get(&key).map(|e| &**e) != made.as_ref() {
@@ -62,7 +63,7 @@ impl<const D: usize> SurfaceElements<D> {
         // Its crossings are used by the cells of its lower neighbours too.
         let dirty = around(&touched, 1);
         let elements = &self.elements;
-        let made = in_order(&dirty, || (), |(), key| crossings(elements, key));
+        let made = parallel::map(&dirty, TOGETHER, |&key| crossings(elements, key));
         for (&key, made) in dirty.iter().zip(made) {
             if self.crossings.get(&key).map(|c| &**c) != made.as_ref() {
                 touched.push(key);
@@ -148,19 +149,6 @@ fn around<const D: usize>(keys: &[BlockKey<D>], sign: i32) -> Vec<BlockKey<D>> {
     all.sort_unstable();
     all.dedup();
     all
-}
-
-/// What `make` makes of every key, in the order of the keys.
-fn in_order<S: Send, R: Send, const D: usize>(
-    keys: &[BlockKey<D>],
-    scratch: impl Fn() -> S + Sync + Send,
-    make: impl Fn(&mut S, BlockKey<D>) -> R + Sync + Send,
-) -> Vec<R> {
-    let chunks: Vec<_> = keys.chunks(TOGETHER).collect();
-    let made = parallel_map(chunks.len(), scratch, |s, i| {
-        chunks[i].iter().map(|&key| make(s, key)).collect::<Vec<_>>()
-    });
-    made.into_iter().flatten().collect()
 }
 
 fn put<T, const D: usize>(map: &mut FxHashMap<BlockKey<D>, Arc<T>>, key: BlockKey<D>, made: Option<T>) {

@@ -4,6 +4,7 @@ use super::level::Level;
 use super::panel::{Panel, solve};
 use super::scan::scan;
 use super::transform::MaskCell;
+use crate::parallel;
 
 /// Columns that one task of the last pass solves.
 const COLUMNS: usize = 512;
@@ -68,7 +69,7 @@ impl<L: Level, const D: usize> Plan<L, D> {
             self.slabs::<M, N>(mask, slab, &mut value, &mut cells);
             let source = Source { value: &value, nearest: &cells, stride: slab };
             let scratch = || Panel::<L, N>::new(rows, !cells.is_empty());
-            for_each(targets(distance, nearest, slab), scratch, |mut target, panel| {
+            parallel::for_each(targets(distance, nearest, slab).into_iter(), scratch, |mut target, panel| {
                 self.columns(source, &mut target, panel, finish);
             });
         }
@@ -88,17 +89,16 @@ impl<L: Level, const D: usize> Plan<L, D> {
         let nx = self.shape[0];
         let with_nearest = !nearest.is_empty();
         let mut cells = nearest.chunks_mut(slab);
-        let tasks: Vec<_> = mask
+        let tasks = mask
             .chunks(slab)
             .zip(value.chunks_mut(slab))
-            .map(|(mask, value)| (mask, value, cells.next().unwrap_or_default()))
-            .collect();
+            .map(|(mask, value)| (mask, value, cells.next().unwrap_or_default()));
         let scratch = || Scratch::<L, N> {
             panel: Panel::new(if D == 3 { self.shape[1] } else { 0 }, with_nearest),
             value: vec![L::ZERO; if D == 3 { slab } else { 0 }],
             nearest: vec![0; if D == 3 && with_nearest { slab } else { 0 }],
         };
-        for_each(tasks, scratch, |(mask, value, nearest), scratch| {
+        parallel::for_each(tasks, scratch, |(mask, value, nearest), scratch| {
             if D == 2 {
                 return scan(mask, &self.squares, value, nearest);
             }
@@ -171,27 +171,4 @@ fn targets<'a>(distance: &'a mut [f32], nearest: &'a mut [u32], stride: usize) -
         blocks.iter_mut().zip(row.chunks_mut(COLUMNS)).for_each(|(block, part)| block.nearest.push(part));
     }
     blocks
-}
-
-/// Every task by itself, on all cores with the feature `parallel`.
-#[cfg(feature = "parallel")]
-fn for_each<T: Send, S>(
-    tasks: Vec<T>,
-    scratch: impl Fn() -> S + Sync + Send,
-    work: impl Fn(T, &mut S) + Sync + Send,
-) {
-    use rayon::prelude::*;
-    if rayon::current_num_threads() == 1 || tasks.len() == 1 {
-        let mut scratch = scratch();
-        tasks.into_iter().for_each(|task| work(task, &mut scratch));
-    } else {
-        tasks.into_par_iter().for_each_init(scratch, |scratch, task| work(task, scratch));
-    }
-}
-
-/// Every task by itself.
-#[cfg(not(feature = "parallel"))]
-fn for_each<T, S>(tasks: Vec<T>, scratch: impl Fn() -> S, work: impl Fn(T, &mut S)) {
-    let mut scratch = scratch();
-    tasks.into_iter().for_each(|task| work(task, &mut scratch));
 }

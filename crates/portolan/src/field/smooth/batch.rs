@@ -4,6 +4,7 @@ use super::cubic::Smooth;
 use crate::answer::Answer;
 use crate::field::{Esdf, SparseEsdf};
 use crate::geom::{BlockKey, vector};
+use crate::parallel;
 use multiversion::multiversion;
 
 /// Which interpolant a batch of points is answered from.
@@ -47,7 +48,6 @@ pub struct FieldSlots<'a, const D: usize> {
 const LANES: usize = 8;
 
 /// Points that one task answers.
-#[cfg(feature = "parallel")]
 const TASK: usize = 2048;
 
 /// What a batch needs of a field.
@@ -196,17 +196,15 @@ fn batch<S: Samples<D>, const D: usize>(
     let FieldSlots { distance, gradient, status } = out;
     let slots = [distance.len(), gradient.len(), status.len()];
     assert_eq!(slots, [points.len(); 3], "one slot for each point");
-    #[cfg(feature = "parallel")]
-    if points.len() > TASK && rayon::current_num_threads() > 1 {
-        use rayon::prelude::*;
-        let slots = distance.par_chunks_mut(TASK).zip(gradient.par_chunks_mut(TASK));
-        let slots = slots.zip(status.par_chunks_mut(TASK));
-        points.par_chunks(TASK).zip(slots).for_each(|(points, ((distance, gradient), status))| {
+    let slots = distance.chunks_mut(TASK).zip(gradient.chunks_mut(TASK)).zip(status.chunks_mut(TASK));
+    parallel::for_each(
+        points.chunks(TASK).zip(slots),
+        || (),
+        |(points, slots), ()| {
+            let ((distance, gradient), status) = slots;
             serial(field, points, interpolation, distance, gradient, status);
-        });
-        return;
-    }
-    serial(field, points, interpolation, distance, gradient, status);
+        },
+    );
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]

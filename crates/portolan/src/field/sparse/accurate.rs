@@ -1,11 +1,11 @@
 //! The accurate field: made, and kept up to date with its map.
 
+use super::TOGETHER;
 use super::anchors::{Anchor, bounds};
 use super::crossings::Crossings;
 use super::edges::edge_distances;
 use super::feature::Feature;
 use super::level::Input;
-use super::pass::map_each;
 use super::planes::{EsdfBrick, Nearest, Sides};
 use super::reach::{Reach, within};
 use super::settings::EsdfUpdate;
@@ -13,6 +13,7 @@ use super::sparse_esdf::SparseEsdf;
 use crate::cell::SignedDistance;
 use crate::field::elements::Refine;
 use crate::geom::{BlockKey, block_cells};
+use crate::parallel;
 use crate::store::Bricks;
 use std::sync::Arc;
 
@@ -63,7 +64,7 @@ impl<const D: usize> SparseEsdf<D> {
         changed: &[BlockKey<D>],
     ) -> (Vec<BlockKey<D>>, Vec<BlockKey<D>>) {
         let min_weight = self.settings.min_weight;
-        let sides = map_each(changed, |&key| {
+        let sides = parallel::map(changed, TOGETHER, |&key| {
             store.brick(key).map_or(Sides::default(), |brick| Sides::of(brick, min_weight))
         });
         let (mut moved, mut uncovered) = (Vec::new(), Vec::new());
@@ -96,7 +97,7 @@ impl<const D: usize> SparseEsdf<D> {
         let whole = dirty.len() == self.keys.len();
         let around =
             if whole { dirty.to_vec() } else { self.held(within(dirty, (limit.sqrt() + 1.0).powi(2))) };
-        let anchors = map_each(&around, |&key| {
+        let anchors = parallel::map(&around, TOGETHER, |&key| {
             let crossings = self.surface.brick(key)?;
             Anchor::of_crossings(key, crossings)
         });

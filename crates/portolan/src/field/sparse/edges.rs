@@ -2,10 +2,11 @@
 
 use super::crossings::BrickCrossings;
 use super::level::{Input, Level, inputs, reachable};
-use super::pass::{LeastWord, Pass, Planes, for_each};
+use super::pass::{LeastWord, Pass, Planes};
 use super::reach::{Reach, line_order, needed};
 use super::roots::Roots;
 use crate::geom::BlockKey;
+use crate::parallel;
 
 /// A brick with crossings.
 pub(super) type Edges<'a, const D: usize> = Input<&'a BrickCrossings<D>, D>;
@@ -57,8 +58,8 @@ fn in_space<R: Send, const D: usize>(
     // Slab by slab of the last axis, so that only what the last pass reads is held for the whole map.
     let slabs: Vec<i32> = before_z.chunk_by(|a, b| a.key.0[2] == b.key.0[2]).map(|s| s[0].key.0[2]).collect();
     let mut levels: Vec<[Level<D>; 2]> = slabs.iter().map(|_| Default::default()).collect();
-    for_each(
-        slabs.into_iter().zip(&mut levels).collect(),
+    parallel::for_each(
+        slabs.into_iter().zip(&mut levels),
         Spare::default,
         |(z, [along_z, in_slab]), spare| {
             let here = slab(&roots_z, z, |i| &i.key);

@@ -33,3 +33,6 @@ pub use dense::DenseEsdf;
 pub(crate) use feature::Feature;
 pub use settings::{EsdfMethod, EsdfUpdate, SparseEsdfSettings};
 pub use sparse_esdf::SparseEsdf;
+
+/// Bricks in one task of those that take microseconds each.
+const TOGETHER: usize = 32;

@@ -4,6 +4,7 @@ use super::level::{Input, lines};
 use super::min_plus::{Found, LANES, Panels, Row, Words, min_plus, min_plus_boxes, min_plus_words};
 use super::reach::{Reach, bricks_within};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
+use crate::parallel;
 use multiversion::multiversion;
 
 /// What a pass looks for on its lines, in bricks of type `B`.
@@ -177,7 +178,7 @@ impl<B: Sync, const D: usize> Pass<'_, B, D> {
             (values, words) = (behind, words_behind);
             tasks.push((line, here, words_here));
         }
-        for_each(tasks, Scratch::default, |(line, values, words), scratch| {
+        parallel::for_each(tasks.into_iter(), Scratch::default, |(line, values, words), scratch| {
             line.solve(&search, &rows, scratch, (values, words));
             let mut words = words.chunks_exact_mut(cells);
             for (n, (output, values)) in line.outputs.iter().zip(values.chunks_exact_mut(cells)).enumerate() {
@@ -197,7 +198,7 @@ impl<B: Sync, const D: usize> Pass<'_, B, D> {
         let lines: Vec<_> = self.lines().collect();
         let mut made: Vec<Vec<R>> = lines.iter().map(|line| Vec::with_capacity(line.outputs.len())).collect();
         let scratch = || (Scratch::default(), Vec::new(), Vec::new());
-        for_each(lines.into_iter().zip(&mut made).collect(), scratch, |(line, made), scratch| {
+        parallel::for_each(lines.into_iter().zip(&mut made), scratch, |(line, made), scratch| {
             let (scratch, values, words) = scratch;
             let count = line.outputs.len() * cells;
             values.resize(count, 0.0);
@@ -403,49 +404,4 @@ impl<B, const D: usize> Line<'_, B, D> {
             rows.collect(&found.words, words);
         }
     }
-}
-
-/// What `make` makes of each, in the same order; a few in one task.
-pub(super) fn map_each<T: Sync, R: Send>(of: &[T], make: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
-    map_each_with(of, || (), |item, ()| make(item))
-}
-
-/// [`map_each`] with scratch that is used again.
-pub(super) fn map_each_with<T: Sync, R: Send, S>(
-    of: &[T],
-    scratch: impl Fn() -> S + Sync + Send,
-    make: impl Fn(&T, &mut S) -> R + Sync + Send,
-) -> Vec<R> {
-    const TOGETHER: usize = 32;
-    let mut made: Vec<Vec<R>> = of.chunks(TOGETHER).map(|_| Vec::new()).collect();
-    let tasks = of.chunks(TOGETHER).zip(&mut made).collect();
-    for_each(tasks, scratch, |(of, made), scratch| {
-        *made = of.iter().map(|item| make(item, scratch)).collect()
-    });
-    made.into_iter().flatten().collect()
-}
-
-/// Every task by itself, on all cores with the feature `parallel`.
-#[cfg(feature = "parallel")]
-pub(super) fn for_each<T: Send, S>(
-    tasks: Vec<T>,
-    scratch: impl Fn() -> S + Sync + Send,
-    work: impl Fn(T, &mut S) + Sync + Send,
-) {
-    use rayon::prelude::*;
-    if rayon::current_num_threads() == 1 {
-        return one_by_one(tasks, scratch, work);
-    }
-    tasks.into_par_iter().for_each_init(scratch, |scratch, task| work(task, scratch));
-}
-
-/// Every task by itself.
-#[cfg(not(feature = "parallel"))]
-pub(super) fn for_each<T, S>(tasks: Vec<T>, scratch: impl Fn() -> S, work: impl Fn(T, &mut S)) {
-    one_by_one(tasks, scratch, work);
-}
-
-fn one_by_one<T, S>(tasks: Vec<T>, scratch: impl Fn() -> S, work: impl Fn(T, &mut S)) {
-    let mut scratch = scratch();
-    tasks.into_iter().for_each(|task| work(task, &mut scratch));
 }

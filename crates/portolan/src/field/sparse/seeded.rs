@@ -1,14 +1,15 @@
 //! The fields of cells: seeded within a band, and of a mask.
 
+use super::TOGETHER;
 use super::kernels::{CellRule, mask, sign};
 use super::level::Level;
-use super::pass::map_each;
 use super::planes::{EsdfBrick, Sides};
 use super::seeds::Survey;
 use super::settings::EsdfMethod;
 use super::sparse_esdf::SparseEsdf;
 use crate::cell::SignedDistance;
 use crate::geom::block_cells;
+use crate::parallel;
 use crate::store::Bricks;
 use std::sync::{Arc, OnceLock};
 
@@ -55,7 +56,7 @@ impl<const D: usize> SparseEsdf<D> {
         self.clear();
         let planes: Vec<_> = level.keys.iter().zip(level.values.chunks_exact(block_cells::<D>())).collect();
         let min_weight = self.settings.min_weight;
-        let bricks = map_each(&planes, |&(&key, plane)| {
+        let bricks = parallel::map(&planes, TOGETHER, |&(&key, plane)| {
             let sides = store.brick(key).map_or(Sides::default(), |brick| Sides::of(brick, min_weight));
             EsdfBrick { distance: Arc::new(OnceLock::from(Box::from(plane))), ..EsdfBrick::new(sides) }
         });

@@ -3,11 +3,12 @@
 use super::anchors::{Anchor, bounds, furthest_of_cells};
 use super::kernels::{CellRule, seeds, survey};
 use super::level::{Input, Level};
-use super::pass::{Least, Source, for_each, layout};
+use super::pass::{Least, Source, layout};
 use super::reach::Reach;
 use super::transform::squared_distances;
 use crate::cell::{DistanceBrick, SignedDistance};
 use crate::geom::{BlockKey, block_cells};
+use crate::parallel;
 use crate::store::Bricks;
 
 /// The seeds of one brick of the map, read when they are needed.
@@ -54,8 +55,8 @@ impl<'a, const D: usize> Survey<'a, D> {
         let keys = store.keys();
         let mut found: Vec<(bool, Option<Anchor<D>>)> = vec![(false, None); keys.len()];
         // A brick is too little for a task.
-        let tasks = keys.chunks(SURVEYED).zip(found.chunks_mut(SURVEYED)).collect();
-        for_each(
+        let tasks = keys.chunks(SURVEYED).zip(found.chunks_mut(SURVEYED));
+        parallel::for_each(
             tasks,
             || (),
             |(keys, found), ()| {

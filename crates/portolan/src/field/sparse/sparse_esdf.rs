@@ -1,12 +1,13 @@
 //! The Euclidean signed distance field of a map in bricks.
 
-use super::pass::map_each_with;
+use super::TOGETHER;
 use super::planes::EsdfBrick;
 use super::settings::{EsdfMethod, EsdfUpdate, SparseEsdfSettings};
 use crate::answer::Answer;
 use crate::cell::SignedDistance;
 use crate::field::elements::{Refine, SurfaceElements};
 use crate::geom::{BLOCK_EDGE, BlockKey, Lattice, interpolate, vector};
+use crate::parallel;
 use crate::store::{Bricks, Store};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -92,7 +93,7 @@ impl<const D: usize> SparseEsdf<D> {
     pub fn measure(&self) {
         let slots: Vec<usize> =
             (0..self.bricks.len()).filter(|&s| self.bricks[s].distance.get().is_none()).collect();
-        map_each_with(&slots, Refine::new, |&slot, refine| {
+        parallel::map_with(&slots, TOGETHER, Refine::new, |&slot, refine| {
             // A reader may be first.
             let _ = self.bricks[slot].distance.set(self.measured(slot, refine));
         });

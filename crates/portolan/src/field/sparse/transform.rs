@@ -1,9 +1,10 @@
 //! The squared distance transform of seeds in bricks.
 
 use super::level::{Input, Level, inputs, reachable};
-use super::pass::{Pass, Planes, Search, Source, for_each};
+use super::pass::{Pass, Planes, Search, Source};
 use super::reach::{Reach, line_order, needed};
 use crate::geom::BlockKey;
+use crate::parallel;
 
 /// The least over seeds of `f(p)` and of what the way to `p` costs by `search`, in squared cells, for all cells of the
 /// bricks of `outputs`: exact wherever it is not beyond the brick's budget, too large or infinite there. Bricks in the
@@ -26,7 +27,7 @@ where
     let outputs = outputs_of_passes(outputs);
     let slabs: Vec<_> = seeds.chunk_by(|a, b| a.key.0[last] == b.key.0[last]).collect();
     let mut levels: Vec<Level<D>> = slabs.iter().map(|_| Level::default()).collect();
-    for_each(slabs.into_iter().zip(&mut levels).collect(), Level::default, |(slab, level), spare| {
+    parallel::for_each(slabs.into_iter().zip(&mut levels), Level::default, |(slab, level), spare| {
         let z = slab[0].key.0[last];
         for axis in 0..last {
             let all = &outputs[axis];

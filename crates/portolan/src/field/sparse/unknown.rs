@@ -1,13 +1,15 @@
 //! How far the nearest cell is that was never observed.
 
+use super::TOGETHER;
 use super::anchors::{Anchor, bounds, furthest_of_cells};
 use super::level::Input;
-use super::pass::{LeastBox, Source, layout, map_each};
+use super::pass::{LeastBox, Source, layout};
 use super::reach::{Reach, within};
 use super::sparse_esdf::SparseEsdf;
 use super::transform::squared_distances;
 use crate::cell::{DistanceBrick, SignedDistance};
 use crate::geom::{BlockKey, block_cells};
+use crate::parallel;
 use crate::store::Bricks;
 use std::sync::Arc;
 
@@ -49,7 +51,7 @@ impl<const D: usize> SparseEsdf<D> {
         let whole = dirty.len() == self.keys.len();
         let around = if whole { dirty.to_vec() } else { self.held(within(dirty, (reach + 1.0).powi(2))) };
         let furthest = furthest_of_cells::<D>();
-        let anchors = map_each(&around, |&key| self.unknown_near(store, key, &furthest));
+        let anchors = parallel::map(&around, TOGETHER, |&key| self.unknown_near(store, key, &furthest));
         let mut wanted = dirty.iter().peekable();
         let outputs = around.iter().zip(bounds(&around, anchors, limit));
         // Ways are half a cell shorter along each axis than those from centre to centre, of which bricks know.
@@ -70,7 +72,7 @@ impl<const D: usize> SparseEsdf<D> {
             values.iter_mut().for_each(|v| *v = if *v <= limit { *v } else { f32::INFINITY });
         });
         let planes: Vec<&[f32]> = level.values.chunks_exact(block_cells::<D>()).collect();
-        let planes = map_each(&planes, |plane| Arc::<[f32]>::from(*plane));
+        let planes = parallel::map(&planes, TOGETHER, |plane| Arc::<[f32]>::from(*plane));
         for (key, plane) in level.keys.iter().zip(planes) {
             if let Some(slot) = self.slot(*key) {
                 self.bricks[slot].unknown = Some(plane);

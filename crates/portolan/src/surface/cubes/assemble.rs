@@ -1,7 +1,7 @@
 //! Pieces of bricks joined into one mesh.
 
-use super::parallel::for_each;
 use super::piece::{Attributes, Part, Piece, WORDS, bits, place_of};
+use crate::parallel;
 use crate::surface::Mesh;
 
 /// Where nodes sit: node `i` at `origin + (i + offset) * resolution`.
@@ -54,7 +54,7 @@ pub(super) fn assemble(pieces: &[(&Part, &Piece)], placement: &Placement, want: 
             }
         })
         .collect();
-    for_each(&mut places, Vec::new, |numbers, place| joint.fill(place, numbers));
+    parallel::change_each(&mut places, 1, Vec::new, |place, numbers| joint.fill(place, numbers));
     super::normals::complete(&mut mesh);
     mesh
 }
@@ -197,12 +197,11 @@ impl Joint<'_> {
 fn owners(pieces: &[(&Part, &Piece)]) -> Vec<[u32; 8]> {
     let order = |key: [i32; 3]| (key[2], key[1], key[0]);
     let mut owners = vec![[NONE; 8]; pieces.len()];
-    let mut chunks: Vec<_> = owners.chunks_mut(8 * TOGETHER).enumerate().collect();
-    for_each(
-        &mut chunks,
+    parallel::for_each(
+        owners.chunks_mut(8 * TOGETHER).enumerate(),
         || (),
-        |(), (chunk, owners)| {
-            let first = *chunk * 8 * TOGETHER;
+        |(chunk, owners), ()| {
+            let first = chunk * 8 * TOGETHER;
             let pairs = pieces[first..].iter().zip(owners.iter_mut());
             let mut at = [first; 8];
             for (n, ((_, piece), owners)) in pairs.enumerate() {

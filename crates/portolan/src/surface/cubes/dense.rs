@@ -1,11 +1,11 @@
 //! Meshes of dense arrays.
 
 use super::assemble::{Placement, assemble};
-use super::parallel::map;
 use super::piece::{Attributes, Numbers, Part};
 use super::samples::DenseSamples;
 use super::signs::{Layers, Signs, byte};
 use crate::geom::BlockKey;
+use crate::parallel;
 use crate::surface::Mesh;
 
 /// The level set of samples on a grid as triangles whose normals point to larger values.
@@ -23,7 +23,7 @@ pub fn isosurface(samples: &[f32], shape: [usize; 3], level: f32, normals: bool)
     let want = Attributes { normals, colors: false };
     let tiles = Tiles::new(shape);
     let scratch = || (Vec::new(), Numbers::new(), [0; 4]);
-    let parts = map(tiles.count(), scratch, |(signs, numbers, sizes), i| {
+    let parts = parallel::map_numbers(tiles.count(), scratch, |i, (signs, numbers, sizes)| {
         let tile = tiles.tile(i);
         tile.read(samples, shape, level, signs);
         // As much as the tile before: arrays seldom grow.

@@ -1,12 +1,12 @@
 //! Meshes of bricks of signed distances.
 
 use super::assemble::{Placement, assemble};
-use super::parallel::map;
 use super::piece::{Attributes, Numbers, Part};
 use super::samples::{BrickSamples, MIDDLE, threshold};
 use super::signs::{Layers, Signs, signs_of_brick};
 use crate::cell::{Color, DistanceBrick, SignedDistance};
 use crate::geom::BlockKey;
+use crate::parallel;
 use crate::store::{Bricks, Store};
 use crate::surface::Mesh;
 
@@ -69,16 +69,9 @@ pub fn marching_cubes(
     let threshold = threshold(settings.min_weight);
     let chunks = bricks.len().div_ceil(TOGETHER);
     let range = |chunk: usize| chunk * TOGETHER..((chunk + 1) * TOGETHER).min(bricks.len());
-    let signs = map(
-        chunks,
-        || (),
-        |(), chunk| {
-            let signs = bricks[range(chunk)].iter().map(|(_, b)| signs_of_brick(b, threshold));
-            signs.collect::<Vec<_>>()
-        },
-    );
-    let sign = |i: usize| &signs[i / TOGETHER][i % TOGETHER];
-    let parts = map(chunks, Numbers::new, |numbers, chunk| {
+    let signs = parallel::map(&bricks, TOGETHER, |(_, brick)| signs_of_brick(brick, threshold));
+    let sign = |i: usize| &signs[i];
+    let parts = parallel::map_numbers(chunks, Numbers::new, |chunk, numbers| {
         let mut part = Part::default();
         let mut upper = Walk::new(&bricks, range(chunk), want.normals);
         let mut samples = BrickSamples::new(threshold);

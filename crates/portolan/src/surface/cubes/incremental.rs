@@ -2,12 +2,12 @@
 
 use super::assemble::{Placement, assemble};
 use super::extract::{MeshSettings, neighbour, order};
-use super::parallel::map;
 use super::piece::{Attributes, Numbers, Part, Piece, place_of};
 use super::samples::{BrickSamples, threshold};
 use super::signs::{Layers, Signs, signs_of_brick};
 use crate::cell::{Color, SignedDistance};
 use crate::geom::BlockKey;
+use crate::parallel;
 use crate::store::Bricks;
 use crate::surface::Mesh;
 use rustc_hash::FxHashMap;
@@ -66,7 +66,7 @@ impl IncrementalMesh {
         dirty.sort_unstable_by_key(|key| order(*key));
         dirty.dedup();
         dirty.retain(|key| store.brick(*key).is_some());
-        let parts = map(dirty.len(), Numbers::new, |numbers, i| {
+        let parts = parallel::map_numbers(dirty.len(), Numbers::new, |i, numbers| {
             mesh_brick(store, colors, self.settings.min_weight, want, dirty[i], numbers)
         });
         for (key, part) in dirty.iter().zip(parts) {

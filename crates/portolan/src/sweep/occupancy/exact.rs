@@ -5,6 +5,7 @@ use super::masks::BrickMasks;
 use super::trace::{trace, walk};
 use crate::geom::vector::{along, distance, dot, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, RayWalk};
+use crate::parallel;
 use crate::scan::RefusedBeams;
 use crate::sweep::clip;
 
@@ -51,7 +52,6 @@ pub(crate) struct ExactRays {
 }
 
 /// Rays that are worth a thread.
-#[cfg(feature = "parallel")]
 const RAYS_A_PART: usize = 2048;
 
 impl ExactRays {
@@ -68,29 +68,37 @@ impl ExactRays {
         further: &[Ray],
         most: usize,
     ) -> Result<Tally, TooManyBricks> {
-        let parts = parts(count);
+        let parts = parallel::threads().min(count / RAYS_A_PART).max(1);
         self.parts.resize_with(parts.max(self.parts.len()), BrickMasks::default);
         let range = |part: usize| part * count / parts..(part + 1) * count / parts;
         let mut boxes = vec![Aabb::EMPTY; parts];
-        in_parallel(boxes.iter_mut().enumerate(), |(i, b)| {
-            let short = |r: &Ray| bounds.is_some() || !is_long(lattice, r);
-            *b = extent(lattice, range(i).map(&ray).filter(short))
-        });
+        parallel::for_each(
+            boxes.iter_mut().enumerate(),
+            || (),
+            |(i, b), ()| {
+                let short = |r: &Ray| bounds.is_some() || !is_long(lattice, r);
+                *b = extent(lattice, range(i).map(&ray).filter(short))
+            },
+        );
         let all = boxes.into_iter().fold(extent(lattice, further.iter().copied()), Aabb::union);
         let (first, last) = reach(lattice, bounds, all);
         self.reach = Some((first, last));
         let mut tallies = vec![Tally::default(); parts];
         let jobs =
             self.parts[..parts].iter_mut().zip(&mut tallies).enumerate().map(|(i, (m, t))| (range(i), m, t));
-        in_parallel(jobs, |(range, masks, tally)| {
-            masks.begin(first, last);
-            for i in range {
-                mark(masks, lattice, bounds, ray(i), tally);
-                if masks.len() > most {
-                    break;
+        parallel::for_each(
+            jobs,
+            || (),
+            |(range, masks, tally), ()| {
+                masks.begin(first, last);
+                for i in range {
+                    mark(masks, lattice, bounds, ray(i), tally);
+                    if masks.len() > most {
+                        break;
+                    }
                 }
-            }
-        });
+            },
+        );
         let (whole, others) = self.parts[..parts].split_at_mut(1);
         let mut fits = whole[0].len() <= most;
         for part in others {
@@ -226,35 +234,6 @@ fn reach(lattice: &Lattice<3>, bounds: Option<&Aabb<3>>, mut all: Aabb<3>) -> (B
     let cell = |p| lattice.to_cells(p).map(|v: f64| v.floor().clamp(-1e9, 1e9) as i32);
     let (low, high) = (BlockKey::of_cell(cell(all.min)), BlockKey::of_cell(cell(all.max)));
     (BlockKey(low.0.map(|v| v - 1)), BlockKey(high.0.map(|v| v + 1)))
-}
-
-#[cfg(feature = "parallel")]
-fn parts(count: usize) -> usize {
-    rayon::current_num_threads().min(count / RAYS_A_PART).max(1)
-}
-
-#[cfg(not(feature = "parallel"))]
-fn parts(_: usize) -> usize {
-    1
-}
-
-#[cfg(feature = "parallel")]
-pub(super) fn in_parallel<T: Send>(jobs: impl Iterator<Item = T>, job: impl Fn(T) + Sync) {
-    let mut jobs: Vec<T> = jobs.collect();
-    match jobs.pop() {
-        Some(only) if jobs.is_empty() => job(only),
-        Some(last) => rayon::scope(|scope| {
-            let job = &job;
-            jobs.into_iter().for_each(|j| scope.spawn(move |_| job(j)));
-            job(last);
-        }),
-        None => {}
-    }
-}
-
-#[cfg(not(feature = "parallel"))]
-pub(super) fn in_parallel<T: Send>(jobs: impl Iterator<Item = T>, job: impl Fn(T) + Sync) {
-    jobs.for_each(job);
 }
 
 #[cfg(test)]

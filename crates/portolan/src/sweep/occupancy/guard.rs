@@ -1,5 +1,7 @@
 //! The nearest reading of any window of pixels, by one look.
 
+use crate::parallel;
+
 /// Windows for bricks and larger: a window that is larger than needed only means to look closer.
 const COARSE: [usize; 11] = [2, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96];
 /// Windows for single cells, in steps of about a half: what is larger than needed frees less.
@@ -127,7 +129,7 @@ impl Guard {
             }
         };
         let (fine, nearest, farthest) = (&mut self.fine, &mut self.nearest, &mut self.farthest);
-        join(
+        parallel::join(
             || series(fine, &FINE, |v| if v > 0.0 { v } else { f32::INFINITY }, f32::INFINITY),
             || {
                 series(nearest, &COARSE, |v| v, 0.0);
@@ -166,16 +168,6 @@ impl Sizes {
         let level = (0..16).map(|i| usize::from(!holds(i))).sum::<usize>();
         (level < self.len).then_some(level)
     }
-}
-
-#[cfg(feature = "parallel")]
-pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
-    rayon::join(a, b)
-}
-
-#[cfg(not(feature = "parallel"))]
-pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
-    (a(), b())
 }
 
 #[cfg(test)]

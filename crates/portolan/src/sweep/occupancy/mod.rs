@@ -15,6 +15,6 @@ mod trace;
 
 pub(crate) use cell_box::CellBox;
 pub(crate) use exact::{ExactRays, LONGEST_RAY, Ray, Tally};
-pub(crate) use guard::{Guard, join};
+pub(crate) use guard::Guard;
 pub(crate) use masks::Bits;
 pub(crate) use projective::Projective;

@@ -3,6 +3,7 @@
 use super::guard::{Guard, Sizes, WindowMin};
 use super::lens::{LANES, Lens, STEP_BITS, STEPS, Seen, Views};
 use crate::geom::{BLOCK_EDGE, BlockKey, Lattice, Pose};
+use crate::parallel;
 use crate::scan::RangeImage;
 
 /// What a scan says about the cells of a cube.
@@ -104,7 +105,7 @@ impl Projective {
                 tops.extend(nodes(0).map(|x| [x, y, z]));
             }
         }
-        let parts = each(&tops, |&top| {
+        let parts = parallel::map(&tops, 1, |&top| {
             let mut found = Vec::new();
             self.descend(top, TOP, &mut found);
             found
@@ -342,18 +343,4 @@ fn free_lanes(
         bits |= (bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * i);
     }
     bits
-}
-
-#[cfg(feature = "parallel")]
-fn each<T: Sync, R: Send>(items: &[T], job: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
-    use rayon::prelude::*;
-    if rayon::current_num_threads() == 1 {
-        return items.iter().map(job).collect();
-    }
-    items.par_iter().map(job).collect()
-}
-
-#[cfg(not(feature = "parallel"))]
-fn each<T, R>(items: &[T], job: impl Fn(&T) -> R) -> Vec<R> {
-    items.iter().map(job).collect()
 }
