@@ -9,7 +9,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use portolan_io::read_ply_mesh;
 use serde_json::{Value, json};
+use support::space_logs::{camera_log, lidar_log};
 use support::{arg, fail, json as document, log_lines, map, room, succeed};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
@@ -83,8 +85,8 @@ impl Page {
         (answer["ok"].clone(), body.into_iter().take(length).collect())
     }
 
-    fn export(&mut self, file: &str, to: &Path) {
-        let (_, bytes) = self.ask("fusion", json!({ "op": "export", "file": file }));
+    fn export(&mut self, view: &str, file: &str, to: &Path) {
+        let (_, bytes) = self.ask(view, json!({ "op": "export", "file": file }));
         std::fs::write(to, bytes).unwrap();
     }
 }
@@ -98,8 +100,8 @@ fn a_lap_that_was_fused_in_the_studio_is_read_by_the_other_commands() {
     let mut page = studio.open();
     page.ask("fusion", json!({ "op": "seek", "scan": 200 }));
     let (esdf, map) = (folder.path().join("esdf.bin"), folder.path().join("map.portolan"));
-    page.export("esdf", &esdf);
-    page.export("map", &map);
+    page.export("fusion", "esdf", &esdf);
+    page.export("fusion", "map", &map);
 
     let info = document(["info", arg(&map), "--json"]);
     assert_eq!(info["scans"], 200, "{info}");
@@ -123,7 +125,7 @@ fn a_recorded_log_is_shown_and_makes_the_map_that_map_makes() {
     let (frame, _) = page.ask("fusion", json!({ "op": "seek", "scan": 30 }));
     assert_eq!((frame["at"].as_u64(), frame["lap"].as_u64()), (Some(30), Some(30)));
     let exported = folder.path().join("studio.portolan");
-    page.export("map", &exported);
+    page.export("fusion", "map", &exported);
 
     let made = folder.path().join("made");
     map(&log, &made, &["--every", "2", "--maps", "tsdf"]);
@@ -131,6 +133,53 @@ fn a_recorded_log_is_shown_and_makes_the_map_that_map_makes() {
         (0..400).map(|i| format!("{},{}\n", 0.3 * f64::from(i % 20), 0.2 * f64::from(i / 20))).collect();
     // Everything but the occupancy, which only the map of `map` could have.
     assert_eq!(query(&exported, &points), query(&made.join("map.portolan"), &points));
+}
+
+#[test]
+fn a_recorded_log_of_space_makes_the_surface_that_map_makes() {
+    let mut made_before: Vec<Vec<[[i64; 3]; 3]>> = Vec::new();
+    for ((folder, log), limits) in [
+        (lidar_log(), &["--min-range", "1.2", "--max-range", "4"][..]),
+        (camera_log(), &["--max-range", "3"]),
+        (camera_log(), &[]),
+    ] {
+        let made = folder.path().join("made");
+        let call = ["map", arg(&log), "--out", arg(&made), "--resolution", "0.05", "--maps", "tsdf,mesh"];
+        succeed(call.iter().chain(limits));
+        let scans = made_of(&made);
+
+        let studio = Studio::start(&[&[arg(&log)], limits].concat());
+        let mut page = studio.open();
+        while page.ask("space", json!({ "op": "seek", "frame": scans })).0["at"] != scans {}
+        while page.ask("space", json!({ "op": "mesh" })).0["mesh"]["pending"] != 0 {}
+        let exported = folder.path().join("studio.ply");
+        page.export("space", "ply", &exported);
+        let shown = surface(&exported);
+        assert!(shown == surface(&made.join("mesh.ply")), "{limits:?}");
+        assert!(!made_before.contains(&shown), "limits change what is seen: {limits:?}");
+        made_before.push(shown);
+    }
+}
+
+/// Scans that were fused.
+fn made_of(map: &Path) -> u64 {
+    let summary: Value = serde_json::from_slice(&std::fs::read(map.join("summary.json")).unwrap()).unwrap();
+    summary["scans"]["fused"].as_u64().unwrap_or_else(|| panic!("{summary}"))
+}
+
+/// The triangles of a mesh, whatever their order: corners in tenths of millimetres.
+fn surface(mesh: &Path) -> Vec<[[i64; 3]; 3]> {
+    let mesh = read_ply_mesh(mesh).unwrap();
+    let corner = |i: u32| mesh.vertices[i as usize].map(|v| (v * 1e4).round() as i64);
+    let mut triangles: Vec<_> = mesh.triangles.iter().map(|t| t.map(corner)).collect();
+    // A triangle begins where it likes.
+    triangles.iter_mut().for_each(|t| {
+        let first = (0..3).min_by_key(|&i| t[i]).unwrap();
+        t.rotate_left(first);
+    });
+    triangles.sort_unstable();
+    assert!(triangles.len() > 1000);
+    triangles
 }
 
 /// What `query` prints.

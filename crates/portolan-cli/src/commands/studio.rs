@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::scan::FrameFilter;
 use portolan_io::{AnyMapFile, FileKind, detect};
 use portolan_studio::engine::{Limits, Logs, PlaneLog, SpaceSource, check};
 use portolan_studio::server::{Server, Settings};
@@ -137,14 +138,27 @@ impl Args {
     }
 
     fn space(&self, path: &Path) -> anyhow::Result<Logs> {
-        if self.limits.is_given() {
+        let LimitArgs { min_range, max_range, no_return, no_return_free } = self.limits;
+        if no_return.is_some() || no_return_free.is_some() {
             return Err(bad_call(
-                "--min-range and the like are for planar logs; the log is of scans of space",
+                "--no-return and --no-return-free are for planar logs; the log is of scans of space",
             ));
+        }
+        let open = FrameFilter::default();
+        let filter = FrameFilter {
+            min_range: min_range.unwrap_or(open.min_range),
+            max_range: max_range.unwrap_or(open.max_range),
+            ..open
+        };
+        if filter.min_range >= filter.max_range {
+            return Err(bad_call("--min-range must be smaller than --max-range"));
         }
         let log = log::read_space(path, &self.source, true)?;
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
-        Ok(Logs { space: SpaceSource::Recorded(Box::new(log.every(every))), ..Logs::default() })
+        Ok(Logs {
+            space: SpaceSource::Recorded { log: Box::new(log.every(every)), filter },
+            ..Logs::default()
+        })
     }
 
     /// Options about a log that is not there would do nothing, silently.
@@ -238,7 +252,7 @@ fn shown_in_the_plane(logs: &Logs) -> String {
 fn shown_in_space(logs: &Logs) -> String {
     match &logs.space {
         SpaceSource::Building => "the simulated building".into(),
-        SpaceSource::Recorded(log) => format!("{}, {} scans", log.name(), log.len()),
+        SpaceSource::Recorded { log, .. } => format!("{}, {} scans", log.name(), log.len()),
         SpaceSource::Map { name, .. } => name.clone(),
     }
 }

@@ -2,6 +2,8 @@
 #![allow(dead_code)] // every test file uses another part
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
+pub(crate) mod space_logs;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -2,7 +2,7 @@
 
 use portolan::geom::Pose;
 use portolan::map::SparseTsdf;
-use portolan::scan::Scan;
+use portolan::scan::{FrameFilter, Scan};
 use portolan_io::space_log::SpaceLog;
 
 /// The two logs that every session looks at. They never change.
@@ -36,7 +36,12 @@ pub enum SpaceSource {
     #[default]
     Building,
     /// A log whose frames are read when they are asked for.
-    Recorded(Box<SpaceLog>),
+    Recorded {
+        /// Poses, and where the frames are.
+        log: Box<SpaceLog>,
+        /// Which readings are used.
+        filter: FrameFilter,
+    },
     /// A map that was made before: nothing is left to fuse, all can be looked at.
     Map {
         /// Its name, for people.

@@ -50,7 +50,7 @@ impl Source {
 
     fn recorded(&self) -> Option<&SpaceLog> {
         match &self.logs.space {
-            SpaceSource::Recorded(log) => Some(log),
+            SpaceSource::Recorded { log, .. } => Some(log),
             SpaceSource::Building | SpaceSource::Map { .. } => None,
         }
     }
@@ -66,7 +66,7 @@ impl Source {
     pub(super) fn name(&self) -> &str {
         match &self.logs.space {
             SpaceSource::Building => "the simulated building",
-            SpaceSource::Recorded(log) => log.name(),
+            SpaceSource::Recorded { log, .. } => log.name(),
             SpaceSource::Map { name, .. } => name,
         }
     }
@@ -75,7 +75,7 @@ impl Source {
     pub(super) fn map(&self) -> Option<&SparseTsdf> {
         match &self.logs.space {
             SpaceSource::Map { tsdf, .. } => Some(tsdf),
-            SpaceSource::Building | SpaceSource::Recorded(_) => None,
+            SpaceSource::Building | SpaceSource::Recorded { .. } => None,
         }
     }
 
@@ -115,7 +115,11 @@ impl Source {
         let pose = self.pose(i).ok_or_else(none)?;
         let frame = match (&mut self.walk, &self.logs.space) {
             (Some(walk), _) => walk.frame(i).ok_or_else(none)?,
-            (None, SpaceSource::Recorded(log)) => Arc::new(log.frame(i).map_err(Refusal::new)?),
+            (None, SpaceSource::Recorded { log, filter }) => {
+                // What the limits refuse is counted in the frame.
+                let (frame, _) = filter.apply(log.frame(i).map_err(Refusal::new)?);
+                Arc::new(frame)
+            }
             (None, _) => return Err(none()),
         };
         Ok((pose, frame))
