@@ -2,7 +2,7 @@
 //! task is done by itself.
 //!
 //! Workers take tasks one after the other from a common iterator. What starts them is not generic, so that it is
-//! compiled once, here, and not in every crate that uses a map; parallel iterators were a fifth of all that such a crate
+//! compiled once, here, and not in every crate that uses a map; parallel iterators were a seventh of all that such a crate
 //! compiled. A task is worth taking a lock: some microseconds at the least.
 
 use std::sync::{Mutex, PoisonError};
