@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
-use portolan::scan::{RangeLimits, Scan};
+use portolan::scan::{FrameFilter, RangeLimits, Scan};
 use portolan_io::poses3::PoseConvention;
 use portolan_io::space_log::{Intrinsics, SpaceLog, SpaceLogKind, SpaceLogOptions};
 use portolan_io::{CarmenLog, FileKind, detect, detect_no_return, read_poses_2d};
 
 use crate::arguments::{length, length_or_zero, point3};
+use crate::error::bad_call;
 
 /// Kinds of logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +110,27 @@ impl LimitArgs {
     pub(crate) fn is_given(&self) -> bool {
         let Self { min_range, max_range, no_return, no_return_free } = self;
         [min_range, max_range, no_return, no_return_free].iter().any(|limit| limit.is_some())
+    }
+
+    /// The limits for a log of space.
+    ///
+    /// # Errors
+    /// Names a limit that only planar scans have, and limits between which there is nothing.
+    pub(crate) fn filter(&self) -> anyhow::Result<FrameFilter> {
+        let planar = [("--no-return", self.no_return), ("--no-return-free", self.no_return_free)];
+        if let Some((what, _)) = planar.iter().find(|(_, limit)| limit.is_some()) {
+            return Err(bad_call(format!("{what} is for planar scans; the log has three dimensions")));
+        }
+        let open = FrameFilter::default();
+        let filter = FrameFilter {
+            min_range: self.min_range.unwrap_or(open.min_range),
+            max_range: self.max_range.unwrap_or(open.max_range),
+            ..open
+        };
+        if filter.min_range >= filter.max_range {
+            return Err(bad_call("--min-range must be smaller than --max-range"));
+        }
+        Ok(filter)
     }
 
     /// The limits for a log; what was not given is found out or left open.

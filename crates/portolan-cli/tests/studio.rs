@@ -146,7 +146,7 @@ fn a_recorded_log_of_space_makes_the_surface_that_map_makes() {
         let made = folder.path().join("made");
         let call = ["map", arg(&log), "--out", arg(&made), "--resolution", "0.05", "--maps", "tsdf,mesh"];
         succeed(call.iter().chain(limits));
-        let scans = made_of(&made);
+        let scans = fused_scans(&made);
 
         let studio = Studio::start(&[&[arg(&log)], limits].concat());
         let mut page = studio.open();
@@ -162,7 +162,7 @@ fn a_recorded_log_of_space_makes_the_surface_that_map_makes() {
 }
 
 /// Scans that were fused.
-fn made_of(map: &Path) -> u64 {
+fn fused_scans(map: &Path) -> u64 {
     let summary: Value = serde_json::from_slice(&std::fs::read(map.join("summary.json")).unwrap()).unwrap();
     summary["scans"]["fused"].as_u64().unwrap_or_else(|| panic!("{summary}"))
 }
@@ -239,6 +239,10 @@ fn calls_that_contradict_themselves_are_refused() {
     let (_folder, log) = room();
     assert!(fail(2, ["studio", "--every", "2"]).contains("give one"));
     assert!(fail(2, ["studio", arg(&log), "--intrinsics", "1,1,1,1"]).contains("planar"));
+    let (_folder, log) = camera_log();
+    assert!(fail(2, ["studio", arg(&log), "--no-return", "9"]).contains("planar"));
+    let nothing = ["studio", arg(&log), "--min-range", "3", "--max-range", "2"];
+    assert!(fail(2, nothing).contains("--min-range must be smaller than --max-range"));
     for bad in [["--port", "70000"], ["--host", "example.org"], ["--sessions", "0"], ["--memory", "much"]] {
         fail(2, ["studio"].iter().chain(&bad));
     }

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use portolan::map::{SparseTsdf, SparseTsdfConfig};
-use portolan::scan::FrameFilter;
 use portolan_io::{AnyMapFile, FileKind, detect};
 use portolan_studio::engine::{Limits, Logs, PlaneLog, SpaceSource, check};
 use portolan_studio::server::{Server, Settings};
@@ -138,21 +137,7 @@ impl Args {
     }
 
     fn space(&self, path: &Path) -> anyhow::Result<Logs> {
-        let LimitArgs { min_range, max_range, no_return, no_return_free } = self.limits;
-        if no_return.is_some() || no_return_free.is_some() {
-            return Err(bad_call(
-                "--no-return and --no-return-free are for planar logs; the log is of scans of space",
-            ));
-        }
-        let open = FrameFilter::default();
-        let filter = FrameFilter {
-            min_range: min_range.unwrap_or(open.min_range),
-            max_range: max_range.unwrap_or(open.max_range),
-            ..open
-        };
-        if filter.min_range >= filter.max_range {
-            return Err(bad_call("--min-range must be smaller than --max-range"));
-        }
+        let filter = self.limits.filter()?;
         let log = log::read_space(path, &self.source, true)?;
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
         Ok(Logs {

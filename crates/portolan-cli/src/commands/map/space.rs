@@ -15,7 +15,7 @@ use crate::arguments::Bounds;
 use crate::error::bad_call;
 use crate::esdf::EsdfArg;
 use crate::json;
-use crate::log::{self, Selection};
+use crate::log::{self, LimitArgs, Selection};
 use crate::mapping::MapKind;
 use crate::progress::Progress;
 use crate::saved::Saved;
@@ -125,11 +125,10 @@ impl Args {
         let planar = |m: &MapKind| matches!(m, MapKind::Grid | MapKind::Contour);
         match self.sweep {
             Some(SweepArg::CellCentre | SweepArg::March) => return refused("this --sweep"),
-            _ if self.limits.no_return.is_some() => return refused("--no-return"),
-            _ if self.limits.no_return_free.is_some() => return refused("--no-return-free"),
             _ if self.maps.iter().flatten().any(planar) => return refused("--maps grid or contour"),
             _ => {}
         }
+        self.limits.filter()?;
         match self.bounds {
             Some(Bounds::Plane(_)) => {
                 Err(bad_call("--bounds of a log of space has six numbers x0,y0,z0,x1,y1,z1"))
@@ -153,9 +152,6 @@ impl Args {
         }
         if self.dense.is_some() && !settings.wants(MapKind::Esdf) {
             return Err(bad_call("--dense writes the esdf, which --maps leaves out"));
-        }
-        if settings.filter.min_range >= settings.filter.max_range {
-            return Err(bad_call("--min-range must be smaller than --max-range"));
         }
         Ok(())
     }
@@ -185,6 +181,11 @@ impl Args {
         }
         maps.sort_unstable();
         maps.dedup();
+        let limits = LimitArgs {
+            min_range: self.limits.min_range.or(saved.number("min_range")),
+            max_range: self.limits.max_range.or(saved.number("max_range")),
+            ..self.limits
+        };
         let body = if self.self_filter.is_empty() { saved.bodies()? } else { self.self_filter.clone() };
         Ok(Settings {
             resolution,
@@ -206,11 +207,7 @@ impl Args {
                 .or(saved.number("carve_weight").map(|w| w as f32))
                 .unwrap_or(CARVE_WEIGHT),
             color: !self.no_color && saved.flag("color").unwrap_or(true),
-            filter: FrameFilter {
-                min_range: self.limits.min_range.or(saved.number("min_range")).unwrap_or(0.0),
-                max_range: self.limits.max_range.or(saved.number("max_range")).unwrap_or(f64::INFINITY),
-                body,
-            },
+            filter: FrameFilter { body, ..limits.filter()? },
             every: self.every.or(saved.number("every").map(|n| n as u64)),
             hold_out: self.hold_out.or(saved.number("hold_out").map(|n| n as u64)),
             bounds,
