@@ -14,7 +14,7 @@ use anyhow::{Context, bail, ensure};
 use clap::{Parser, ValueEnum};
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Lattice, Pose};
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{OccupancySweep, Occupancy, Tsdf3, TsdfConfig};
 use portolan::scan::Frame;
 use portolan::surface::isosurface;
 use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
@@ -104,14 +104,14 @@ fn timed<T>(repeats: usize, mut run: impl FnMut() -> anyhow::Result<T>) -> anyho
     Ok((seconds, last.context("a repeat")?))
 }
 
-fn fused(args: &Args, frames: &[(Pose<3>, Frame)]) -> anyhow::Result<SparseOccupancy> {
+fn fused(args: &Args, frames: &[(Pose<3>, Frame)]) -> anyhow::Result<Occupancy> {
     let sweep = match args.sweep {
         Sweep::Auto => OccupancySweep::Auto,
         Sweep::Exact => OccupancySweep::Exact,
         Sweep::Projective => OccupancySweep::Projective,
     };
     let lattice = Lattice::new([0.0; 3], args.resolution);
-    let mut map = SparseOccupancy::new(lattice, OccupancyModel::default(), sweep)?;
+    let mut map = Occupancy::new(lattice, OccupancyModel::default(), sweep)?;
     for (pose, frame) in frames {
         map.integrate(pose, frame)?;
     }
@@ -128,16 +128,16 @@ fn occupancy(args: &Args) -> anyhow::Result<Timed> {
 
 fn tsdf(args: &Args, folder: &str) -> anyhow::Result<Timed> {
     let frames = frames(args, folder)?;
-    let config = SparseTsdfConfig {
+    let config = TsdfConfig {
         resolution: args.resolution,
         // As the peers are set: four cells for depth images, three for lidars.
         truncation: if folder.starts_with("rgbd") { 4.0 } else { 3.0 } * args.resolution,
         carve: args.carve,
         color: false,
-        ..SparseTsdfConfig::default()
+        ..TsdfConfig::default()
     };
     let (seconds, map) = timed(args.repeats, || {
-        let mut map = SparseTsdf::new(config)?;
+        let mut map = Tsdf3::new(config)?;
         for (pose, frame) in &frames {
             map.integrate(pose, frame)?;
         }

@@ -3,13 +3,13 @@
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 use portolan::field::{SparseEsdf, SparseEsdfSettings};
-use portolan::map::{SparseTsdf, SparseTsdfConfig, Tsdf, Tsdf2, Tsdf2Config, TsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig, Tsdf, Tsdf2, TsdfConfig, TsdfConfig};
 use portolan::plan::{Demand, Waypoints, check_path};
 use portolan::store::Bricks;
 
 /// Distances to a wall at x = 3, as a map would have them.
 fn wall_2d() -> Tsdf2 {
-    let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [80, 60], ..Default::default() }).unwrap();
+    let mut tsdf = Tsdf2::new(TsdfConfig { cells: [80, 60], ..Default::default() }).unwrap();
     (0..tsdf.grid().len()).for_each(|i| {
         let cell = tsdf.grid().cell(i);
         let d = 3.0 - tsdf.grid().lattice.center(cell)[0];
@@ -33,7 +33,7 @@ fn in_space() {
     let how = SparseEsdfSettings { unknown: true, ..Default::default() };
     let path = Waypoints::new(vec![[0.5, 0.5, 0.5], [1.5, 1.0, 1.5], [1.5, 1.5, 1.0]]).unwrap();
     // Nothing was seen yet: nothing is certified.
-    let unseen = SparseTsdf::new(SparseTsdfConfig::default()).unwrap();
+    let unseen = Tsdf3::new(TsdfConfig::default()).unwrap();
     let field = SparseEsdf::of(unseen.store(), &how);
     assert!(!check_path(&field, &path, &Demand::new(0.3)).is_certified());
     // A wall at x = 2.

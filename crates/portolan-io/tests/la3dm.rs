@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use portolan::cell::{LogOdds32, LogOddsValue, OccupancyModel};
 use portolan::geom::vector::{along, distance, scale, sub};
 use portolan::geom::{Lattice, Pose};
-use portolan::map::{OccupancySweep, SparseOccupancy};
+use portolan::map::{OccupancySweep, Occupancy};
 use portolan::scan::{Frame, PointScan};
 use portolan::store::{Leaf, Store, Tree};
 use portolan_io::{OctomapTree, read_pcd};
@@ -35,10 +35,10 @@ fn folder() -> Option<PathBuf> {
 }
 
 /// Twelve scans in the world's frame, fused.
-fn fused(folder: &std::path::Path) -> SparseOccupancy<LogOdds32> {
+fn fused(folder: &std::path::Path) -> Occupancy<3, LogOdds32> {
     let model = OccupancyModel { p_min: 0.1192, p_max: 0.971, ..OccupancyModel::default() };
     let lattice = Lattice::new([0.0; 3], RESOLUTION);
-    let mut map = SparseOccupancy::<LogOdds32>::new(lattice, model, OccupancySweep::Exact).unwrap();
+    let mut map = Occupancy::<3, LogOdds32>::new(lattice, model, OccupancySweep::Exact).unwrap();
     for k in 1..=12 {
         let cloud = read_pcd(folder.join(format!("sim_structured_{k}.pcd"))).unwrap();
         let origin = cloud.viewpoint.unwrap().position;

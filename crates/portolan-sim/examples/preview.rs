@@ -4,7 +4,7 @@
 #![allow(clippy::print_stderr, reason = "a program says how long it took")]
 
 use portolan::geom::Pose;
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, Projection, RangeImage};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan_draw::{MeshView, Preview, Sensor, preview};
@@ -38,14 +38,14 @@ fn main() -> Result<(), Error> {
     let scans = scans(log, every)?;
     let resolution: f64 = resolution.parse()?;
     let start = Instant::now();
-    let config = SparseTsdfConfig {
+    let config = TsdfConfig {
         resolution,
         truncation: 3.0 * resolution,
         color: true,
         carve: false,
         ..Default::default()
     };
-    let mut map = SparseTsdf::new(config)?;
+    let mut map = Tsdf3::new(config)?;
     for (pose, frame) in &scans {
         map.integrate(pose, frame)?;
     }

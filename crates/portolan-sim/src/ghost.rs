@@ -9,7 +9,7 @@ use crate::followed::GhostGroup;
 use crate::ghost_watch::GhostWatch;
 use crate::{CHAIR_MOVE, StaticNoise, World, apartment, static_noise};
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{MapError, SweepKind, Tsdf, TsdfConfig};
+use portolan::map::{MapError, BeamSweep, Tsdf, TsdfConfig};
 use portolan::sweep::WeightModel;
 
 /// How the experiment is done.
@@ -22,7 +22,7 @@ pub struct GhostSettings {
     /// Truncation (metres).
     pub truncation: f64,
     /// How scans become observations.
-    pub sweep: SweepKind,
+    pub sweep: BeamSweep,
     /// How much each beam is trusted.
     pub weights: WeightModel,
     /// One lap.
@@ -45,7 +45,7 @@ impl Default for GhostSettings {
             w_max: vec![4.0, 24.0, 64.0],
             resolution: 0.05,
             truncation: 0.15,
-            sweep: SweepKind::default(),
+            sweep: BeamSweep::default(),
             weights: WeightModel::default(),
             lap: LapConfig::default(),
             max_laps_before: 4,
@@ -89,7 +89,7 @@ pub struct GhostRun {
 
 struct Run {
     w_max: f32,
-    tsdf: Tsdf<2>,
+    tsdf: Tsdf2,
     saturated_after: Option<usize>,
     laps_before: usize,
     laps_after: usize,
@@ -175,13 +175,13 @@ fn chair(world: &World) -> Aabb<2> {
 }
 
 /// Cells of the chair's place: centre in the chair or within a cell of it, estimated as behind or near its surface.
-pub(crate) fn old_place(tsdf: &Tsdf<2>, place: Aabb<2>) -> Vec<[i32; 2]> {
+pub(crate) fn old_place(tsdf: &Tsdf2, place: Aabb<2>) -> Vec<[i32; 2]> {
     let near = place.grown(tsdf.grid().lattice.resolution);
     let limit = (0.5 * tsdf.config().truncation) as f32;
     cells_in(tsdf, near).filter(|&c| tsdf.store_cell(c).is_some_and(|s| s.distance < limit)).collect()
 }
 
-pub(crate) fn cells_in(tsdf: &Tsdf<2>, place: Aabb<2>) -> impl Iterator<Item = [i32; 2]> + '_ {
+pub(crate) fn cells_in(tsdf: &Tsdf2, place: Aabb<2>) -> impl Iterator<Item = [i32; 2]> + '_ {
     let grid = tsdf.grid();
     (0..grid.len()).map(|i| grid.cell(i)).filter(move |&c| place.contains(grid.lattice.center(c)))
 }
@@ -191,7 +191,7 @@ pub(crate) trait StoreCell {
     fn store_cell(&self, cell: [i32; 2]) -> Option<portolan::cell::SignedDistance>;
 }
 
-impl StoreCell for Tsdf<2> {
+impl StoreCell for Tsdf2 {
     fn store_cell(&self, cell: [i32; 2]) -> Option<portolan::cell::SignedDistance> {
         self.store().at(self.grid().index(cell)?)
     }

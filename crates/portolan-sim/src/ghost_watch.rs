@@ -19,7 +19,7 @@ impl GhostWatch {
     /// Chooses the cells at the moment of the move: those of the old place that the map takes for the thing, and
     /// those of the new place that it has seen. `after` is the world after the move, `places` are where the thing was
     /// and is.
-    pub fn new(tsdf: &Tsdf<2>, after: &World, [old, new]: [Aabb<2>; 2]) -> Self {
+    pub fn new(tsdf: &Tsdf2, after: &World, [old, new]: [Aabb<2>; 2]) -> Self {
         let tau = tsdf.config().truncation;
         let mut chosen: Vec<_> = old_place(tsdf, old).into_iter().map(|c| (c, false)).collect();
         // At the new place all that was free and comes to lie in the thing.

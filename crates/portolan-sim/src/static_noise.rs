@@ -88,7 +88,7 @@ pub fn static_noise(
             weights: settings.weights,
             ..Default::default()
         };
-        maps.push(Tsdf::<2>::new(config.with_grid(&grid))?);
+        maps.push(Tsdf2::new(config.with_grid(&grid))?);
     }
     let distance = |cell: [i32; 2]| world.signed_distance(grid.lattice.center(cell));
     let front = (0..grid.len()).map(|i| grid.cell(i));
@@ -141,7 +141,7 @@ pub fn static_noise(
 
 fn summarise(
     m: usize,
-    (map, snapshots): (&Tsdf<2>, &Vec<Vec<f32>>),
+    (map, snapshots): (&Tsdf2, &Vec<Vec<f32>>),
     fronts: &[Front],
     laps: usize,
 ) -> StaticNoise {

@@ -4,7 +4,7 @@
 
 use portolan::cell::LogOdds8;
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{OccupancySweep, Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan_sim::space::{
     BuildingConfig, BuildingLog, DepthCamera, SpaceSensor, building, free_points, score_free, score_surface,
@@ -15,9 +15,9 @@ use std::sync::LazyLock;
 /// The default lidar: 40 scans of 64 x 1024 rays, noise 1 cm.
 static LIDAR: LazyLock<BuildingLog> = LazyLock::new(|| building(&BuildingConfig::default()));
 
-fn occupancy(resolution: f64, sweep: OccupancySweep) -> SparseOccupancy {
+fn occupancy(resolution: f64, sweep: OccupancySweep) -> Occupancy {
     let lattice = Lattice::new([0.0; 3], resolution);
-    let mut map = SparseOccupancy::<LogOdds8>::new(lattice, Default::default(), sweep).unwrap();
+    let mut map = Occupancy::<3, LogOdds8>::new(lattice, Default::default(), sweep).unwrap();
     for (pose, frame) in &LIDAR.scans {
         map.integrate(pose, frame).unwrap();
     }
@@ -74,13 +74,13 @@ fn the_default_sweep_keeps_surfaces_at_5_cm() {
 }
 
 /// The mesh's vertices.
-fn vertices(map: &SparseTsdf) -> Vec<[f64; 3]> {
+fn vertices(map: &Tsdf3) -> Vec<[f64; 3]> {
     let mesh = marching_cubes(map.store(), None, &MeshSettings::default());
     (0..mesh.vertices.len()).map(|i| mesh.vertex_world(i)).collect()
 }
 
-fn tsdf_of(log: &BuildingLog, config: SparseTsdfConfig) -> SparseTsdf {
-    let mut map = SparseTsdf::new(config).unwrap();
+fn tsdf_of(log: &BuildingLog, config: TsdfConfig) -> Tsdf3 {
+    let mut map = Tsdf3::new(config).unwrap();
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();
     }
@@ -90,7 +90,7 @@ fn tsdf_of(log: &BuildingLog, config: SparseTsdfConfig) -> SparseTsdf {
 #[test]
 fn the_surface_of_lidar_scans_is_3_mm_off_in_the_median() {
     let log = &*LIDAR;
-    let map = tsdf_of(log, SparseTsdfConfig { truncation: 0.15, ..Default::default() });
+    let map = tsdf_of(log, TsdfConfig { truncation: 0.15, ..Default::default() });
     let errors = surface_errors(&log.world, vertices(&map).into_iter()).unwrap();
     println!("lidar, 5 cm, noise 1 cm: {errors:?}");
     assert!(errors.count > 50_000 && errors.median <= 3e-3, "{errors:?}");
@@ -101,7 +101,7 @@ fn the_surface_and_colours_of_depth_images_are_right() {
     let camera = DepthCamera::default().with_noise(0.01);
     let log =
         building(&BuildingConfig { scans: 60, sensor: SpaceSensor::Camera(camera), ..Default::default() });
-    let map = tsdf_of(&log, SparseTsdfConfig { color: true, truncation: 0.15, ..Default::default() });
+    let map = tsdf_of(&log, TsdfConfig { color: true, truncation: 0.15, ..Default::default() });
     let points = vertices(&map);
     let errors = surface_errors(&log.world, points.iter().copied()).unwrap();
     println!("depth camera, 5 cm, noise 1 cm: {errors:?}");

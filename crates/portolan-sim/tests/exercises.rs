@@ -125,7 +125,7 @@ fn exercise_2_crossovers_of_our_node() {
 
 /// What the map of a wall at `y = 0` believes along the normal when beams of these angles (radians) were fused with these
 /// weights, their ranges off by `errors`: cell centres at `(k + 1/2) r`, up to tau on both sides.
-fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf<2> {
+fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf2 {
     let config = TsdfConfig {
         cells: [1, 2 * (tau / r).ceil() as usize],
         resolution: r,
@@ -134,7 +134,7 @@ fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf<2> {
         w_max: f32::INFINITY,
         ..Default::default()
     };
-    let mut map = Tsdf::<2>::new(config).unwrap();
+    let mut map = Tsdf2::new(config).unwrap();
     for j in 0..config.cells[1] as i32 {
         let y = map.grid().lattice.center([0, j])[1];
         for &(theta, weight, error) in beams {
@@ -149,7 +149,7 @@ fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf<2> {
 }
 
 /// Where the linear interpolation between the cells next to the wall is zero, and the slope in front of it.
-fn crossing_and_slope(map: &Tsdf<2>) -> (f64, f64) {
+fn crossing_and_slope(map: &Tsdf2) -> (f64, f64) {
     let n = map.grid().shape[1] as i32;
     // Far behind the wall a grazing beam says nothing.
     let at = |j: i32| {
@@ -301,7 +301,7 @@ fn exercise_6_the_cloud_wins_while_points_are_few() {
     assert!((2..=64).contains(&crossover));
 
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
-    let tsdf = Tsdf::<2>::new(TsdfConfig::default().with_grid(&grid)).unwrap();
+    let tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&grid)).unwrap();
     let esdf_bytes = size_of_val(esdf_from_tsdf(&tsdf, 0.5, 1.5).samples());
     // A point is held twice, once with its index: 36 bytes.
     let bytes = 36 * points.len();
@@ -324,7 +324,7 @@ fn exercise_6_a_cloud_cannot_forget() {
     let moved = world.with_moved("chair", CHAIR_MOVE);
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
     let mut tsdf =
-        Tsdf::<2>::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
+        Tsdf2::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
     let mut cloud = Cloud::new();
     for (k, world) in [&world, &moved].into_iter().enumerate() {
         for (pose, scan) in lap(world, &LapConfig { first_index: 200 * k as u64, ..Default::default() }) {

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
 
-use portolan::map::SweepKind;
+use portolan::map::BeamSweep;
 use portolan::sweep::WeightModel;
 use portolan_sim::{GhostGroup, GhostSettings, ghost, static_noise};
 
@@ -84,9 +84,9 @@ fn a_static_map_is_as_noisy_as_the_filter_says() {
 #[test]
 fn with_weights_that_fall_with_the_range_the_received_weight_predicts() {
     for (weights, sweep) in [
-        (WeightModel::InverseSquare, SweepKind::CellCentre),
-        (WeightModel::CosIncidence, SweepKind::CellCentre),
-        (WeightModel::Constant, SweepKind::March),
+        (WeightModel::InverseSquare, BeamSweep::CellCentre),
+        (WeightModel::CosIncidence, BeamSweep::CellCentre),
+        (WeightModel::Constant, BeamSweep::March),
     ] {
         let w_max = vec![4.0];
         let settings = GhostSettings { w_max, weights, sweep, noise_laps: 0, ..Default::default() };

@@ -11,7 +11,7 @@ use divan::{Bencher, black_box};
 use portolan::cell::{DistanceBrick, SignedDistance};
 use portolan::field::{EsdfMethod, SparseEsdf, SparseEsdfSettings, squared_distance_transform};
 use portolan::geom::{BlockKey, Lattice};
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::store::{Bricks, Store};
 use portolan_sim::SEED;
 use portolan_sim::space::{
@@ -159,12 +159,12 @@ fn measure_carved_1m(bencher: Bencher, threads: usize) {
 
 /// A walk with a depth camera of 640 x 480 pixels through the simulated Building: the map before one more frame and
 /// after it.
-static WALK: LazyLock<[SparseTsdf; 2]> = LazyLock::new(|| {
+static WALK: LazyLock<[Tsdf3; 2]> = LazyLock::new(|| {
     let camera = DepthCamera::default();
     let config = BuildingConfig { scans: 600, sensor: SpaceSensor::Camera(camera), seed: SEED };
     let building = building_world(config.seed);
     let mut map =
-        SparseTsdf::new(SparseTsdfConfig { max_range: 5.0, ..Default::default() }).expect("a valid map");
+        Tsdf3::new(TsdfConfig { max_range: 5.0, ..Default::default() }).expect("a valid map");
     let mut before = map.clone();
     for (i, pose) in building_poses(&building, &config).iter().enumerate().take(16) {
         before = map.clone();
@@ -188,7 +188,7 @@ fn one_depth_frame_measured(bencher: Bencher, (max_distance, threads): (f64, usi
 
 fn follow(bencher: Bencher, max_distance: f64, threads: usize, measure: bool) {
     let [before, after] = &*WALK;
-    let min_weight = 0.5 * SparseTsdfConfig::default().weights.typical_low();
+    let min_weight = 0.5 * TsdfConfig::default().weights.typical_low();
     let settings = SparseEsdfSettings { min_weight, max_distance, ..Default::default() };
     let esdf = SparseEsdf::of(before.store(), &settings);
     esdf.measure();

@@ -7,7 +7,7 @@ use divan::{Bencher, black_box};
 use portolan::cell::OccupancyModel;
 use portolan::field::{Esdf2, esdf_from_tsdf};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Cloud, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
+use portolan::map::{Cloud, MapRepr, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use std::sync::LazyLock;
@@ -18,7 +18,7 @@ fn main() {
 
 static LOG: LazyLock<Vec<(Pose<2>, Scan<2>)>> =
     LazyLock::new(|| portolan_sim::lap(&portolan_sim::apartment().world, &Default::default()));
-static TSDF: LazyLock<Tsdf2> = LazyLock::new(|| tsdf(SweepKind::CellCentre, true));
+static TSDF: LazyLock<Tsdf2> = LazyLock::new(|| tsdf(BeamSweep::CellCentre, true));
 static PROBES: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
     let at = |i: u32, a: f64| (0.5 + f64::from(i) * a).fract();
     (1..=10_000)
@@ -35,7 +35,7 @@ fn scans() -> ItemsCount {
 }
 
 fn occupancy() -> OccupancyGrid<2> {
-    let mut map = OccupancyGrid::new(grid(), OccupancyModel::default()).expect("a valid map");
+    let mut map = OccupancyGrid::covering(grid(), OccupancyModel::default()).expect("a valid map");
     for (pose, scan) in LOG.iter() {
         map.integrate(pose, scan);
     }
@@ -50,8 +50,8 @@ fn quadtree(resolution: f64) -> Quadtree {
     map
 }
 
-fn tsdf(sweep: SweepKind, carve: bool) -> Tsdf2 {
-    let config = Tsdf2Config { sweep, ..Default::default() }.with_grid(&grid());
+fn tsdf(sweep: BeamSweep, carve: bool) -> Tsdf2 {
+    let config = TsdfConfig { sweep, ..Default::default() }.with_grid(&grid());
     let mut map = Tsdf2::new(config).expect("a valid map");
     for (pose, scan) in LOG.iter() {
         map.integrate(pose, scan, carve);
@@ -79,12 +79,12 @@ mod update {
 
     #[divan::bench(args = [false, true])]
     fn tsdf_cell_centre(bencher: Bencher, carve: bool) {
-        bencher.counter(scans()).bench(|| tsdf(SweepKind::CellCentre, carve));
+        bencher.counter(scans()).bench(|| tsdf(BeamSweep::CellCentre, carve));
     }
 
     #[divan::bench(args = [false, true])]
     fn tsdf_march(bencher: Bencher, carve: bool) {
-        bencher.counter(scans()).bench(|| tsdf(SweepKind::March, carve));
+        bencher.counter(scans()).bench(|| tsdf(BeamSweep::March, carve));
     }
 }
 

@@ -8,11 +8,11 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::{LogOdds8, OccupancyModel};
 use portolan::geom::{Lattice, Pose};
-use portolan::map::{OccupancySweep, SparseOccupancy};
+use portolan::map::{OccupancySweep, Occupancy};
 use portolan::scan::{Frame, PointScan};
 use std::sync::LazyLock;
 
-type Map = SparseOccupancy<LogOdds8>;
+type Map = Occupancy<3, LogOdds8>;
 
 fn main() {
     divan::main();

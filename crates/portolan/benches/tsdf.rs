@@ -6,7 +6,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use portolan::geom::Pose;
-use portolan::map::{PointSweep, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{PointSweep, Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, Pinhole, PointScan, Projection, RangeImage, Spherical};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -156,8 +156,8 @@ fn made_up_lidar() -> Log {
     made_up(&Projection::Spherical(rings()), AZIMUTHS, RINGS, Pose::<3>::IDENTITY.rotation)
 }
 
-fn config(resolution: f64, carve: bool) -> SparseTsdfConfig {
-    SparseTsdfConfig {
+fn config(resolution: f64, carve: bool) -> TsdfConfig {
+    TsdfConfig {
         resolution,
         truncation: 4.0 * resolution,
         carve,
@@ -166,11 +166,11 @@ fn config(resolution: f64, carve: bool) -> SparseTsdfConfig {
     }
 }
 
-fn fuse(bencher: Bencher, log: &Log, config: SparseTsdfConfig, threads: usize) {
+fn fuse(bencher: Bencher, log: &Log, config: TsdfConfig, threads: usize) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     bencher.counter(ItemsCount::new(log.len())).bench(|| {
         pool.install(|| {
-            let mut map = SparseTsdf::new(config).expect("a valid map");
+            let mut map = Tsdf3::new(config).expect("a valid map");
             for (pose, frame) in log {
                 map.integrate(pose, frame).expect("room for it");
             }
@@ -196,6 +196,6 @@ fn lidar_with_carving(bencher: Bencher, (resolution, threads): (f64, usize)) {
 
 #[divan::bench(args = [0.1, 0.05], sample_count = 3)]
 fn lidar_rays_with_carving(bencher: Bencher, resolution: f64) {
-    let config = SparseTsdfConfig { sweep: PointSweep::Rays, ..config(resolution, true) };
+    let config = TsdfConfig { sweep: PointSweep::Rays, ..config(resolution, true) };
     fuse(bencher, &RAYS, config, 1);
 }

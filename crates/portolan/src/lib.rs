@@ -7,14 +7,14 @@
 //! output, prints nothing, starts no threads of its own and reads no clock.
 //!
 //! ```
-//! use portolan::{Answer, geom::{Grid, Pose}, map::{Tsdf2, Tsdf2Config}, scan::{RangeLimits, Scan}};
+//! use portolan::{Answer, geom::{Grid, Pose}, map::{Tsdf2, TsdfConfig}, scan::{RangeLimits, Scan}};
 //!
 //! // A laser in the middle of a room of 4 m x 4 m, 360 beams.
 //! let bearings: Vec<f64> = (0..360).map(|d| f64::from(d - 180).to_radians()).collect();
 //! let ranges: Vec<f64> = bearings.iter().map(|b| 2.0 / b.cos().abs().max(b.sin().abs())).collect();
 //! let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
 //!
-//! let mut tsdf = Tsdf2::new(Tsdf2Config::default().with_grid(&Grid::new([-2.5; 2], 0.05, [100; 2])))?;
+//! let mut tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&Grid::new([-2.5; 2], 0.05, [100; 2])))?;
 //! tsdf.integrate(&Pose::<2>::new(0.0, 0.0, 0.0), &scan, true);
 //!
 //! // Where is the surface? How far is it, and which way is away from it? And what is not known?
@@ -34,7 +34,7 @@
 //! | where is the surface? | [`map::Tsdf`], then [`surface::marching_squares`] | one pass over the cells |
 //! | how far to the nearest surface, and which way is away? | [`field::Esdf`] | one interpolation |
 //! | is this path free, this pose of a robot, and where would it be? | [`plan`] over a field | steps of the clearance |
-//! | where does the known end, and what would be seen from there? | [`explore`] over [`map::SparseTsdf`] | changed bricks |
+//! | where does the known end, and what would be seen from there? | [`explore`] over [`map::Tsdf3`] | changed bricks |
 //! | how near is the nearest measurement? | [`map::Cloud`] | a k-d tree |
 //! | what does a renderer make of it? | [`radiance`] | on a line, so far |
 

@@ -9,7 +9,7 @@ mod scenes;
 
 use portolan::field::{EsdfMethod, SparseEsdf, SparseEsdfSettings};
 use portolan::geom::{Lattice, block_cells, vector};
-use portolan::map::SweepKind;
+use portolan::map::BeamSweep;
 use portolan::surface::{ContourSettings, MeshSettings, NearestSurface, marching_cubes, marching_squares};
 use scenes::{Random, Segments, Spoiled, room};
 
@@ -81,7 +81,7 @@ fn nodes_in_space_are_exact_where_crossings_are_at_nodes() {
 
 #[test]
 fn nodes_of_the_apartment_are_exact() {
-    let tsdf = common::tsdf(SweepKind::CellCentre, true, &common::apartment().log);
+    let tsdf = common::tsdf(BeamSweep::CellCentre, true, &common::apartment().log);
     let settings = ContourSettings::of(&tsdf);
     let contour = marching_squares(&tsdf, &settings);
     let segments = Segments::of(&contour, 0.1);
@@ -94,7 +94,7 @@ fn nodes_of_the_apartment_are_exact() {
 /// true walls, and lengths of gradients, by each method.
 #[test]
 fn distances_of_the_apartment_by_every_method() {
-    let tsdf = common::tsdf(SweepKind::CellCentre, true, &common::apartment().log);
+    let tsdf = common::tsdf(BeamSweep::CellCentre, true, &common::apartment().log);
     let settings = ContourSettings::of(&tsdf);
     let segments = Segments::of(&marching_squares(&tsdf, &settings), 0.1);
     let min_weight = settings.min_weight;

@@ -12,7 +12,7 @@ use portolan::Answer;
 use portolan::cell::SignedDistance;
 use portolan::field::{Clearance, ClearanceField, EsdfMethod, SparseEsdf, SparseEsdfSettings, UnknownSpace};
 use portolan::geom::{BlockKey, Grid, Lattice, block_cells, vector};
-use portolan::map::{SweepKind, Tsdf2, TsdfConfig};
+use portolan::map::{BeamSweep, Tsdf2, TsdfConfig};
 use portolan::store::{Bricks, Store};
 use portolan::surface::{ContourSettings, MeshSettings, NearestSurface, marching_cubes, marching_squares};
 use scenes::{Random, Segments, Spoiled, bricks, room};
@@ -170,7 +170,7 @@ fn bounds_hold_where_crossings_lie_at_nodes_far_from_zero() {
 
 #[test]
 fn bounds_hold_in_the_apartment() {
-    let tsdf = common::tsdf(SweepKind::CellCentre, true, &common::apartment().log);
+    let tsdf = common::tsdf(BeamSweep::CellCentre, true, &common::apartment().log);
     let settings = ContourSettings::of(&tsdf);
     let contour = marching_squares(&tsdf, &settings);
     let segments = Segments::of(&contour, 0.1);

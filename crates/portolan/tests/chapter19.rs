@@ -10,7 +10,7 @@ use parry2d::shape::Polyline;
 use portolan::cell::TsdfRule;
 use portolan::field::esdf_from_tsdf;
 use portolan::geom::vector::{distance, point_segment};
-use portolan::map::{SweepKind, Tsdf2, Tsdf2Config};
+use portolan::map::{BeamSweep, Tsdf2, TsdfConfig};
 use portolan::surface::{Contour, ContourSettings, marching_squares};
 
 /// The worked example of section 3.3: one cell, tau 0.20 m, W_max 4. Rows: observation, weight, gain, D, W.
@@ -26,7 +26,7 @@ const TABLE: [[f64; 5]; 6] = [
 #[test]
 fn chapter19_voxel_filter_table() {
     let config =
-        Tsdf2Config { cells: [1, 1], resolution: 1.0, truncation: 0.20, w_max: 4.0, ..Default::default() };
+        TsdfConfig { cells: [1, 1], resolution: 1.0, truncation: 0.20, w_max: 4.0, ..Default::default() };
     let mut tsdf = Tsdf2::new(config).unwrap();
     let rule = TsdfRule { truncation: 0.20, w_max: 4.0 };
     let (mut d, mut w) = (0.0, 0.0);
@@ -90,7 +90,7 @@ fn compare(tsdf: &Tsdf2, contour: &Contour) -> Vec<([f64; 2], f64)> {
 #[test]
 fn chapter19_esdf_against_exact_distance() {
     let log = &apartment().log;
-    for (name, sweep) in [("cell centre", SweepKind::CellCentre), ("the chapter's march", SweepKind::March)] {
+    for (name, sweep) in [("cell centre", BeamSweep::CellCentre), ("the chapter's march", BeamSweep::March)] {
         let tsdf = tsdf(sweep, true, log);
         let contour = marching_squares(&tsdf, &ContourSettings::default());
         let errors = compare(&tsdf, &contour);
@@ -136,7 +136,7 @@ fn is_steep_at_contour(tsdf: &Tsdf2, contour: &Contour, p: [f64; 2]) -> bool {
 /// be too large as well. (The first half, never too large on an exact field, is tested beside the transform.)
 #[test]
 fn on_a_fused_field_the_seeding_over_estimates_too() {
-    let tsdf = tsdf(SweepKind::CellCentre, true, &apartment().log);
+    let tsdf = tsdf(BeamSweep::CellCentre, true, &apartment().log);
     let contour = marching_squares(&tsdf, &ContourSettings::default());
     let worst = compare(&tsdf, &contour).into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
     assert!(worst.1 > 0.02, "the largest over-estimate is {} m at {:?}", worst.1, worst.0);

@@ -9,7 +9,7 @@ use portolan::explore::{
     Frontier, FrontierMap, FrontierSettings, GainSettings, expected_gain, expected_gains, fan, spherical,
 };
 use portolan::geom::{Aabb, Pose, vector};
-use portolan::map::{SparseTsdf, SparseTsdfConfig, SweepKind};
+use portolan::map::{Tsdf3, TsdfConfig, BeamSweep};
 use portolan::store::{Bricks, Store};
 use portolan_sim::space::{BuildingConfig, SpaceLidar, SpaceSensor, building};
 
@@ -24,7 +24,7 @@ fn frontiers<const D: usize>(store: &Bricks<SignedDistance, D>) -> Vec<Frontier<
 fn frontiers_of_the_apartment_are_at_what_was_not_seen_yet() {
     let log = &apartment().log;
     let lengths = [10, 60, log.len()].map(|scans| {
-        let tsdf = tsdf(SweepKind::CellCentre, true, &log[..scans]);
+        let tsdf = tsdf(BeamSweep::CellCentre, true, &log[..scans]);
         let store: Bricks<_, 2> = tsdf.store().into();
         let found = frontiers(&store);
         println!("after {scans} scans {} frontiers:", found.len());
@@ -50,7 +50,7 @@ fn frontiers_of_the_apartment_are_at_what_was_not_seen_yet() {
 #[test]
 fn the_expected_gain_is_what_a_scan_adds_and_more() {
     let world = &apartment().world;
-    let mut tsdf = tsdf(SweepKind::CellCentre, true, &apartment().log[..30]);
+    let mut tsdf = tsdf(BeamSweep::CellCentre, true, &apartment().log[..30]);
     let bounds = Some(Aabb::new([0.0; 2], [12.0, 9.0]));
     let settings = GainSettings { max_range: 8.0, bounds, ..Default::default() };
     let rays = fan(-3.13, 3.13, 360);
@@ -84,8 +84,8 @@ fn the_expected_gain_is_what_a_scan_adds_and_more() {
 fn frontiers_of_the_building_follow_its_scans() {
     let sensor = SpaceSensor::Lidar(SpaceLidar { rings: 16, columns: 256, ..Default::default() });
     let log = building(&BuildingConfig { scans: 12, sensor, ..Default::default() });
-    let config = SparseTsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() };
-    let mut map = SparseTsdf::new(config).unwrap();
+    let config = TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() };
+    let mut map = Tsdf3::new(config).unwrap();
     let mut kept = FrontierMap::new(FrontierSettings::default());
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();

@@ -8,7 +8,7 @@ use portolan::Answer;
 use portolan::cell::OccupancyModel;
 use portolan::field::{esdf_from_tsdf, squared_distance_transform};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{OccupancyGrid, Quadtree, SweepKind, Tsdf, Tsdf2, TsdfConfig};
+use portolan::map::{OccupancyGrid, Quadtree, BeamSweep, Tsdf, Tsdf2, TsdfConfig};
 use portolan::scan::{Beam, Scan, ScanStats};
 use portolan::store::Store;
 use portolan::surface::{ContourSettings, marching_squares};
@@ -16,7 +16,7 @@ use portolan::surface::{ContourSettings, marching_squares};
 type Log = [(Pose<2>, Scan<2>)];
 
 fn occupancy(grid: Grid<2>, log: &Log) -> OccupancyGrid<2> {
-    let mut map = OccupancyGrid::new(grid, OccupancyModel::default()).unwrap();
+    let mut map = OccupancyGrid::covering(grid, OccupancyModel::default()).unwrap();
     log.iter().for_each(|(pose, scan)| drop_stats(map.integrate(pose, scan)));
     map
 }
@@ -63,7 +63,7 @@ fn far_from_zero_nothing_changes() {
     // Seen: 23 of some 20,000 observed cells.
     assert!(differing <= 60, "{differing} cells differ");
 
-    let near = tsdf(SweepKind::CellCentre, true, near_log);
+    let near = tsdf(BeamSweep::CellCentre, true, near_log);
     let mut far = Tsdf2::new(TsdfConfig::default().with_grid(&far_grid)).unwrap();
     far_log.iter().for_each(|(pose, scan)| drop_stats(far.integrate(pose, scan, true)));
     let values = |t: &Tsdf2, i| t.store().at(i).map(|c| (c.distance, c.weight));
@@ -85,7 +85,7 @@ fn a_quarter_turn_of_everything_turns_the_contour() {
     let turn = Pose::<2>::from_cos_sin(9.0, 0.0, 0.0, 1.0);
     let turned_log: Vec<_> = log.iter().map(|(pose, scan)| (turn * *pose, scan.clone())).collect();
     let turned_grid = Grid::new([0.0; 2], 0.05, [180, 240]);
-    let straight = tsdf(SweepKind::CellCentre, true, log);
+    let straight = tsdf(BeamSweep::CellCentre, true, log);
     let mut turned = Tsdf2::new(TsdfConfig::default().with_grid(&turned_grid)).unwrap();
     turned_log.iter().for_each(|(pose, scan)| drop_stats(turned.integrate(pose, scan, true)));
     let a = esdf_from_tsdf(&straight, 0.5, 1.5);
@@ -107,9 +107,9 @@ fn a_slice_of_space_is_the_plane() {
     let log = &apartment().log[..40];
     let plane = occupancy(grid(), log);
     let space_grid = Grid::new([0.0, 0.0, -0.1], 0.05, [240, 180, 4]);
-    let mut space = OccupancyGrid::<3>::new(space_grid, OccupancyModel::default()).unwrap();
+    let mut space = OccupancyGrid::<3>::covering(space_grid, OccupancyModel::default()).unwrap();
     let mut space_tsdf =
-        Tsdf::<3>::new(TsdfConfig { sweep: SweepKind::March, ..Default::default() }.with_grid(&space_grid))
+        Tsdf::<3>::new(TsdfConfig { sweep: BeamSweep::March, ..Default::default() }.with_grid(&space_grid))
             .unwrap();
     for (pose, scan) in log {
         let [[c, s], _] = [[pose.rotation[0][0], pose.rotation[1][0]], [0.0; 2]];
@@ -123,7 +123,7 @@ fn a_slice_of_space_is_the_plane() {
         drop_stats(space.integrate(&pose, &scan));
         drop_stats(space_tsdf.integrate(&pose, &scan, true));
     }
-    let plane_tsdf = tsdf(SweepKind::March, true, log);
+    let plane_tsdf = tsdf(BeamSweep::March, true, log);
     let (mut differing, mut off) = (0, 0.0f32);
     for i in 0..grid().len() {
         let [x, y] = grid().cell(i);
@@ -174,7 +174,7 @@ fn the_same_bytes_for_any_number_of_threads() {
 #[test]
 fn what_was_never_seen_is_unknown_everywhere() {
     let log = &apartment().log[..1];
-    let map = tsdf(SweepKind::CellCentre, true, log);
+    let map = tsdf(BeamSweep::CellCentre, true, log);
     let esdf = esdf_from_tsdf(&map, 0.5, 1.5);
     let grid_map = occupancy(grid(), log);
     let unseen = [11.0, 8.0];

@@ -9,7 +9,7 @@ mod scenes;
 use common::{apartment, points, tsdf};
 use portolan::field::{SparseEsdf, SparseEsdfSettings};
 use portolan::geom::{Pose, vector};
-use portolan::map::{SparseTsdf, SparseTsdfConfig, SweepKind, Tsdf2};
+use portolan::map::{Tsdf3, TsdfConfig, BeamSweep, Tsdf2};
 use portolan::plan::{
     Body, Cause, Curve, Demand, Motion, MotionCheck, NearestFree, PathCheck, PathClearance, Spline,
     Waypoints, check_motion, check_path, check_pose, nearest_free,
@@ -22,7 +22,7 @@ use std::sync::LazyLock;
 
 /// The Apartment at 5 cm, its field up to one metre, and the contour it is about.
 static APARTMENT: LazyLock<(Tsdf2, SparseEsdf<2>, Segments)> = LazyLock::new(|| {
-    let tsdf = tsdf(SweepKind::CellCentre, true, &apartment().log);
+    let tsdf = tsdf(BeamSweep::CellCentre, true, &apartment().log);
     let settings = SparseEsdfSettings { unknown: true, ..Default::default() };
     let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
     let contour = ContourSettings { min_weight: settings.min_weight, ..Default::default() };
@@ -146,7 +146,7 @@ fn certified_motions_through_the_building_keep_their_clearance() {
     let sensor = SpaceSensor::Lidar(SpaceLidar { rings: 32, columns: 512, ..Default::default() });
     let log = building(&BuildingConfig { scans: 24, sensor, ..Default::default() });
     let mut map =
-        SparseTsdf::new(SparseTsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
+        Tsdf3::new(TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();
     }

@@ -3,7 +3,7 @@
 
 use portolan::cell::SignedDistance;
 use portolan::geom::{BlockKey, Lattice, Pose, vector};
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, Orthographic, Pinhole, Projection, RangeImage, Spherical};
 use portolan::store::Store;
 use portolan::sweep::WeightModel;
@@ -58,7 +58,7 @@ fn project(image: &RangeImage, p: [f64; 3]) -> Option<(f64, f64, f64, f64)> {
 
 /// What a cell may get: between the same four pixels in any case but where it lies on a line between fours, and rounding
 /// decides which of them it is.
-fn said(image: &RangeImage, pose: &Pose<3>, centre: [f64; 3], config: &SparseTsdfConfig) -> Vec<Said> {
+fn said(image: &RangeImage, pose: &Pose<3>, centre: [f64; 3], config: &TsdfConfig) -> Vec<Said> {
     let p = pose.inverse().transform_point(centre);
     let Some(seen) = project(image, p) else { return vec![Said::Nothing] };
     let firsts = |x: f64| {
@@ -75,7 +75,7 @@ fn said_between(
     image: &RangeImage,
     (c, r): (i64, i64),
     (u, v, length, scale): (f64, f64, f64, f64),
-    config: &SparseTsdfConfig,
+    config: &TsdfConfig,
 ) -> Said {
     let (tau, resolution) = (config.truncation, config.resolution);
     let (w, h) = (image.columns as i64, image.rows as i64);
@@ -188,8 +188,8 @@ fn agrees(said: Said, cell: Option<SignedDistance>) -> bool {
 }
 
 /// Every cell of a box around everything, and nothing beyond it.
-fn equals_its_definition(image: RangeImage, pose: &Pose<3>, config: &SparseTsdfConfig, reach: f64) {
-    let mut map = SparseTsdf::new(*config).expect("a valid map");
+fn equals_its_definition(image: RangeImage, pose: &Pose<3>, config: &TsdfConfig, reach: f64) {
+    let mut map = Tsdf3::new(*config).expect("a valid map");
     let frame = Frame::Image(image.clone());
     map.integrate(pose, &frame).unwrap();
     let lattice = *map.lattice();
@@ -255,9 +255,9 @@ fn poses() -> impl Strategy<Value = Pose<3>> {
     })
 }
 
-fn configs(resolution: f64, pose: &Pose<3>, carve: bool, squared: bool) -> SparseTsdfConfig {
+fn configs(resolution: f64, pose: &Pose<3>, carve: bool, squared: bool) -> TsdfConfig {
     let anchor = pose.translation.map(|v| (v / resolution / 64.0).round() * 64.0 * resolution);
-    SparseTsdfConfig {
+    TsdfConfig {
         resolution,
         origin: anchor,
         truncation: 3.0 * resolution,
@@ -310,13 +310,13 @@ fn a_map_moves_with_the_scan() {
     let frame = Frame::Image(image(Projection::Pinhole(camera), 64, 48, patchy(5, 0.8, 2.5)));
     let at = tilted(0.3, -0.2, 0.1, [0.2, -0.5, 0.1, 0.8]);
     let config = configs(0.05, &Pose::IDENTITY, true, false);
-    let mut here = SparseTsdf::new(config).unwrap();
+    let mut here = Tsdf3::new(config).unwrap();
     here.integrate(&at, &frame).unwrap();
     let turn = Pose::<3> {
         rotation: [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
         translation: [500_000.0, 4_000_000.0, 40.0],
     };
-    let mut there = SparseTsdf::new(SparseTsdfConfig { origin: turn.translation, ..config }).unwrap();
+    let mut there = Tsdf3::new(TsdfConfig { origin: turn.translation, ..config }).unwrap();
     there.integrate(&(turn * at), &frame).unwrap();
     let lattice = *there.lattice();
     let (mut cells, mut other) = (0, 0);
@@ -343,10 +343,10 @@ fn the_same_bytes_for_any_number_of_threads() {
     let mut depth = image(Projection::Pinhole(camera), 64, 48, patchy(3, 0.8, 2.5));
     depth.colors = (0..64 * 48).map(|i| [(i % 251) as u8, (i % 13) as u8, 7]).collect();
     let frames = [Frame::Image(depth)];
-    let config = SparseTsdfConfig { color: true, ..configs(0.04, &Pose::IDENTITY, true, true) };
+    let config = TsdfConfig { color: true, ..configs(0.04, &Pose::IDENTITY, true, true) };
     let fused = |threads: usize| {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
-            let mut map = SparseTsdf::new(config).unwrap();
+            let mut map = Tsdf3::new(config).unwrap();
             for k in 0..3 {
                 let pose = tilted(0.1 * f64::from(k), 0.0, 0.0, [0.1, 0.05 * f64::from(k), 0.0, 1.0]);
                 for frame in &frames {
@@ -366,7 +366,7 @@ fn the_same_bytes_for_any_number_of_threads() {
 }
 
 /// All cells by index.
-fn cells(map: &SparseTsdf) -> HashMap<[i32; 3], SignedDistance> {
+fn cells(map: &Tsdf3) -> HashMap<[i32; 3], SignedDistance> {
     let of = |key: BlockKey<3>| (0..512).map(move |i| key.cell(i));
     let all = map.store().bricks_by_age().flat_map(|(key, _)| of(key));
     all.filter_map(|cell| Some((cell, map.store().cell(cell)?))).collect()
@@ -377,7 +377,7 @@ fn watched_cells_tell_what_happened() {
     let camera = Pinhole { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 };
     let frame = Frame::Image(image(Projection::Pinhole(camera), 64, 48, patchy(3, 0.8, 2.5)));
     let mut map =
-        SparseTsdf::new(SparseTsdfConfig { w_max: 2.0, ..configs(0.05, &Pose::IDENTITY, true, false) })
+        Tsdf3::new(TsdfConfig { w_max: 2.0, ..configs(0.05, &Pose::IDENTITY, true, false) })
             .unwrap();
     map.integrate(&Pose::IDENTITY, &frame).unwrap();
     map.watch((-10..10).flat_map(|x| (0..30).map(move |z| [x, 1, z])));
@@ -399,7 +399,7 @@ fn watched_cells_tell_what_happened() {
 #[test]
 fn lattice_is_the_one_that_was_asked_for() {
     let map =
-        SparseTsdf::new(SparseTsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..Default::default() })
+        Tsdf3::new(TsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..Default::default() })
             .unwrap();
     assert_eq!(*map.lattice(), Lattice::new([1.0, 2.0, 3.0], 0.1));
 }

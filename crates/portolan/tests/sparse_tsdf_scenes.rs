@@ -3,7 +3,7 @@
 
 use portolan::cell::SignedDistance;
 use portolan::geom::{Aabb, Pose, vector};
-use portolan::map::{MapError, PointSweep, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{MapError, PointSweep, Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, Orthographic, Pinhole, PointScan, Projection, RangeImage, Spherical};
 use portolan::store::Store;
 
@@ -60,7 +60,7 @@ fn looking_at_zero(from: [f64; 3]) -> Pose<3> {
 }
 
 /// Where the field changes its sign between neighbouring cells, by linear interpolation.
-fn crossings(map: &SparseTsdf) -> Vec<[f64; 3]> {
+fn crossings(map: &Tsdf3) -> Vec<[f64; 3]> {
     let mut found = Vec::new();
     for (key, brick) in map.store().bricks_by_age() {
         for i in (0..512).filter(|&i| brick.weights()[i] > 0.5) {
@@ -89,13 +89,13 @@ fn quantiles(mut errors: Vec<f64>) -> (f64, f64) {
     (errors[errors.len() / 2], errors[errors.len() * 95 / 100])
 }
 
-fn config(resolution: f64, cells: f64) -> SparseTsdfConfig {
-    SparseTsdfConfig { resolution, truncation: cells * resolution, ..Default::default() }
+fn config(resolution: f64, cells: f64) -> TsdfConfig {
+    TsdfConfig { resolution, truncation: cells * resolution, ..Default::default() }
 }
 
 #[test]
 fn a_sphere_is_where_it_is_from_all_sides() {
-    let mut map = SparseTsdf::new(config(0.02, 4.0)).unwrap();
+    let mut map = Tsdf3::new(config(0.02, 4.0)).unwrap();
     for k in 0..12 {
         let (a, b) = (f64::from(k) * 0.9, f64::from(k) * 0.5 - 2.7);
         let from = [2.5 * a.cos() * b.cos(), 2.5 * a.sin() * b.cos(), 2.5 * b.sin()];
@@ -112,7 +112,7 @@ fn a_sphere_is_where_it_is_from_all_sides() {
 
 #[test]
 fn a_sphere_under_parallel_rays() {
-    let mut map = SparseTsdf::new(config(0.001, 4.0)).unwrap();
+    let mut map = Tsdf3::new(config(0.001, 4.0)).unwrap();
     let rays = Orthographic { first: [-0.06, 0.06], step: [0.0008, -0.0008] };
     let pose = Pose::IDENTITY;
     let mut image = see(Projection::Orthographic { rays, top: 0.1 }, [150, 150], &pose, sphere(0.05));
@@ -140,7 +140,7 @@ fn walls_between_the_rings_of_a_lidar_are_planes() {
         let to = |k: usize| (size[k][usize::from(d[k] > 0.0)] - from[k]) / d[k];
         (0..3).map(to).filter(|t| t.is_finite()).min_by(f64::total_cmp)
     };
-    let mut map = SparseTsdf::new(config(0.05, 4.0)).unwrap();
+    let mut map = Tsdf3::new(config(0.05, 4.0)).unwrap();
     for k in 0..3 {
         let pose = Pose::<3> { translation: [0.21 * f64::from(k), 0.1, 0.03], ..Pose::IDENTITY };
         let image = see(Projection::Spherical(lidar.clone()), [512, 32], &pose, room);
@@ -166,7 +166,7 @@ fn a_plate_of_two_centimetres_stays_from_both_sides() {
         let p = vector::along(from, d, t);
         (t > 0.0 && p[1].abs() < 0.3 && p[2].abs() < 0.3).then_some(t)
     };
-    let mut map = SparseTsdf::new(config(0.01, 2.5)).unwrap();
+    let mut map = Tsdf3::new(config(0.01, 2.5)).unwrap();
     for k in 0..10 {
         let side = if k % 2 == 0 { 1.2 } else { -1.2 };
         let pose = looking_at_zero([side, 0.2 - 0.04 * f64::from(k), 0.1]);
@@ -186,7 +186,7 @@ fn a_plate_of_two_centimetres_stays_from_both_sides() {
 fn what_is_gone_is_carved_and_what_is_behind_is_not_touched() {
     let pose = Pose::<3>::IDENTITY;
     let wall = |z: f64| see(Projection::Pinhole(CAMERA), [160, 120], &pose, move |_, d| Some(z / d[2]));
-    let mut map = SparseTsdf::new(SparseTsdfConfig { w_max: 4.0, ..config(0.05, 3.0) }).unwrap();
+    let mut map = Tsdf3::new(TsdfConfig { w_max: 4.0, ..config(0.05, 3.0) }).unwrap();
     map.integrate(&pose, &Frame::Image(wall(1.0))).unwrap();
     assert!(map.signed_distance([0.0, 0.0, 0.99]).known().is_some());
     assert_eq!(map.signed_distance([0.0, 0.0, 1.3]), portolan::Answer::Unknown);
@@ -196,7 +196,7 @@ fn what_is_gone_is_carved_and_what_is_behind_is_not_touched() {
     assert_eq!(map.occupancy([0.0, 0.0, 1.02]), Some(0.0));
     let before = map.clone();
     map.integrate(&pose, &Frame::Image(wall(1.0))).unwrap();
-    let behind = |m: &SparseTsdf| m.signed_distance([0.02, 0.02, 1.98]);
+    let behind = |m: &Tsdf3| m.signed_distance([0.02, 0.02, 1.98]);
     assert_eq!(behind(&before), behind(&map));
 }
 
@@ -214,7 +214,7 @@ fn plain(values: Vec<f32>) -> RangeImage {
 
 #[test]
 fn what_is_no_scan_is_refused_and_counted() {
-    let mut map = SparseTsdf::new(SparseTsdfConfig { max_range: 5.0, ..config(0.05, 3.0) }).unwrap();
+    let mut map = Tsdf3::new(TsdfConfig { max_range: 5.0, ..config(0.05, 3.0) }).unwrap();
     let good = Frame::Image(plain(vec![1.0; 64]));
     let bent =
         Pose::<3> { rotation: [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
@@ -243,28 +243,28 @@ fn what_is_no_scan_is_refused_and_counted() {
         assert!(matches!(map.integrate(&Pose::IDENTITY, &Frame::Image(image)), Err(MapError::Image(_))));
     }
     for bad in [
-        SparseTsdfConfig { resolution: 0.0, ..config(0.05, 3.0) },
-        SparseTsdfConfig { carve_weight: f32::NAN, ..config(0.05, 3.0) },
-        SparseTsdfConfig { truncation: -1.0, ..config(0.05, 3.0) },
-        SparseTsdfConfig { max_range: f64::INFINITY, ..config(0.05, 3.0) },
-        SparseTsdfConfig { min_range: 5.0, max_range: 4.0, ..config(0.05, 3.0) },
-        SparseTsdfConfig { origin: [f64::NAN, 0.0, 0.0], ..config(0.05, 3.0) },
+        TsdfConfig { resolution: 0.0, ..config(0.05, 3.0) },
+        TsdfConfig { carve_weight: f32::NAN, ..config(0.05, 3.0) },
+        TsdfConfig { truncation: -1.0, ..config(0.05, 3.0) },
+        TsdfConfig { max_range: f64::INFINITY, ..config(0.05, 3.0) },
+        TsdfConfig { min_range: 5.0, max_range: 4.0, ..config(0.05, 3.0) },
+        TsdfConfig { origin: [f64::NAN, 0.0, 0.0], ..config(0.05, 3.0) },
     ] {
-        assert!(SparseTsdf::new(bad).is_err(), "{bad:?}");
+        assert!(Tsdf3::new(bad).is_err(), "{bad:?}");
     }
 }
 
 #[test]
 fn limit_and_bounds_are_kept() {
     let frame = |depth| Frame::Image(plain(vec![depth; 64]));
-    let mut map = SparseTsdf::new(config(0.05, 3.0)).unwrap();
+    let mut map = Tsdf3::new(config(0.05, 3.0)).unwrap();
     map.set_limit(200_000);
     assert!(map.integrate(&Pose::IDENTITY, &frame(1.0)).is_ok());
     let full = map.integrate(&Pose::IDENTITY, &frame(60.0)).unwrap_err();
     assert!(matches!(full, MapError::Full(_)), "{full}");
     assert!(map.memory_bytes() <= 200_000 && map.signed_distance([0.0, 0.0, 0.98]).known().is_some());
 
-    let mut map = SparseTsdf::new(config(0.05, 3.0)).unwrap();
+    let mut map = Tsdf3::new(config(0.05, 3.0)).unwrap();
     let bounds = Aabb::new([-0.13, -10.0, 0.42], [0.31, 10.0, 0.97]);
     map.set_bounds(Some(bounds));
     for frame in [frame(1.0), Frame::Points(PointScan::new([[0.1, 0.1, 0.9], [0.1, 0.0, 1.2]], [0.0; 3]))] {
@@ -292,7 +292,7 @@ fn bare_points_get_their_rows_and_columns_back() {
     });
     let points: Vec<[f32; 3]> = image.points().map(|(_, p)| p.map(|v| v as f32)).collect();
     let fused = |frame: &Frame, sweep| {
-        let mut map = SparseTsdf::new(SparseTsdfConfig { sweep, ..config(0.05, 3.0) }).unwrap();
+        let mut map = Tsdf3::new(TsdfConfig { sweep, ..config(0.05, 3.0) }).unwrap();
         let stats = map.integrate(&Pose::IDENTITY, frame).unwrap();
         (map, stats)
     };
@@ -322,7 +322,7 @@ fn colours_lie_near_the_surface_and_nowhere_else() {
     let mut scan = PointScan::new(image.points().map(|(_, p)| p.map(|v| v as f32)), [0.0; 3]);
     scan.colors = image.colors.clone();
     for frame in [Frame::Image(image), Frame::Points(scan)] {
-        let mut map = SparseTsdf::new(SparseTsdfConfig { color: true, ..config(0.02, 4.0) }).unwrap();
+        let mut map = Tsdf3::new(TsdfConfig { color: true, ..config(0.02, 4.0) }).unwrap();
         for _ in 0..3 {
             map.integrate(&pose, &frame).unwrap();
         }
@@ -339,7 +339,7 @@ fn colours_lie_near_the_surface_and_nowhere_else() {
 #[test]
 fn points_in_one_call_at_utm_coordinates() {
     let far = [500_000.0, 4_000_000.0, 100.0];
-    let mut map = SparseTsdf::new(SparseTsdfConfig { origin: far, ..config(0.05, 3.0) }).unwrap();
+    let mut map = Tsdf3::new(TsdfConfig { origin: far, ..config(0.05, 3.0) }).unwrap();
     let points: Vec<[f64; 3]> = (0..1000)
         .map(|i| vector::add(far, [2.0, f64::from(i % 40) * 0.02, f64::from(i / 40) * 0.02]))
         .collect();

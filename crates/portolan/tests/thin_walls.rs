@@ -5,13 +5,13 @@ mod common;
 
 use common::quantile;
 use portolan::geom::{Grid, Pose};
-use portolan::map::{SweepKind, Tsdf2, Tsdf2Config};
+use portolan::map::{BeamSweep, Tsdf2, TsdfConfig};
 use portolan::surface::{ContourSettings, marching_squares, thin_walls};
 use portolan_sim::{Lidar, Solid, SolidKind, World, scan_at};
 
 /// A wall of this thickness between two halves of a room, seen from 20 places on either side; returns the
 /// extracted thickness (metres) and the length that is reported as too thin.
-fn extracted(thickness: f64, sweep: SweepKind, truncation: f64) -> (f64, f64) {
+fn extracted(thickness: f64, sweep: BeamSweep, truncation: f64) -> (f64, f64) {
     let half = 0.5 * thickness;
     let wall = |name: &str, min, max| Solid::rectangle(name, SolidKind::Wall, min, max);
     let world = World::new(vec![
@@ -24,7 +24,7 @@ fn extracted(thickness: f64, sweep: SweepKind, truncation: f64) -> (f64, f64) {
     ]);
     let grid = Grid::new([-3.5, -2.5], 0.05, [140, 100]);
     let mut tsdf =
-        Tsdf2::new(Tsdf2Config { sweep, truncation, ..Default::default() }.with_grid(&grid)).unwrap();
+        Tsdf2::new(TsdfConfig { sweep, truncation, ..Default::default() }.with_grid(&grid)).unwrap();
     for i in 0..40u32 {
         let side = if i % 2 == 0 { 1.0 } else { -1.0 };
         let step = f64::from(i / 2);
@@ -61,7 +61,7 @@ fn walls_of_10_20_and_30_cm_seen_from_both_sides() {
         (0.30, 0.30, 0.300, true),
     ];
     for (tau, thickness, want, warned) in table {
-        let (measured, thin) = extracted(thickness, SweepKind::CellCentre, tau);
+        let (measured, thin) = extracted(thickness, BeamSweep::CellCentre, tau);
         println!(
             "tau {tau} m: a wall of {thickness} m comes out {measured:.3} m thick, {thin:.1} m reported thin"
         );
@@ -76,6 +76,6 @@ fn walls_of_10_20_and_30_cm_seen_from_both_sides() {
 /// loses about 1 cm from either face.
 #[test]
 fn the_march_moves_both_faces_inwards() {
-    let (measured, _) = extracted(0.30, SweepKind::March, 0.15);
+    let (measured, _) = extracted(0.30, BeamSweep::March, 0.15);
     assert!((measured - 0.281).abs() < 0.005, "{measured}");
 }

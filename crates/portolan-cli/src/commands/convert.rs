@@ -326,7 +326,7 @@ fn contour_of(esdf: &Esdf<2>) -> anyhow::Result<Contour> {
 /// The cells as an occupancy grid whose cells are as sure as they can be.
 fn as_map_file(map: &MapServerMap, args: &Args) -> anyhow::Result<MapFile> {
     let model = OccupancyModel::default();
-    let mut grid = OccupancyGrid::new(map.grid, model)?;
+    let mut grid = OccupancyGrid::covering(map.grid, model)?;
     let (free, occupied) = (grid.rule().min, grid.rule().max);
     let cells = map.cells.iter().map(|c| match c {
         MapCell::Free => LogOdds8(free),

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use portolan::geom::{Grid, Pose};
-use portolan::map::SweepKind;
+use portolan::map::BeamSweep;
 use portolan::scan::{RangeLimits, Scan, ScanStats};
 use portolan::sweep::WeightModel;
 use portolan_io::{MapFile, write_atomic};
@@ -208,7 +208,7 @@ fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
         truncation: TRUNCATION,
         w_max: w_max.unwrap_or(64.0),
         weights: WeightModel::default(),
-        sweep: SweepKind::default(),
+        sweep: BeamSweep::default(),
         carve: true,
         carve_weight: 1.0,
         limits: RangeLimits { max: lidar.max_range, ..Default::default() },

@@ -9,7 +9,7 @@ use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
 use portolan::geom::{Aabb, Grid, Pose};
-use portolan::map::{SweepKind, Tsdf2Config};
+use portolan::map::{BeamSweep, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::ContourSettings;
 use portolan::sweep::WeightModel;
@@ -119,7 +119,7 @@ impl Args {
             truncation: self.truncation.unwrap_or(3.0 * self.resolution),
             w_max: 64.0,
             weights: WeightModel::default(),
-            sweep: SweepKind::default(),
+            sweep: BeamSweep::default(),
             carve: true,
             carve_weight: 1.0,
             limits: Default::default(),
@@ -153,7 +153,7 @@ pub(crate) fn measure(
 ) -> anyhow::Result<Gallery> {
     let settings = GallerySettings {
         grid: *grid,
-        tsdf: Tsdf2Config { truncation: made_with.truncation, w_max: made_with.w_max, ..Default::default() },
+        tsdf: TsdfConfig { truncation: made_with.truncation, w_max: made_with.w_max, ..Default::default() },
         model: OccupancyModel::default(),
         contour: ContourSettings::default(),
         esdf: EsdfSettings::default(),

@@ -7,7 +7,7 @@ use anyhow::bail;
 use portolan::Answer;
 use portolan::field::{Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
 use portolan::geom::Pose;
-use portolan::map::{MapRepr, OccupancySweep, SparseOccupancy};
+use portolan::map::{MapRepr, OccupancySweep, Occupancy};
 use portolan::store::Store;
 use portolan_io::{
     AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
@@ -230,7 +230,7 @@ fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
         field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
     let occupancy: Occupancy<3> = match (file.occupancy, file.tsdf) {
         (Some(map), _) => {
-            let map = SparseOccupancy::from_store(map.store, map.model, OccupancySweep::Auto)?;
+            let map = Occupancy::from_store(map.store, map.model, OccupancySweep::Auto)?;
             Box::new(move |p| map.probability(p))
         }
         (None, Some(map)) => Box::new(move |p| match map.store.lattice().cell_of(p) {

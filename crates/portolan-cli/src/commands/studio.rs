@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig};
 use portolan_io::{AnyMapFile, FileKind, detect};
 use portolan_studio::engine::{Limits, Logs, PlaneLog, SpaceSource, check};
 use portolan_studio::server::{Server, Settings};
@@ -105,14 +105,14 @@ impl Args {
         let Some(held) = file.tsdf else {
             bail!("{shown}: the map holds no distances, and so no surface; make it with --maps tsdf");
         };
-        let config = SparseTsdfConfig {
+        let config = TsdfConfig {
             truncation: held.truncation,
             w_max: held.w_max,
             carve_weight: held.carve_weight,
             weights: held.weights,
-            ..SparseTsdfConfig::default()
+            ..TsdfConfig::default()
         };
-        let tsdf = SparseTsdf::from_stores(held.store, file.colors.map(|c| c.store), config)?;
+        let tsdf = Tsdf3::from_stores(held.store, file.colors.map(|c| c.store), config)?;
         let space = SpaceSource::Map { name: name(path), tsdf: Box::new(tsdf) };
         Ok(Logs { space, ..Logs::default() })
     }

@@ -100,7 +100,7 @@ impl Drift {
         let config =
             TsdfConfig { truncation: settings.truncation, w_max: settings.w_max, ..Default::default() };
         for (k, set) in PoseSet::ALL.into_iter().enumerate() {
-            let mut tsdf = Tsdf::<2>::new(config.with_grid(&grid))?;
+            let mut tsdf = Tsdf2::new(config.with_grid(&grid))?;
             for (pose, (_, scan)) in self.poses(set).iter().zip(log) {
                 tsdf.integrate(pose, scan, settings.carve);
             }

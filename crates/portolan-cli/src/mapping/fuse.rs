@@ -15,7 +15,7 @@ use crate::progress::Progress;
 pub(crate) struct Maps {
     pub(crate) grid: Option<OccupancyGrid<2>>,
     pub(crate) tree: Option<Quadtree>,
-    pub(crate) tsdf: Option<Tsdf<2>>,
+    pub(crate) tsdf: Option<Tsdf2>,
 }
 
 impl Maps {

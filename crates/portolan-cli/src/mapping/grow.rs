@@ -15,7 +15,7 @@ pub(crate) fn grown(maps: Maps, grid: &Grid<2>) -> anyhow::Result<Maps> {
         let store = map.store().regridded(*grid).ok_or_else(lost)?;
         anyhow::Ok(OccupancyGrid::from_store(store, *map.model())?)
     };
-    let grow_tsdf = |map: Tsdf<2>| {
+    let grow_tsdf = |map: Tsdf2| {
         let store = map.store().regridded(*grid).ok_or_else(lost)?;
         anyhow::Ok(Tsdf::from_store(store, *map.config())?)
     };

@@ -2,7 +2,7 @@
 
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{OccupancyGrid, Quadtree, SweepKind, Tsdf, TsdfConfig};
+use portolan::map::{OccupancyGrid, Quadtree, BeamSweep, Tsdf, TsdfConfig};
 use portolan::scan::RangeLimits;
 use portolan::sweep::WeightModel;
 use portolan_io::{MapFile, sweep_word, weights_word};
@@ -38,7 +38,7 @@ pub(crate) struct Settings {
     pub(crate) truncation: f64,
     pub(crate) w_max: f32,
     pub(crate) weights: WeightModel,
-    pub(crate) sweep: SweepKind,
+    pub(crate) sweep: BeamSweep,
     pub(crate) carve: bool,
     pub(crate) carve_weight: f32,
     pub(crate) limits: RangeLimits,
@@ -68,7 +68,7 @@ impl Settings {
         };
         let made = |kind| self.wants(kind);
         Ok(Maps {
-            grid: made(MapKind::Grid).then(|| OccupancyGrid::new(*grid, model)).transpose()?,
+            grid: made(MapKind::Grid).then(|| OccupancyGrid::covering(*grid, model)).transpose()?,
             tree: made(MapKind::Tree).then(|| Quadtree::covering(grid, model)).transpose()?,
             tsdf: made(MapKind::Tsdf).then(|| Tsdf::new(config.with_grid(grid))).transpose()?,
         })

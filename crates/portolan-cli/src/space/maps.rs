@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::bail;
 use portolan::geom::{Aabb, Pose};
-use portolan::map::{MapError, SparseOccupancy, SparseTsdf};
+use portolan::map::{MapError, Occupancy, Tsdf3};
 use portolan::scan::{Frame, ScanStats};
 use portolan::store::Store;
 use portolan_io::{ColorBricks, OccupancyBricks, SpaceMapFile, TsdfBricks};
@@ -17,8 +17,8 @@ use crate::mapping::MapKind;
 /// The maps that frames are fused into.
 #[derive(Default)]
 pub(crate) struct SpaceMaps {
-    pub(crate) occupancy: Option<SparseOccupancy>,
-    pub(crate) tsdf: Option<SparseTsdf>,
+    pub(crate) occupancy: Option<Occupancy>,
+    pub(crate) tsdf: Option<Tsdf3>,
 }
 
 impl SpaceMaps {
@@ -54,7 +54,7 @@ impl SpaceMaps {
         let mut stats = ScanStats::default();
         let start = Instant::now();
         if self.occupancy.is_some() {
-            let others = self.tsdf.as_ref().map_or(0, SparseTsdf::memory_bytes);
+            let others = self.tsdf.as_ref().map_or(0, Tsdf3::memory_bytes);
             if let Some(map) = &mut self.occupancy {
                 map.set_limit(memory.saturating_sub(others));
                 stats = map.integrate(pose, frame)?;
@@ -63,7 +63,7 @@ impl SpaceMaps {
         }
         let start = Instant::now();
         if self.tsdf.is_some() {
-            let others = self.occupancy.as_ref().map_or(0, SparseOccupancy::memory_bytes);
+            let others = self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes);
             if let Some(map) = &mut self.tsdf {
                 map.set_limit(memory.saturating_sub(others));
                 stats = map.integrate(pose, frame)?;
@@ -90,10 +90,10 @@ impl SpaceMaps {
             );
         }
         let occupancy =
-            file.occupancy.take().map(|o| SparseOccupancy::from_store(o.store, o.model, settings.sweep));
+            file.occupancy.take().map(|o| Occupancy::from_store(o.store, o.model, settings.sweep));
         let tsdf = file.tsdf.take().map(|t| {
             let config = settings.tsdf_config(t.store.lattice().origin);
-            SparseTsdf::from_stores(t.store, file.colors.take().map(|c| c.store), config)
+            Tsdf3::from_stores(t.store, file.colors.take().map(|c| c.store), config)
         });
         Ok(Self { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()? })
     }

@@ -2,7 +2,7 @@
 
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Lattice};
-use portolan::map::{OccupancySweep, PointSweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{OccupancySweep, PointSweep, Occupancy, Tsdf3, TsdfConfig};
 use portolan::scan::{Body, FrameFilter};
 use portolan::sweep::WeightModel;
 use portolan_io::weights_word;
@@ -44,8 +44,8 @@ impl Settings {
     }
 
     /// Settings of the distance field, about a lattice's origin.
-    pub(crate) fn tsdf_config(&self, origin: [f64; 3]) -> SparseTsdfConfig {
-        SparseTsdfConfig {
+    pub(crate) fn tsdf_config(&self, origin: [f64; 3]) -> TsdfConfig {
+        TsdfConfig {
             resolution: self.resolution,
             origin,
             truncation: self.truncation,
@@ -60,7 +60,7 @@ impl Settings {
             },
             // What is beyond the caller's limit is cut before; the map's own is as far as it reaches.
             max_range: FARTHEST_CELLS * self.resolution - self.truncation,
-            ..SparseTsdfConfig::default()
+            ..TsdfConfig::default()
         }
     }
 
@@ -69,8 +69,8 @@ impl Settings {
         let lattice = Lattice::new(origin, self.resolution);
         let occupancy = self
             .wants(MapKind::Tree)
-            .then(|| SparseOccupancy::new(lattice, OccupancyModel::default(), self.sweep));
-        let tsdf = self.wants(MapKind::Tsdf).then(|| SparseTsdf::new(self.tsdf_config(origin)));
+            .then(|| Occupancy::new(lattice, OccupancyModel::default(), self.sweep));
+        let tsdf = self.wants(MapKind::Tsdf).then(|| Tsdf3::new(self.tsdf_config(origin)));
         Ok(SpaceMaps { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()? })
     }
 

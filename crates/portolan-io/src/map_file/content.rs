@@ -16,7 +16,7 @@ pub struct MapFile {
     /// The quadtree.
     pub tree: Option<Quadtree>,
     /// The truncated signed distance field.
-    pub tsdf: Option<Tsdf<2>>,
+    pub tsdf: Option<Tsdf2>,
     /// Poses of the sensor at the scans that were fused, `world_from_sensor`.
     pub poses: Vec<Pose<2>>,
     pub(super) unknown_maps: Vec<Value>,
@@ -45,7 +45,7 @@ mod tests {
                 more: [("studio".to_owned(), json!({"colour": 0.1}))].into_iter().collect(),
                 ..Default::default()
             },
-            grid: Some(OccupancyGrid::new(grid, OccupancyModel::default()).unwrap()),
+            grid: Some(OccupancyGrid::covering(grid, OccupancyModel::default()).unwrap()),
             tree: Some(Quadtree::covering(&grid, OccupancyModel::default()).unwrap()),
             tsdf: Some(
                 Tsdf::new(TsdfConfig { truncation: 0.3, ..Default::default() }.with_grid(&grid)).unwrap(),

@@ -2,7 +2,7 @@
 
 use portolan::cell::OccupancyModel;
 use portolan::geom::Grid;
-use portolan::map::SweepKind;
+use portolan::map::BeamSweep;
 use portolan::sweep::WeightModel;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -107,16 +107,16 @@ impl Model {
 }
 
 /// The word for a sweep in files and on the command line.
-pub fn sweep_word(sweep: SweepKind) -> &'static str {
+pub fn sweep_word(sweep: BeamSweep) -> &'static str {
     match sweep {
-        SweepKind::CellCentre => "cell-centre",
-        SweepKind::March => "march",
+        BeamSweep::CellCentre => "cell-centre",
+        BeamSweep::March => "march",
     }
 }
 
 /// The sweep of a word.
-pub fn sweep_of(word: &str) -> Option<SweepKind> {
-    [SweepKind::CellCentre, SweepKind::March].into_iter().find(|&s| sweep_word(s) == word)
+pub fn sweep_of(word: &str) -> Option<BeamSweep> {
+    [BeamSweep::CellCentre, BeamSweep::March].into_iter().find(|&s| sweep_word(s) == word)
 }
 
 /// The word for a weight model in files and on the command line.

@@ -1,7 +1,7 @@
 //! What the studio shows: a log of the plane and one of space, recorded or simulated.
 
 use portolan::geom::Pose;
-use portolan::map::SparseTsdf;
+use portolan::map::Tsdf3;
 use portolan::scan::{FrameFilter, Scan};
 use portolan_io::space_log::SpaceLog;
 
@@ -47,6 +47,6 @@ pub enum SpaceSource {
         /// Its name, for people.
         name: String,
         /// Every session has a snapshot of it.
-        tsdf: Box<SparseTsdf>,
+        tsdf: Box<Tsdf3>,
     },
 }

@@ -2,7 +2,7 @@
 
 use portolan::cell::FusionEvent;
 use portolan::geom::Grid;
-use portolan::map::{Tsdf2, Tsdf2Config};
+use portolan::map::{Tsdf2, TsdfConfig};
 use portolan_sim::{LapConfig, apartment, lap};
 use serde_json::json;
 
@@ -78,7 +78,7 @@ fn the_main_thread_has_little_to_do() {
 
 /// What the library says that scans did to a cell, with the page's settings.
 fn events(cell: [i32; 2], scans: usize) -> Vec<(usize, FusionEvent)> {
-    let config = Tsdf2Config::default();
+    let config = TsdfConfig::default();
     let mut tsdf = Tsdf2::new(config.with_grid(&Grid::new([0.0; 2], 0.05, [240, 180]))).unwrap();
     tsdf.watch([cell]);
     let mut events = Vec::new();

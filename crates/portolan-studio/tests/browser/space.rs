@@ -2,7 +2,7 @@
 
 use portolan::cell::DistanceBrick;
 use portolan::geom::{BlockKey, Lattice};
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::store::Bricks;
 use portolan_studio::engine::{Logs, SpaceSource};
 use portolan_studio::server::Settings;
@@ -120,7 +120,7 @@ fn a_link_shows_the_same_and_files_can_be_taken_away() {
 }
 
 /// A surface that fills space, of four million triangles.
-fn gyroid() -> SparseTsdf {
+fn gyroid() -> Tsdf3 {
     const CELLS: i32 = 184;
     const PERIOD: f64 = 16.0;
     let mut store = Bricks::new(Lattice::new([0.0; 3], 0.05));
@@ -134,7 +134,7 @@ fn gyroid() -> SparseTsdf {
         let distances: Vec<f32> = (0..512).map(value).collect();
         store.insert(key, DistanceBrick::from_parts(&distances, &[4.0; 512]).unwrap()).unwrap();
     }
-    SparseTsdf::from_stores(store, None, SparseTsdfConfig::default()).unwrap()
+    Tsdf3::from_stores(store, None, TsdfConfig::default()).unwrap()
 }
 
 #[test]

@@ -90,6 +90,10 @@ impl Evidence for Colors {
     fn observed(&self) -> usize {
         self.weight.iter().map(|&w| u32::from(w > 0.0)).sum::<u32>() as usize
     }
+
+    fn keep(&mut self, inside: impl Fn(usize) -> bool) {
+        self.weight.iter_mut().enumerate().filter(|(i, _)| !inside(*i)).for_each(|(_, w)| *w = 0.0);
+    }
 }
 
 /// Colours of a brick's cells: four words each, red, green, blue, weight; weight 0: never observed.

@@ -72,4 +72,8 @@ impl Evidence for Distances {
         // Summed as u32, which stands in vectors of the same width as the weights.
         self.weight.iter().map(|&w| u32::from(w > 0.0)).sum::<u32>() as usize
     }
+
+    fn keep(&mut self, inside: impl Fn(usize) -> bool) {
+        self.weight.iter_mut().enumerate().filter(|(i, _)| !inside(*i)).for_each(|(_, w)| *w = 0.0);
+    }
 }

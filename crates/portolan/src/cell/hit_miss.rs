@@ -81,4 +81,11 @@ impl Evidence for HitMiss {
     fn observed(&self) -> usize {
         (0..self.words).map(|w| (self.hit[w] | self.miss[w]).count_ones() as usize).sum()
     }
+
+    fn keep(&mut self, inside: impl Fn(usize) -> bool) {
+        for i in (0..64 * self.words).filter(|&i| !inside(i)) {
+            self.hit[i >> 6] &= !(1 << (i & 63));
+            self.miss[i >> 6] &= !(1 << (i & 63));
+        }
+    }
 }

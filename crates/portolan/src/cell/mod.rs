@@ -37,6 +37,9 @@ pub trait Evidence: Clone + Send + Sync {
 
     /// Number of cells that it says something about.
     fn observed(&self) -> usize;
+
+    /// Forgets the observations of all cells but those that `inside` accepts.
+    fn keep(&mut self, inside: impl Fn(usize) -> bool);
 }
 
 /// Cells in structure-of-arrays form.

@@ -51,10 +51,10 @@ impl Default for FrontierSettings {
 /// store.insert(BlockKey([1, 0]), DistanceBrick::from_parts(&[0.3; 64], &[1.0; 64]).expect("sane"))?;
 /// assert_eq!(map.update(&store), [BlockKey([0, 0]), BlockKey([1, 0])]);
 /// assert_eq!(map.frontiers()[0].extent.max[0], 1.6);
-/// # Ok::<(), portolan::store::BricksFull>(())
+/// # Ok::<(), portolan::store::StoreFull>(())
 /// ```
 ///
-/// In space the same with [`SparseTsdf::store`](crate::map::SparseTsdf::store):
+/// In space the same with [`Tsdf3::store`](crate::map::Tsdf3::store):
 ///
 /// ```
 /// use portolan::cell::DistanceBrick;
@@ -69,7 +69,7 @@ impl Default for FrontierSettings {
 /// // The shell of the free cube, open to all sides.
 /// let shell = &map.frontiers()[0];
 /// assert_eq!((shell.cells.len(), shell.faces, shell.normal), (512 - 216, 384, None));
-/// # Ok::<(), portolan::store::BricksFull>(())
+/// # Ok::<(), portolan::store::StoreFull>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct FrontierMap<const D: usize> {

@@ -74,7 +74,7 @@ const FARTHEST: f64 = 1e5;
 /// let gain = expected_gain(&store, &world_from_sensor, &fan(0.0, 0.0, 1), &settings);
 /// assert_eq!((gain.cells, gain.unknown), (2, 1));
 /// assert!((gain.volume - 0.02).abs() < 1e-12);
-/// # Ok::<(), portolan::store::BricksFull>(())
+/// # Ok::<(), portolan::store::StoreFull>(())
 /// ```
 pub fn expected_gain<const D: usize>(
     store: &Bricks<SignedDistance, D>,

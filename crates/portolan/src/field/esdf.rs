@@ -3,7 +3,7 @@
 use super::{SparseEsdf, SparseEsdfSettings, squared_distance_transform};
 use crate::answer::Answer;
 use crate::geom::{Grid, interpolate, vector};
-use crate::map::{Abilities, DerivedField, Tsdf};
+use crate::map::{Abilities, DerivedField, DenseTsdf};
 
 /// Settings of [`esdf_from_tsdf`] as a derived field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ impl Default for EsdfSettings {
 impl EsdfSettings {
     /// The default with a `W_min` of half of what one ordinary observation of free space weighs in this map, so that
     /// what was seen free once is known (the chapter's 0.5 where everything weighs 1).
-    pub fn of<const D: usize>(tsdf: &Tsdf<D>) -> Self {
+    pub fn of<const D: usize>(tsdf: &DenseTsdf<D>) -> Self {
         let config = tsdf.config();
         Self { min_weight: 0.5 * config.weights.typical_low() * config.carve_weight, ..Self::default() }
     }
@@ -62,7 +62,7 @@ pub struct Esdf<const D: usize> {
 /// angles to the way there. On an exact field that makes distances too small by up to one and a half cells,
 /// and never too large; on a fused field, whose values are projective, it can be too large by as much as the
 /// cells' values are.
-pub fn esdf_from_tsdf<const D: usize>(tsdf: &Tsdf<D>, min_weight: f32, band_cells: f64) -> Esdf<D> {
+pub fn esdf_from_tsdf<const D: usize>(tsdf: &DenseTsdf<D>, min_weight: f32, band_cells: f64) -> Esdf<D> {
     let grid = *tsdf.grid();
     let planes = tsdf.store().planes();
     let (distance, weight) = (planes.distances(), planes.weights());
@@ -97,7 +97,7 @@ impl<const D: usize> Esdf<D> {
     ///
     /// # Panics
     /// Where `max_distance` is not positive.
-    pub fn of_tsdf(tsdf: &Tsdf<D>, settings: &SparseEsdfSettings) -> Self {
+    pub fn of_tsdf(tsdf: &DenseTsdf<D>, settings: &SparseEsdfSettings) -> Self {
         let dense = SparseEsdf::of_tsdf(tsdf, settings).dense(tsdf.grid());
         Self { grid: dense.grid, distance: dense.distances }
     }
@@ -203,7 +203,7 @@ impl<const D: usize> Esdf<D> {
 impl<const D: usize> DerivedField<D> for Esdf<D> {
     type Settings = EsdfSettings;
 
-    fn derive(tsdf: &Tsdf<D>, settings: &EsdfSettings) -> Self {
+    fn derive(tsdf: &DenseTsdf<D>, settings: &EsdfSettings) -> Self {
         esdf_from_tsdf(tsdf, settings.min_weight, settings.band_cells)
     }
 
@@ -231,7 +231,7 @@ mod tests {
     use super::*;
     use crate::map::TsdfConfig;
 
-    fn sphere<const D: usize>(n: usize, r: f64, radius: f64) -> Tsdf<D> {
+    fn sphere<const D: usize>(n: usize, r: f64, radius: f64) -> DenseTsdf<D> {
         let config = TsdfConfig { cells: [n; D], resolution: r, truncation: 3.0 * r, ..Default::default() };
         let mut tsdf = Tsdf::new(config).unwrap();
         let centre = [0.5 * n as f64 * r; D];
@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_map_without_a_surface_is_unknown_and_not_far() {
-        let mut tsdf = Tsdf::<2>::new(TsdfConfig { cells: [10; 2], ..Default::default() }).unwrap();
+        let mut tsdf = Tsdf2::new(TsdfConfig { cells: [10; 2], ..Default::default() }).unwrap();
         (0..100).for_each(|i| {
             let cell = tsdf.grid().cell(i);
             tsdf.fuse(cell, 0.15, 1.0);
@@ -284,7 +284,7 @@ mod tests {
     #[test]
     fn unobserved_cells_make_their_neighbourhood_unknown() {
         let mut tsdf =
-            Tsdf::<2>::new(TsdfConfig { cells: [20; 2], resolution: 0.1, ..Default::default() }).unwrap();
+            Tsdf2::new(TsdfConfig { cells: [20; 2], resolution: 0.1, ..Default::default() }).unwrap();
         for i in 0..400 {
             let cell = tsdf.grid().cell(i);
             if cell != [10, 10] {

@@ -93,8 +93,8 @@ pub(super) fn contour_of_grid(map: &OccupancyGrid<2>) -> Contour {
 
 /// The boundary between free and occupied cells of a tree, over all that its root covers.
 pub(super) fn contour_of_tree(map: &Quadtree) -> Contour {
-    let own = Grid { lattice: *map.tree().lattice(), shape: map.tree().grid().shape };
-    occupancy_contour(&own, |cell| map.tree().cell(cell).map(|v| v.0))
+    let own = Grid { lattice: *map.store().lattice(), shape: map.store().grid().shape };
+    occupancy_contour(&own, |cell| map.store().cell(cell).map(|v| v.0))
 }
 
 /// Log odds as a field, occupied negative.

@@ -66,7 +66,7 @@ pub fn tree_crossovers_at(
         let grid = Grid::new(bounds.min, resolution, shape);
         let mut tree = Quadtree::covering(&grid, model)?;
         for (pose, scan) in log {
-            tree.integrate(pose, scan);
+            tree.integrate(pose, scan)?;
         }
         let bytes = crate::map::MapRepr::memory_bytes(&tree);
         let plane = (surface, extent[0] * extent[1]);
@@ -74,7 +74,7 @@ pub fn tree_crossovers_at(
             TreeCrossover::new(name, (node_bytes, resolution), plane, (bytes, grid.len()))
         };
         Ok([
-            against(CHAPTER_NODE, 20.0, 20 * tree.tree().nodes()),
+            against(CHAPTER_NODE, 20.0, 20 * tree.store().nodes()),
             against(OUR_NODE, inner_only_node_bytes::<2>(9.0), bytes),
         ])
     };

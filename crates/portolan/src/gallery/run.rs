@@ -9,9 +9,9 @@ use super::probes::{Clock, points, seconds_of};
 use super::row::{Cost, Row, Winner, Workload};
 use crate::cell::OccupancyModel;
 use crate::field::{Esdf2, EsdfSettings};
-use crate::geom::{Grid, Pose, vector};
+use crate::geom::{Grid, Lattice, Pose, vector};
 use crate::map::{
-    Cloud, DerivedField, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config,
+    Cloud, DerivedField, MapError, MapRepr, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig,
     inner_only_node_bytes,
 };
 use crate::scan::{Scan, ScanStats};
@@ -24,7 +24,7 @@ pub struct GallerySettings {
     /// The cells of the dense maps.
     pub grid: Grid<2>,
     /// The TSDF; its grid is replaced by `grid`.
-    pub tsdf: Tsdf2Config,
+    pub tsdf: TsdfConfig<2>,
     /// The occupancy filter of grid and trees.
     pub model: OccupancyModel,
     /// Contour extraction.
@@ -113,23 +113,24 @@ fn build(
     clock: &mut Clock<'_>,
 ) -> Result<Gallery, MapError> {
     let grid = settings.grid;
-    let tsdf_config = settings.tsdf.with_grid(&grid);
-    let march = Tsdf2Config { sweep: SweepKind::March, ..tsdf_config };
+    let carved = TsdfConfig { carve: true, ..settings.tsdf };
+    let banded = TsdfConfig { carve: false, ..settings.tsdf };
+    let march = TsdfConfig { beams: BeamSweep::March, ..carved };
 
-    let mut occupancy = OccupancyGrid::new(grid, settings.model)?;
-    let grid_update = fuse_all(clock, log, |at, scan| occupancy.integrate(at, scan));
+    let mut occupancy = OccupancyGrid::covering(&grid, settings.model)?;
+    let grid_update = fuse_all(clock, log, |at, scan| occupancy.integrate(at, scan))?;
     let mut tree = Quadtree::covering(&grid, settings.model)?;
-    let tree_update = fuse_all(clock, log, |at, scan| tree.integrate(at, scan));
+    let tree_update = fuse_all(clock, log, |at, scan| tree.integrate(at, scan))?;
     let mut chapter_tree = chapter_tree(&grid, settings.model)?;
-    let chapter_tree_update = fuse_all(clock, log, |at, scan| chapter_tree.integrate(at, scan));
-    let mut tsdf = Tsdf2::new(tsdf_config)?;
-    let tsdf_update = fuse_all(clock, log, |at, scan| tsdf.integrate(at, scan, true));
-    let mut banded = Tsdf2::new(tsdf_config)?;
-    let banded_update = fuse_all(clock, log, |at, scan| banded.integrate(at, scan, false));
-    let mut marched = Tsdf2::new(march)?;
-    let marched_update = fuse_all(clock, log, |at, scan| marched.integrate(at, scan, true));
+    let chapter_tree_update = fuse_all(clock, log, |at, scan| chapter_tree.integrate(at, scan))?;
+    let mut tsdf = Tsdf2::covering(&grid, carved)?;
+    let tsdf_update = fuse_all(clock, log, |at, scan| tsdf.integrate(at, scan))?;
+    let mut banded = Tsdf2::covering(&grid, banded)?;
+    let banded_update = fuse_all(clock, log, |at, scan| banded.integrate(at, scan))?;
+    let mut marched = Tsdf2::covering(&grid, march)?;
+    let marched_update = fuse_all(clock, log, |at, scan| marched.integrate(at, scan))?;
     let mut cloud = Cloud::new();
-    let cloud_update = fuse_all(clock, log, |at, scan| cloud.integrate(at, scan));
+    let cloud_update = fuse_all(clock, log, |at, scan| Ok(cloud.integrate(at, scan)))?;
     let (cloud_build, ()) = seconds_of(clock, || cloud.rebuild());
     let fields = fields_of(clock, &tsdf, &settings.esdf);
     let (contour_build, contour) = seconds_of(clock, || marching_squares(&tsdf, &settings.contour));
@@ -143,7 +144,7 @@ fn build(
     };
     let derived = |row: Row| Row { derived: true, ..row };
     let nodes =
-        |map: &Quadtree| format!("{} nodes, {} of them inner", map.tree().nodes(), map.tree().inner_nodes());
+        |map: &Quadtree| format!("{} nodes, {} of them inner", map.store().nodes(), map.store().inner_nodes());
     let segments = |map: &Tsdf2| marching_squares(map, &settings.contour).segments.len();
     // What a workload costs comes in this order, too: `costs.rs`.
     let rows = vec![
@@ -267,20 +268,20 @@ fn hold_against_truth(gallery: &mut Gallery, asker: &Asker<'_>) {
 fn fuse_all(
     clock: &mut Clock<'_>,
     log: &[(Pose<2>, Scan<2>)],
-    mut fuse: impl FnMut(&Pose<2>, &Scan<2>) -> ScanStats,
-) -> f64 {
+    mut fuse: impl FnMut(&Pose<2>, &Scan<2>) -> Result<ScanStats, MapError>,
+) -> Result<f64, MapError> {
     let start = clock();
     for (pose, scan) in log {
-        fuse(pose, scan);
+        fuse(pose, scan)?;
     }
-    (clock() - start) / log.len().max(1) as f64
+    Ok((clock() - start) / log.len().max(1) as f64)
 }
 
 /// The chapter's tree: leaves a 256th of a root of 16 m, or of as many doublings of it as the map needs.
 fn chapter_tree(grid: &Grid<2>, model: OccupancyModel) -> Result<Quadtree, MapError> {
     let extent = grid.aabb().extent().into_iter().fold(0.0, f64::max);
     let doublings = (extent / 16.0).log2().ceil().max(0.0) as u32;
-    Quadtree::new(grid.lattice.origin, 0.0625, 8 + doublings, model)
+    Quadtree::with_depth(Lattice::new(grid.lattice.origin, 0.0625), 8 + doublings, model)
 }
 
 fn tree_crossovers(
@@ -294,9 +295,9 @@ fn tree_crossovers(
     let plane = (settings.surface_length.unwrap_or(contour.length()), width * height);
     let dense = grid.len();
     let ours = inner_only_node_bytes::<2>(9.0);
-    let (fine, coarse) = (grid.lattice.resolution, chapter_tree.tree().lattice().resolution);
+    let (fine, coarse) = (grid.lattice.resolution, chapter_tree.store().lattice().resolution);
     vec![
-        TreeCrossover::new(CHAPTER_NODE, (20.0, coarse), plane, (20 * chapter_tree.tree().nodes(), dense)),
+        TreeCrossover::new(CHAPTER_NODE, (20.0, coarse), plane, (20 * chapter_tree.store().nodes(), dense)),
         TreeCrossover::new(OUR_NODE, (ours, fine), plane, (tree.memory_bytes(), dense)),
     ]
 }

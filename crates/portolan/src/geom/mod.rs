@@ -11,6 +11,7 @@
 
 mod aabb;
 mod block;
+mod cell_box;
 mod grid;
 mod interpolation;
 mod lattice;
@@ -20,6 +21,7 @@ mod walk;
 
 pub use aabb::Aabb;
 pub use block::{BLOCK_EDGE, BlockKey, block_cells};
+pub use cell_box::CellBox;
 pub use grid::Grid;
 pub use interpolation::interpolate;
 pub use lattice::Lattice;

@@ -2,7 +2,8 @@
 
 use crate::cell::{OccupancyModelError, TsdfRuleError};
 use crate::geom::{Grid, Lattice};
-use crate::store::BricksFull;
+use crate::store::StoreFull;
+use crate::sweep::PlanError;
 
 /// What is wrong with a map's settings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -46,15 +47,15 @@ pub enum MapError {
     /// Distances and colours lie on different lattices.
     #[error("the lattices of distances and colours differ")]
     Lattices,
-    /// Bricks would need more memory than they may have.
+    /// The map would need more memory than it may have.
     #[error(transparent)]
-    Full(#[from] BricksFull),
+    Full(#[from] StoreFull),
     /// One scan reaches further than can be searched, whatever memory there is.
     #[error(
-        "one scan reaches into more than {bricks} bricks of 8 x 8 x 8 cells: limit the range that is used, or make cells larger"
+        "one scan reaches into more than {bricks} blocks of 8 cells an edge: limit the range that is used, or make cells larger"
     )]
     TooFar {
-        /// Bricks that a scan may touch.
+        /// Blocks that a scan may touch.
         bricks: usize,
     },
     /// The occupancy model is not valid.
@@ -65,21 +66,21 @@ pub enum MapError {
     Rule(#[from] TsdfRuleError),
 }
 
-/// Bricks that one scan may touch at most.
-const MOST_BRICKS: usize = 1 << 26;
+/// Blocks that one scan may touch at most.
+const MOST_BLOCKS: usize = 1 << 26;
 
-/// Bricks that one scan may touch where a store may hold `limit` bytes and a touched one costs `bytes`: many may turn out
-/// to be silent, and the first few are free, but the search ends before it alone takes the memory.
-pub(super) fn most_bricks(limit: usize, bytes: usize) -> usize {
-    (limit / bytes).saturating_add(4096).min(MOST_BRICKS)
+/// Blocks that one scan may touch where a store may hold `limit` bytes and a touched one costs `bytes`: many may turn out
+/// to be unobserved, and the first few are free, but the search ends before it alone takes the memory.
+pub(super) fn most_blocks(limit: usize, bytes: usize) -> usize {
+    (limit / bytes).saturating_add(4096).min(MOST_BLOCKS)
 }
 
-/// What a scan gets that touches more than [`most_bricks`] of them.
-pub(super) fn too_many(most: usize, full: BricksFull) -> MapError {
-    if most == MOST_BRICKS || full.limit == usize::MAX {
-        MapError::TooFar { bricks: most }
-    } else {
-        MapError::Full(full)
+/// The map's error for a scan that cannot be planned, in a store that holds `bytes` of `limit`.
+pub(super) fn too_many(error: PlanError, most: usize, limit: usize, bytes: usize) -> MapError {
+    match error {
+        PlanError::BadImage(why) => MapError::Image(why),
+        PlanError::TooManyBlocks if most == MOST_BLOCKS || limit == usize::MAX => MapError::TooFar { bricks: most },
+        PlanError::TooManyBlocks => MapError::Full(StoreFull { limit, bytes }),
     }
 }
 

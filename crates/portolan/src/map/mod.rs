@@ -3,34 +3,45 @@
 mod cloud;
 mod error;
 mod integrate;
-mod occupancy_grid;
-mod repr;
-mod sparse_fuse;
-mod sparse_occupancy;
+mod occupancy;
+mod occupancy_3d;
+mod occupancy_rings;
 #[cfg(test)]
-mod sparse_occupancy_tests;
-mod sparse_tsdf;
-mod sparse_tsdf_config;
-mod tree_map;
+mod occupancy_projective_tests;
+#[cfg(test)]
+mod occupancy_tests;
+mod occupancy_tree;
+mod repr;
+mod scan_kind;
 mod tsdf;
+mod tsdf_3d;
+mod tsdf_config;
+#[cfg(test)]
+mod tsdf_tests;
+mod watch;
 
 pub use cloud::Cloud;
 pub use error::MapError;
-pub use occupancy_grid::OccupancyGrid;
+pub use integrate::integrate;
+pub use occupancy::Occupancy;
+pub use occupancy_tree::{CoarseOccupancy, crossover_resolution, inner_only_node_bytes, memory_ratio};
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
-pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
-pub use sparse_tsdf::SparseTsdf;
-pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
-pub use tree_map::{
-    CoarseOccupancy, Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio,
-};
-pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
+pub use scan_kind::ScanKind;
+pub use tsdf::Tsdf;
+pub use tsdf_config::{BeamSweep, PointSweep, TsdfConfig};
 
-/// A TSDF of the plane.
-pub type Tsdf2 = Tsdf<2>;
-/// A TSDF of space.
+use crate::cell::{LogOdds8, SignedDistance};
+use crate::store::{Dense, Tree};
+
+/// A TSDF over all cells of a grid.
+pub type DenseTsdf<const D: usize> = Tsdf<D, Dense<SignedDistance, D>>;
+/// A 2-D TSDF over all cells of a grid.
+pub type Tsdf2 = DenseTsdf<2>;
+/// A 3-D TSDF in bricks.
 pub type Tsdf3 = Tsdf<3>;
-/// Settings of a TSDF of the plane.
-pub type Tsdf2Config = TsdfConfig<2>;
-/// Settings of a TSDF of space.
-pub type Tsdf3Config = TsdfConfig<3>;
+/// An occupancy map over all cells of a grid, one byte each.
+pub type OccupancyGrid<const D: usize> = Occupancy<D, LogOdds8, Dense<LogOdds8, D>>;
+/// A 2-D occupancy map in a pruned tree.
+pub type Quadtree = Occupancy<2, LogOdds8, Tree<LogOdds8, 2>>;
+/// A 3-D occupancy map in a pruned tree.
+pub type Octree = Occupancy<3, LogOdds8, Tree<LogOdds8, 3>>;

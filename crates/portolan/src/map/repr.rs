@@ -1,8 +1,10 @@
 //! The chapter's thesis as an interface: a map is what it can answer cheaply.
 
-use super::Tsdf;
+use super::{Occupancy, Tsdf};
+use crate::cell::{LogOdds8, SignedDistance};
 use crate::geom::Pose;
 use crate::scan::{Scan, ScanStats};
+use crate::store::{Dense, Store};
 
 /// Which questions a representation answers at all, within its documented cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +43,7 @@ pub trait DerivedField<const D: usize> {
     type Settings;
 
     /// Makes the field.
-    fn derive(tsdf: &Tsdf<D>, settings: &Self::Settings) -> Self;
+    fn derive(tsdf: &Tsdf<D, Dense<SignedDistance, D>>, settings: &Self::Settings) -> Self;
 
     /// P(occupied), if the field can tell.
     fn occupancy(&self, p_world: [f64; D]) -> Option<f64>;
@@ -60,14 +62,14 @@ pub trait DerivedField<const D: usize> {
 /// field anew. Between the two the field answers as of the last rebuild.
 #[derive(Clone, Debug)]
 pub struct Derived<F: DerivedField<D>, const D: usize> {
-    tsdf: Tsdf<D>,
+    tsdf: Tsdf<D, Dense<SignedDistance, D>>,
     settings: F::Settings,
     field: F,
 }
 
 impl<F: DerivedField<D>, const D: usize> Derived<F, D> {
     /// Derives the field of a TSDF.
-    pub fn new(tsdf: Tsdf<D>, settings: F::Settings) -> Self {
+    pub fn new(tsdf: Tsdf<D, Dense<SignedDistance, D>>, settings: F::Settings) -> Self {
         let field = F::derive(&tsdf, &settings);
         Self { tsdf, settings, field }
     }
@@ -83,7 +85,7 @@ impl<F: DerivedField<D>, const D: usize> Derived<F, D> {
     }
 
     /// The map that it is made from.
-    pub fn tsdf(&self) -> &Tsdf<D> {
+    pub fn tsdf(&self) -> &Tsdf<D, Dense<SignedDistance, D>> {
         &self.tsdf
     }
 }
@@ -108,5 +110,49 @@ impl<F: DerivedField<D>, const D: usize> MapRepr<D> for Derived<F, D> {
 
     fn abilities(&self) -> Abilities {
         F::abilities()
+    }
+}
+
+impl<const D: usize, S: Store<SignedDistance, D>> MapRepr<D> for Tsdf<D, S> {
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
+        self.integrate(world_from_sensor, scan).unwrap_or_default()
+    }
+
+    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
+        self.occupancy(p_world)
+    }
+
+    fn distance(&self, _: [f64; D]) -> Option<f64> {
+        None
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.memory_bytes()
+    }
+
+    fn abilities(&self) -> Abilities {
+        Abilities { occupancy: true, distance: false }
+    }
+}
+
+impl<const D: usize, S: Store<LogOdds8, D>> MapRepr<D> for Occupancy<D, LogOdds8, S> {
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
+        self.integrate(world_from_sensor, scan).unwrap_or_default()
+    }
+
+    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
+        self.probability(p_world).known()
+    }
+
+    fn distance(&self, _: [f64; D]) -> Option<f64> {
+        None
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.memory_bytes()
+    }
+
+    fn abilities(&self) -> Abilities {
+        Abilities { occupancy: true, distance: false }
     }
 }

@@ -1,241 +1,291 @@
 //! Truncated signed distance fields.
 
-use super::error::check_grid;
-use super::integrate::integrate_watched;
-use super::{Abilities, MapError, MapRepr};
+use super::error::{check_grid, check_lattice};
+use super::integrate::{limits, plan};
+use super::watch::Watch;
+use super::{BeamSweep, MapError, ScanKind, TsdfConfig};
 use crate::answer::Answer;
-use crate::cell::{Cell, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule};
-use crate::geom::{Aabb, BlockKey, Grid, Pose, block_cells};
-use crate::scan::{Scan, ScanStats};
-use crate::store::{Dense, Store};
-use crate::sweep::{CellCentre, March, WeightModel};
+use crate::cell::{Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule};
+use crate::geom::{Aabb, BlockKey, CellBox, Grid, Lattice, Pose, block_cells};
+use crate::scan::{LayoutFinder, Scan, ScanStats};
+use crate::store::{Bricks, Dense, Store};
+use crate::sweep::{CellCentre, Inside, March, PointRays, Projective, Sweep, Swept, SweptColors};
 
-/// How a scan becomes observations of cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SweepKind {
-    /// At cell centres, with the range interpolated between neighbouring beams.
-    #[default]
-    CellCentre,
-    /// The textbook's march along every beam; puts surfaces about a quarter of a cell too far away.
-    March,
-}
-
-/// Settings of a [`Tsdf`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TsdfConfig<const D: usize> {
-    /// Number of cells along each axis.
-    pub cells: [usize; D],
-    /// Edge of a cell (metres).
-    pub resolution: f64,
-    /// World position of the lower corner of the first cell (metres).
-    pub origin: [f64; D],
-    /// Truncation tau (metres): two to four cells, and less than half of the thinnest wall that is seen from
-    /// both sides.
-    pub truncation: f64,
-    /// Clamp of the weight. Infinity: never forget.
-    pub w_max: f32,
-    /// Weight of an observation of free space beyond the truncation, times the beam's. The chapter's is 1. With
-    /// less, what was seen of a surface counts for more than that beams passed near it: thin things survive, and
-    /// what has gone fades more slowly, by the same factor.
-    pub carve_weight: f32,
-    /// How scans become observations.
-    pub sweep: SweepKind,
-    /// How much each beam is trusted.
-    pub weights: WeightModel,
-}
-
-impl<const D: usize> Default for TsdfConfig<D> {
-    /// The chapter's parameters (r 5 cm, tau 15 cm, W_max 64) and no cells.
-    fn default() -> Self {
-        Self {
-            cells: [0; D],
-            resolution: 0.05,
-            origin: [0.0; D],
-            truncation: 0.15,
-            w_max: 64.0,
-            carve_weight: 1.0,
-            sweep: SweepKind::default(),
-            weights: WeightModel::default(),
-        }
-    }
-}
-
-impl<const D: usize> TsdfConfig<D> {
-    /// These settings for the cells of a grid.
-    pub fn with_grid(self, grid: &Grid<D>) -> Self {
-        Self { cells: grid.shape, resolution: grid.lattice.resolution, origin: grid.lattice.origin, ..self }
-    }
-
-    /// The box of cells.
-    pub fn grid(&self) -> Grid<D> {
-        Grid::new(self.origin, self.resolution, self.cells)
-    }
-}
-
-/// A truncated signed distance field: per cell a scalar information filter of the signed distance to the
-/// nearest surface (Curless & Levoy 1996), in two `f32` planes.
+/// A truncated signed distance field: per cell a scalar information filter of the signed distance to the nearest surface
+/// (Curless & Levoy 1996).
 ///
-/// Its values are projective (measured along beams) and kept only within the truncation: it answers *where is
-/// the surface*, not *how far is it*; the ESDF derived from it does that.
+/// Distances are measured along rays and kept within the truncation: the map answers *where is the surface*, not *how far
+/// is it*; the distance field derived from it does that. Cells lie in bricks, which exist only where something was seen, or
+/// in a dense array ([`Tsdf2`](super::Tsdf2)). Colors lie beside them in bricks of their own, near surfaces only.
+///
+/// A clone is a snapshot: bricks are shared until one side changes them, arrays are copied.
 #[derive(Clone, Debug)]
-pub struct Tsdf<const D: usize> {
-    store: Dense<SignedDistance, D>,
-    config: TsdfConfig<D>,
+pub struct Tsdf<const D: usize, S = Bricks<SignedDistance, D>> {
+    pub(super) config: TsdfConfig<D>,
     rule: TsdfRule,
-    bounds: Aabb<D>,
-    carving: CellCentreOrMarch<D>,
-    banded: CellCentreOrMarch<D>,
-    scratch: Distances,
-    watched: Watched<D>,
+    color_rule: ColorRule,
+    pub(super) distances: S,
+    pub(super) colors: Option<Bricks<Color, D>>,
+    pub(super) bounds: Option<Aabb<D>>,
+    limit: usize,
+    pub(super) layout: LayoutFinder,
+    pub(super) sweeps: Box<Sweeps<D>>,
+    watch: Watch<FusionEvent, D>,
 }
 
-/// Cells whose events are kept: block, cell in the block, and which cell that is, ascending.
-#[derive(Clone, Debug, Default)]
-struct Watched<const D: usize> {
-    places: Vec<(BlockKey<D>, usize, [i32; D])>,
-    events: Vec<([i32; D], FusionEvent)>,
+/// What sweeps of beams keep of a touched cell: distance, weight, how far aside, which beam.
+const BEAM_CELL_BYTES: usize = 16;
+
+/// The sweeps with their memory, which is kept from scan to scan.
+#[derive(Debug)]
+pub(super) struct Sweeps<const D: usize> {
+    config: TsdfConfig<D>,
+    centers: CellCentre<D>,
+    march: March<D>,
+    pub(super) image: Projective,
+    pub(super) points: PointRays,
 }
 
-impl<const D: usize> Watched<D> {
-    /// The events of the watched cells of a block, from the evidence that is about to be fused.
-    fn look(
-        &mut self,
-        key: BlockKey<D>,
-        store: &Dense<SignedDistance, D>,
-        evidence: &Distances,
-        rule: &TsdfRule,
-    ) {
-        let first = self.places.partition_point(|p| p.0 < key);
-        for &(_, i, cell) in self.places[first..].iter().take_while(|p| p.0 == key) {
-            if let Some(observation) = evidence.one(i) {
-                self.events.push((cell, SignedDistance::fuse(store.cell(cell), observation, rule).1));
-            }
+impl<const D: usize> Sweeps<D> {
+    fn new(config: TsdfConfig<D>) -> Self {
+        let (tau, free, weights) = (config.truncation, config.free_weight(), config.weights);
+        Self {
+            config,
+            centers: CellCentre::new(tau, free, weights),
+            march: March::new(tau, free, weights),
+            image: Projective::new(config.projective()),
+            points: PointRays::new(config.projective()),
         }
     }
 }
 
-#[derive(Clone, Debug)]
-enum CellCentreOrMarch<const D: usize> {
-    CellCentre(Box<CellCentre<D>>),
-    March(Box<March<D>>),
-}
-
-impl<const D: usize> CellCentreOrMarch<D> {
-    fn new(config: &TsdfConfig<D>, carve_weight: f32) -> Self {
-        match config.sweep {
-            SweepKind::CellCentre => {
-                Self::CellCentre(Box::new(CellCentre::new(config.truncation, carve_weight, config.weights)))
-            }
-            SweepKind::March => {
-                Self::March(Box::new(March::new(config.truncation, carve_weight, config.weights)))
-            }
-        }
+/// Without what they remember of the last scan: a snapshot does not pay for it.
+impl<const D: usize> Clone for Sweeps<D> {
+    fn clone(&self) -> Self {
+        Self::new(self.config)
     }
 }
 
 impl<const D: usize> Tsdf<D> {
-    /// A field in which nothing was observed.
+    /// A field in bricks in which nothing was observed.
     ///
     /// # Errors
-    /// Where the grid or the filter's settings are not possible.
+    /// Where a setting is not possible.
     pub fn new(config: TsdfConfig<D>) -> Result<Self, MapError> {
-        check_grid(&config.grid())?;
-        Self::from_store(Dense::new(config.grid()), config)
+        let lattice = Lattice::new(config.origin, config.resolution);
+        let colors = config.color.then(|| Bricks::new(lattice));
+        Self::from_stores(Bricks::new(lattice), colors, config)
     }
 
-    /// A field of stored cells; the grid of `config` is taken from the store.
+    /// The stores of the map: distances, colors.
+    pub fn into_stores(self) -> (Bricks<SignedDistance, D>, Option<Bricks<Color, D>>) {
+        (self.distances, self.colors)
+    }
+
+    /// Number of cells with a weight of at least `min_weight` (and above 0).
+    pub fn observed_cells(&self, min_weight: f32) -> usize {
+        self.distances.bricks_by_age().map(|(_, brick)| observed(brick.weights(), min_weight)).sum()
+    }
+}
+
+fn observed(weights: &[f32], min_weight: f32) -> usize {
+    weights.iter().filter(|&&w| w > 0.0 && w >= min_weight).count()
+}
+
+impl<const D: usize> Tsdf<D, Dense<SignedDistance, D>> {
+    /// A field over all cells of a grid, in which nothing was observed. Resolution and origin are those of the grid.
     ///
     /// # Errors
-    /// Where the grid or the filter's settings are not possible.
-    pub fn from_store(store: Dense<SignedDistance, D>, config: TsdfConfig<D>) -> Result<Self, MapError> {
-        check_grid(store.grid())?;
-        let config = config.with_grid(store.grid());
-        let rule = TsdfRule { truncation: config.truncation as f32, w_max: config.w_max };
-        rule.validate()?;
-        if !(config.carve_weight > 0.0 && config.carve_weight <= 1.0) {
-            return Err(MapError::CarveWeight(config.carve_weight));
-        }
-        Ok(Self {
-            bounds: store.grid().aabb(),
-            carving: CellCentreOrMarch::new(&config, config.carve_weight),
-            banded: CellCentreOrMarch::new(&config, 0.0),
-            scratch: Distances::silent(block_cells::<D>()),
-            watched: Watched { places: Vec::new(), events: Vec::new() },
-            store,
-            config,
-            rule,
-        })
+    /// Where the grid or a setting is not possible.
+    pub fn covering(grid: &Grid<D>, config: TsdfConfig<D>) -> Result<Self, MapError> {
+        check_grid(grid)?;
+        Self::from_stores(Dense::new(*grid), None, config)
     }
 
-    /// One step of one cell's filter, as if a scan had observed it: `d` metres with weight `w`. Cells outside
-    /// of the map compute the step from nothing and keep nothing.
+    /// Shape and place.
+    pub fn grid(&self) -> &Grid<D> {
+        self.distances.grid()
+    }
+
+    /// Number of cells with a weight of at least `min_weight` (and above 0).
+    pub fn observed_cells(&self, min_weight: f32) -> usize {
+        observed(self.distances.planes().weights(), min_weight)
+    }
+
+    /// One step of one cell's filter, as if a scan had observed it: `d` metres with weight `w`. Cells outside of the map
+    /// compute the step from nothing and keep nothing.
     pub fn fuse(&mut self, cell: [i32; D], d: f64, w: f64) -> FusionEvent {
-        let index = self.store.grid().index(cell);
-        let prior = index.and_then(|i| self.store.at(i));
+        let index = self.distances.grid().index(cell);
+        let prior = index.and_then(|i| self.distances.at(i));
         let state = prior.unwrap_or(SignedDistance { distance: 0.0, weight: 0.0 });
         let event = self.rule.step(state.distance.into(), state.weight.into(), d, w);
         if let Some(i) = index {
             let after = SignedDistance { distance: event.after as f32, weight: event.weight_after as f32 };
-            self.store.planes_mut().set(i, Some(after));
+            self.distances.planes_mut().set(i, Some(after));
         }
         event
     }
+}
 
-    /// Fuses a scan taken at a known pose. With `carve` the free space up to the surfaces is fused too: that
-    /// costs several times as much and buys the difference between free and unknown.
-    pub fn integrate(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>, carve: bool) -> ScanStats {
-        let sweep = if carve { &mut self.carving } else { &mut self.banded };
-        let (store, scratch, at) = (&mut self.store, &mut self.scratch, (world_from_sensor, scan));
-        let (rule, bounds, watched) = (&self.rule, &self.bounds, &mut self.watched);
-        watched.events.clear();
-        let look = |key, store: &Dense<SignedDistance, D>, evidence: &Distances| {
-            if !watched.places.is_empty() {
-                watched.look(key, store, evidence, rule);
-            }
+impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
+    /// A field of stored cells; resolution and origin are taken from the store, and whether there are colors.
+    ///
+    /// # Errors
+    /// Where a setting is not possible, or the two stores have not the same lattice.
+    pub fn from_stores(
+        distances: S,
+        colors: Option<Bricks<Color, D>>,
+        config: TsdfConfig<D>,
+    ) -> Result<Self, MapError> {
+        let lattice = *distances.lattice();
+        check_lattice(&lattice)?;
+        if colors.as_ref().is_some_and(|c| *c.lattice() != lattice) {
+            return Err(MapError::Lattices);
+        }
+        let color = colors.is_some();
+        let config = TsdfConfig { resolution: lattice.resolution, origin: lattice.origin, color, ..config };
+        Ok(Self {
+            rule: config.rule()?,
+            color_rule: ColorRule { w_max: config.color_w_max },
+            distances,
+            colors,
+            bounds: None,
+            limit: usize::MAX,
+            layout: LayoutFinder::default(),
+            sweeps: Box::new(Sweeps::new(config)),
+            watch: Watch::default(),
+            config,
+        })
+    }
+
+    /// Fuses one scan taken at a known pose. O(cells seen); in bricks parallel, with the same bytes for any number of
+    /// threads. A pose that is not rigid or has no cell refuses the scan, which is counted.
+    ///
+    /// # Errors
+    /// [`MapError::Full`] where a brick would pass the limit: what was fused before it stays. Also where the search for
+    /// bricks alone would take more: nothing is fused then. [`MapError::TooFar`] where it would never end.
+    /// [`MapError::Image`] where an image contradicts itself.
+    pub fn integrate(
+        &mut self,
+        world_from_sensor: &Pose<D>,
+        scan: &impl ScanKind<D>,
+    ) -> Result<ScanStats, MapError> {
+        self.watch.clear();
+        scan.fuse_distances(self, world_from_sensor)
+    }
+
+    pub(super) fn integrate_beams(
+        &mut self,
+        world_from_sensor: &Pose<D>,
+        scan: &Scan<D>,
+    ) -> Result<ScanStats, MapError> {
+        let bytes = BEAM_CELL_BYTES * block_cells::<D>();
+        match self.config.beams {
+            BeamSweep::CellCentre => self.sweep(|s| &mut s.centers, bytes, world_from_sensor, scan),
+            BeamSweep::March => self.sweep(|s| &mut s.march, bytes, world_from_sensor, scan),
+        }
+    }
+
+    /// Fuses a scan by one of the sweeps, whose touched blocks cost `bytes` each.
+    pub(super) fn sweep<W>(
+        &mut self,
+        choose: impl Fn(&mut Sweeps<D>) -> &mut W,
+        bytes: usize,
+        world_from_sensor: &Pose<D>,
+        scan: &W::Scan,
+    ) -> Result<ScanStats, MapError>
+    where
+        W: Sweep<D, Evidence = Distances> + SweptColors<D>,
+    {
+        let others = self.colors.as_ref().map_or(0, Store::memory_bytes);
+        self.distances.set_limit(self.limit.saturating_sub(others));
+        let sweep = choose(&mut self.sweeps);
+        let limits = limits(&self.distances, self.bounds, bytes);
+        let Some(mut stats) = plan(&self.distances, sweep, &limits, world_from_sensor, scan)? else {
+            return Ok(ScanStats::refused_pose());
         };
-        match sweep {
-            CellCentreOrMarch::CellCentre(s) => {
-                integrate_watched::<SignedDistance, _, _, D>(store, &mut **s, scratch, rule, bounds, at, look)
-            }
-            CellCentreOrMarch::March(s) => {
-                integrate_watched::<SignedDistance, _, _, D>(store, &mut **s, scratch, rule, bounds, at, look)
-            }
+        let cells = self.bounds.map(|b| CellBox::of_centers(&b, self.distances.lattice()));
+        let scan = Inside { scan: &*sweep, cells };
+        self.watch.look(&scan, &self.distances, &self.rule);
+        stats.cells = self.distances.fuse(&scan, &self.rule)?;
+        if let Some(colors) = &mut self.colors {
+            colors.set_limit(self.limit.saturating_sub(self.distances.memory_bytes()));
+            // Corners of the cells that a surface passes through are at most a diagonal away from it.
+            let band = (1.75 * self.config.resolution).min(self.config.truncation) as f32;
+            colors.fuse(&ColorsOf { scan: &scan, band }, &self.color_rule)?;
         }
+        Ok(stats)
     }
 
-    /// Watches these cells from now on, and no others: every scan leaves what it did to them in
-    /// [`Tsdf::events`]. Cells outside of the map are left out. What is not watched pays nothing.
+    /// Watches these cells from now on, and no others: every scan leaves what it did to them in [`Tsdf::events`]. Cells
+    /// outside of the map have no events. What is not watched pays nothing.
     pub fn watch(&mut self, cells: impl IntoIterator<Item = [i32; D]>) {
-        let inside = cells.into_iter().filter(|&c| self.store.grid().index(c).is_some());
-        self.watched.places =
-            inside.map(|cell| (BlockKey::of_cell(cell), BlockKey::offset(cell), cell)).collect();
-        self.watched.places.sort_unstable();
-        self.watched.places.dedup();
-        self.watched.events.clear();
+        self.watch.watch(cells.into_iter().filter(|&c| self.distances.contains(c)));
     }
 
-    /// What the last scan that was integrated did to the watched cells that it observed: computed by
-    /// [`Cell::fuse`] from the same evidence, so that it is what happened. In the order of blocks.
+    pub(super) fn clear_events(&mut self) {
+        self.watch.clear();
+    }
+
+    /// What the last scan did to the watched cells that it observed, by [`Cell::fuse`](crate::cell::Cell::fuse) from the
+    /// same evidence. In the order of blocks. (Where the memory limit stopped a scan, also what it would have done.)
     pub fn events(&self) -> &[([i32; D], FusionEvent)] {
-        &self.watched.events
+        self.watch.events()
     }
 
-    /// The estimate of the cell that holds a point; saturated at the truncation, where the field is a constant.
-    /// Projective, not Euclidean.
+    /// The estimate of the cell that holds a point; saturated at the truncation, where the field is a constant. Measured
+    /// along rays, not Euclidean. Outside: beyond the bounds, or beyond what an index can hold.
     pub fn signed_distance(&self, p_world: impl Into<[f64; D]>) -> Answer<f64> {
-        let Some(i) = self.store.grid().index_of(p_world.into()) else { return Answer::Outside };
-        let Some(cell) = self.store.at(i) else { return Answer::Unknown };
+        let p = p_world.into();
+        let outside = self.bounds.is_some_and(|b| !b.contains(p));
+        let Some(cell) = self.lattice().cell_of(p).filter(|_| !outside) else { return Answer::Outside };
+        let Some(state) = self.distances.cell(cell) else {
+            return if self.distances.contains(cell) { Answer::Unknown } else { Answer::Outside };
+        };
         let limit = self.rule.truncation * (1.0 - 1e-4);
-        if cell.distance.abs() < limit {
-            Answer::Known(cell.distance.into())
+        if state.distance.abs() < limit {
+            Answer::Known(state.distance.into())
         } else {
-            Answer::Saturated(cell.distance.into())
+            Answer::Saturated(state.distance.into())
         }
     }
 
-    /// Cells and where they are.
-    pub fn store(&self) -> &Dense<SignedDistance, D> {
-        &self.store
+    /// The color of the cell that holds a point; `None` where none was seen.
+    pub fn color(&self, p_world: impl Into<[f64; D]>) -> Option<Color> {
+        self.colors.as_ref()?.cell(self.lattice().cell_of(p_world.into())?)
+    }
+
+    /// 1 behind the surface, 0 in front of it: the sign of the estimate. `None`: never observed, or outside.
+    pub fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
+        match self.signed_distance(p_world) {
+            Answer::Known(d) | Answer::Saturated(d) => Some(if d < 0.0 { 1.0 } else { 0.0 }),
+            Answer::Unknown | Answer::Outside => None,
+        }
+    }
+
+    /// The distances.
+    pub fn store(&self) -> &S {
+        &self.distances
+    }
+
+    /// The colors beside them; `None` where the map keeps none.
+    pub fn colors(&self) -> Option<&Bricks<Color, D>> {
+        self.colors.as_ref()
+    }
+
+    /// Allows no more than `bytes` for distances and colors together from now on.
+    pub fn set_limit(&mut self, bytes: usize) {
+        self.limit = bytes;
+    }
+
+    /// Keeps to cells whose center lies in a box (world) from now on; `None`: everywhere.
+    pub fn set_bounds(&mut self, bounds: Option<Aabb<D>>) {
+        self.bounds = bounds;
+    }
+
+    /// Bytes that the cells hold: measured, not estimated.
+    pub fn memory_bytes(&self) -> usize {
+        self.distances.memory_bytes() + self.colors.as_ref().map_or(0, Store::memory_bytes)
     }
 
     /// The settings.
@@ -248,87 +298,39 @@ impl<const D: usize> Tsdf<D> {
         &self.rule
     }
 
-    /// Number of cells with a weight of at least `min_weight` (and above 0).
-    pub fn observed_cells(&self, min_weight: f32) -> usize {
-        self.store.planes().weights().iter().filter(|&&w| w > 0.0 && w >= min_weight).count()
-    }
-
-    /// Shape and place.
-    pub fn grid(&self) -> &Grid<D> {
-        self.store.grid()
+    /// Index to metres.
+    pub fn lattice(&self) -> &Lattice<D> {
+        self.distances.lattice()
     }
 }
 
-impl<const D: usize> MapRepr<D> for Tsdf<D> {
-    /// With carving.
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        self.integrate(world_from_sensor, scan, true)
-    }
-
-    /// The sign of the estimate: 1 behind the surface, 0 in front of it.
-    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
-        let i = self.store.grid().index_of(p_world)?;
-        self.store.at(i).map(|c| if c.distance < 0.0 { 1.0 } else { 0.0 })
-    }
-
-    fn distance(&self, _: [f64; D]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { occupancy: true, distance: false }
-    }
+/// The colors of a swept scan, as evidence of its own.
+struct ColorsOf<'a, W> {
+    scan: &'a W,
+    /// Only cells so near to a surface have colors (metres).
+    band: f32,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scan::RangeLimits;
+impl<const D: usize, W: SweptColors<D>> Swept<D> for ColorsOf<'_, W> {
+    type Evidence = Colors;
+    type Scratch = (W::Scratch, Colors);
 
-    fn events_are_what_happened(sweep: SweepKind) {
-        let config =
-            TsdfConfig { cells: [60, 60], origin: [-1.5, -1.5], w_max: 3.0, sweep, ..Default::default() };
-        let mut tsdf = Tsdf::<2>::new(config).unwrap();
-        let mut unwatched = tsdf.clone();
-        let cells = (0..60).flat_map(|x| (0..60).map(move |y| [x, y])).filter(|c| (c[0] * 7 + c[1]) % 3 == 0);
-        tsdf.watch(cells.clone().chain([[-1, 4], [60, 2], [3, 3], [3, 3]]));
-        let bearings: Vec<f64> = (0..90).map(|i| f64::from(i) * 0.07 - 3.1).collect();
-        let mut seen = 0;
-        for k in 0..6 {
-            let ranges: Vec<f64> = (0..90).map(|i| 0.8 + 0.1 * f64::from((i * k) % 5)).collect();
-            let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
-            let pose = Pose::<2>::new(0.02 * f64::from(k), 0.0, 0.3 * f64::from(k));
-            let before = tsdf.clone();
-            tsdf.integrate(&pose, &scan, true);
-            unwatched.integrate(&pose, &scan, true);
-            assert_eq!(tsdf.store(), unwatched.store());
-            assert!(unwatched.events().is_empty());
-            let observed: std::collections::HashMap<_, _> = tsdf.events().iter().copied().collect();
-            assert_eq!(observed.len(), tsdf.events().len());
-            seen += observed.len();
-            for cell in cells.clone() {
-                let (old, new) = (before.store().cell(cell), tsdf.store().cell(cell));
-                match observed.get(&cell) {
-                    None => assert_eq!(old, new),
-                    Some(e) => {
-                        let new = new.unwrap();
-                        assert_eq!((e.after as f32, e.weight_after as f32), (new.distance, new.weight));
-                        assert_eq!(e.weight_before, old.map_or(0.0, |c| c.weight.into()));
-                        assert!(e.gain > 0.0 && e.gain <= 1.0);
-                    }
-                }
+    fn scratch(&self) -> Self::Scratch {
+        (self.scan.scratch(), Colors::silent(block_cells::<D>()))
+    }
+
+    fn blocks(&self) -> &[BlockKey<D>] {
+        self.scan.blocks()
+    }
+
+    fn evidence<'a>(&'a self, i: usize, (scratch, colors): &'a mut Self::Scratch) -> &'a Colors {
+        colors.clear();
+        if !self.scan.is_free(i) {
+            let distances = self.scan.evidence(i, scratch);
+            if distances.observed() > 0 {
+                self.scan.colors(i, distances, self.band, colors);
             }
         }
-        assert!(seen > 1000);
-    }
-
-    #[test]
-    fn events_of_watched_cells_are_what_happened() {
-        events_are_what_happened(SweepKind::CellCentre);
-        events_are_what_happened(SweepKind::March);
+        colors
     }
 }

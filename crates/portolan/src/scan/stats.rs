@@ -100,6 +100,21 @@ pub struct ScanStats {
     pub hits_outside: u64,
 }
 
+impl ScanStats {
+    /// What a scan leaves whose pose is refused.
+    pub fn refused_pose() -> Self {
+        Self { refused_poses: 1, ..Self::default() }
+    }
+
+    /// Moves one beam to the dropped ones, because it is too long to be followed.
+    pub(crate) fn refuse_far(&mut self, hit: bool) {
+        let from = if hit { &mut self.beams.hit } else { &mut self.beams.max_range };
+        *from = from.saturating_sub(1);
+        self.beams.dropped += 1;
+        self.refused.too_far += 1;
+    }
+}
+
 impl std::ops::AddAssign for ScanStats {
     fn add_assign(&mut self, o: Self) {
         self.scans += o.scans;

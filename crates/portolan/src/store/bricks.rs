@@ -1,9 +1,10 @@
 //! Hashed bricks of `8^D` cells: memory only where something was seen.
 
-use super::Store;
-use crate::cell::{Cell, Planes};
+use super::{Store, StoreFull};
+use crate::cell::{Cell, Evidence, Planes};
 use crate::geom::{BlockKey, Lattice, block_cells};
 use crate::parallel;
+use crate::sweep::Swept;
 use rustc_hash::FxHashMap;
 
 /// Keys that are taken out, fused and put back together: enough for every core, few enough that what is allocated
@@ -29,18 +30,6 @@ pub struct Bricks<C: Cell, const D: usize> {
     limit: usize,
 }
 
-/// A brick would not fit into the memory that the store may use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the map needs more than {limit} bytes: its {bricks} bricks take {bytes}")]
-pub struct BricksFull {
-    /// Bytes allowed.
-    pub limit: usize,
-    /// Bricks held.
-    pub bricks: usize,
-    /// Bytes that they take.
-    pub bytes: usize,
-}
-
 impl<C: Cell, const D: usize> Bricks<C, D> {
     /// A store in which nothing was observed.
     pub fn new(lattice: Lattice<D>) -> Self {
@@ -54,16 +43,6 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
             bytes: 0,
             limit: usize::MAX,
         }
-    }
-
-    /// Allows no more than `bytes` for the store from now on; checked whenever a brick is added.
-    pub fn set_limit(&mut self, bytes: usize) {
-        self.limit = bytes;
-    }
-
-    /// Bytes allowed; `usize::MAX`: as many as there are.
-    pub fn limit(&self) -> usize {
-        self.limit
     }
 
     /// Number of bricks.
@@ -110,8 +89,8 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
     /// Puts a brick in place, replacing the one that is there. Counts as a change of a new epoch.
     ///
     /// # Errors
-    /// [`BricksFull`] where the limit leaves no room; the store is then as before.
-    pub fn insert(&mut self, key: BlockKey<D>, brick: C::Brick) -> Result<(), BricksFull> {
+    /// [`StoreFull`] where the limit leaves no room; the store is then as before.
+    pub fn insert(&mut self, key: BlockKey<D>, brick: C::Brick) -> Result<(), StoreFull> {
         assert_eq!(brick.len(), block_cells::<D>(), "a brick has 8^D cells");
         self.epoch += 1;
         match self.slots.get(&key) {
@@ -126,10 +105,10 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
         }
     }
 
-    fn add(&mut self, key: BlockKey<D>, brick: C::Brick) -> Result<(), BricksFull> {
+    fn add(&mut self, key: BlockKey<D>, brick: C::Brick) -> Result<(), StoreFull> {
         let room = self.limit.checked_sub(self.memory_bytes() + brick.bytes());
         if room.is_none() {
-            return Err(BricksFull { limit: self.limit, bricks: self.len(), bytes: self.memory_bytes() });
+            return Err(StoreFull { limit: self.limit, bytes: self.memory_bytes() });
         }
         self.bytes += brick.bytes();
         self.slots.insert(key, self.bricks.len() as u32);
@@ -146,14 +125,14 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
     /// made by `scratch`, and returns how many cells it changed; with 0 the brick must be as before. Returns the sum.
     ///
     /// # Errors
-    /// [`BricksFull`] at the first brick, in the order of `keys`, that the limit leaves no room for; those before it are
+    /// [`StoreFull`] at the first brick, in the order of `keys`, that the limit leaves no room for; those before it are
     /// changed.
     pub fn update<S: Send>(
         &mut self,
         keys: &[BlockKey<D>],
         scratch: impl Fn() -> S + Sync + Send,
         change: impl Fn(usize, &mut Option<C::Brick>, &mut S) -> usize + Sync + Send,
-    ) -> Result<u64, BricksFull> {
+    ) -> Result<u64, StoreFull> {
         self.epoch += 1;
         let mut total = 0;
         let mut work: Vec<Work<C>> = Vec::with_capacity(keys.len().min(TOGETHER));
@@ -195,6 +174,19 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
     }
 }
 
+/// Fuses evidence into a brick, which is made where there is none; returns the number of observed cells.
+fn fuse_brick<C: Cell, const D: usize>(
+    brick: &mut Option<C::Brick>,
+    evidence: &C::Evidence,
+    rule: &C::Rule,
+) -> usize {
+    let observed = evidence.observed();
+    if observed > 0 {
+        C::fuse_brick(brick.get_or_insert_with(|| C::Brick::unobserved(block_cells::<D>())), evidence, rule);
+    }
+    observed
+}
+
 /// A brick that is being changed.
 struct Work<C: Cell> {
     position: usize,
@@ -232,20 +224,30 @@ impl<C: Cell, const D: usize> Store<C, D> for Bricks<C, D> {
         self.brick(BlockKey::of_cell(cell))?.get(BlockKey::offset(cell))
     }
 
-    /// Without regard to the limit; [`Bricks::update`] is the way that keeps it.
-    fn apply(&mut self, key: BlockKey<D>, evidence: &C::Evidence, rule: &C::Rule) {
-        let limit = std::mem::replace(&mut self.limit, usize::MAX);
-        let fused = self.update(
-            &[key],
-            || (),
-            |_, brick, ()| {
-                let brick = brick.get_or_insert_with(|| C::Brick::unobserved(block_cells::<D>()));
-                C::fuse_brick(brick, evidence, rule);
-                1
-            },
-        );
-        debug_assert!(fused.is_ok(), "there is no limit");
-        self.limit = limit;
+    fn apply(&mut self, key: BlockKey<D>, evidence: &C::Evidence, rule: &C::Rule) -> Result<(), StoreFull> {
+        let fuse = |_: usize, brick: &mut Option<C::Brick>, (): &mut ()| fuse_brick::<C, D>(brick, evidence, rule);
+        self.update(&[key], || (), fuse).map(|_| ())
+    }
+
+    /// In parallel over bricks, with the feature `parallel`.
+    fn fuse<W>(&mut self, scan: &W, rule: &C::Rule) -> Result<u64, StoreFull>
+    where
+        W: Swept<D, Evidence = C::Evidence>,
+    {
+        self.update(
+            scan.blocks(),
+            || scan.scratch(),
+            |i, brick, scratch| fuse_brick::<C, D>(brick, scan.evidence(i, scratch), rule),
+        )
+    }
+
+    fn limit(&self) -> usize {
+        self.limit
+    }
+
+    /// Checked whenever a brick is added.
+    fn set_limit(&mut self, bytes: usize) {
+        self.limit = bytes;
     }
 
     fn memory_bytes(&self) -> usize {
@@ -259,7 +261,7 @@ impl<C: Cell, const D: usize> Store<C, D> for Bricks<C, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, OccupancyModel, SignedDistance};
+    use crate::cell::{HitMiss, LogOdds8, LogOddsRule, OccupancyModel, SignedDistance};
     use crate::geom::Grid;
     use crate::store::Dense;
     use proptest::prelude::*;
@@ -290,7 +292,7 @@ mod tests {
             keys.sort_unstable();
             keys.dedup();
             let e = evidence::<D>(*seed);
-            keys.iter().for_each(|&key| dense.apply(key, &e, &rule()));
+            keys.iter().for_each(|&key| dense.apply(key, &e, &rule()).unwrap());
             let change = |_: usize, brick: &mut Option<_>, (): &mut ()| {
                 LogOdds8::fuse_brick(
                     brick.get_or_insert_with(|| Planes::unobserved(block_cells::<D>())),

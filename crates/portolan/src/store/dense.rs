@@ -1,8 +1,8 @@
 //! A dense array of cells.
 
-use super::Store;
+use super::{Store, StoreFull};
 use crate::cell::{Cell, Planes};
-use crate::geom::{BLOCK_EDGE, BlockKey, Grid, Lattice};
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Grid, Lattice};
 
 /// Every cell of a box, in structure-of-arrays planes, x fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,9 +77,18 @@ impl<C: Cell, const D: usize> Store<C, D> for Dense<C, D> {
         self.planes.get(self.grid.index(cell)?)
     }
 
-    fn apply(&mut self, key: BlockKey<D>, evidence: &C::Evidence, rule: &C::Rule) {
+    fn bounds(&self) -> Option<Aabb<D>> {
+        Some(self.grid.aabb())
+    }
+
+    #[inline(always)]
+    fn contains(&self, cell: [i32; D]) -> bool {
+        self.grid.index(cell).is_some()
+    }
+
+    fn apply(&mut self, key: BlockKey<D>, evidence: &C::Evidence, rule: &C::Rule) -> Result<(), StoreFull> {
         if !self.grid.has_block(key) {
-            return;
+            return Ok(());
         }
         let first = key.first_cell();
         let run = BLOCK_EDGE.min(self.grid.shape[0] - first[0] as usize);
@@ -90,6 +99,7 @@ impl<C: Cell, const D: usize> Store<C, D> for Dense<C, D> {
                 C::fuse_run(&mut self.planes, start, evidence, from, run, rule);
             }
         }
+        Ok(())
     }
 
     fn memory_bytes(&self) -> usize {
@@ -109,7 +119,7 @@ mod tests {
         let mut everywhere = HitMiss::silent(block_cells::<D>());
         (0..block_cells::<D>()).for_each(|i| everywhere.mark_hit(i));
         for key in [[1; D], [-1; D], [2; D]] {
-            store.apply(BlockKey(key), &everywhere, &rule);
+            store.apply(BlockKey(key), &everywhere, &rule).unwrap();
         }
         let observed = (0..store.grid().len()).filter(|&i| store.at(i).is_some()).count();
         assert_eq!(observed, 3usize.pow(D as u32));

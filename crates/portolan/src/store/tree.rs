@@ -2,9 +2,9 @@
 
 use super::arena::{Arena, NONE, Record, children};
 use super::tree_build::{expand, subtree};
-use super::{Store, tree_build::value_above};
+use super::{Store, StoreFull, tree_build::value_above};
 use crate::cell::LogOddsValue;
-use crate::geom::{BlockKey, Grid, Lattice, block_cells};
+use crate::geom::{Aabb, BlockKey, Grid, Lattice, block_cells};
 
 /// Height of a block: `2^3` cells along each edge.
 pub(super) const BLOCK_HEIGHT: u32 = 3;
@@ -279,9 +279,18 @@ impl<V: LogOddsValue, const D: usize> Store<V, D> for Tree<V, D> {
         (!value.is_unobserved()).then_some(value)
     }
 
-    fn apply(&mut self, key: BlockKey<D>, evidence: &V::Evidence, rule: &V::Rule) {
+    fn bounds(&self) -> Option<Aabb<D>> {
+        Some(self.grid().aabb())
+    }
+
+    #[inline(always)]
+    fn contains(&self, cell: [i32; D]) -> bool {
+        self.inside(cell)
+    }
+
+    fn apply(&mut self, key: BlockKey<D>, evidence: &V::Evidence, rule: &V::Rule) -> Result<(), StoreFull> {
         if !self.inside(key.first_cell()) {
-            return;
+            return Ok(());
         }
         self.descend_to(key.first_cell());
         let mut scratch = std::mem::take(&mut self.scratch);
@@ -296,6 +305,7 @@ impl<V: LogOddsValue, const D: usize> Store<V, D> for Tree<V, D> {
         V::fuse_run(&mut scratch, 0, evidence, 0, block_cells::<D>(), rule);
         self.fill_slot(slot, &scratch);
         self.scratch = scratch;
+        Ok(())
     }
 
     fn memory_bytes(&self) -> usize {

@@ -3,7 +3,7 @@
 use super::arena::NONE;
 use super::tree::{BLOCK_HEIGHT, Tree};
 use super::tree_build::expand;
-use super::{Bricks, BricksFull, Store};
+use super::{Bricks, StoreFull, Store};
 use crate::cell::{LogOddsBrick, LogOddsValue, Planes};
 use crate::geom::{BlockKey, Lattice, block_cells};
 
@@ -16,7 +16,7 @@ pub enum TreeBricksError {
     Lattice(f64),
     /// Too many bricks.
     #[error(transparent)]
-    Full(#[from] BricksFull),
+    Full(#[from] StoreFull),
 }
 
 impl<V: LogOddsValue, const D: usize> Tree<V, D> {
@@ -78,8 +78,8 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         value: V,
         block: [i32; D],
         height: u32,
-        put: &mut impl FnMut([i32; D], LogOddsBrick<V>) -> Result<(), BricksFull>,
-    ) -> Result<(), BricksFull> {
+        put: &mut impl FnMut([i32; D], LogOddsBrick<V>) -> Result<(), StoreFull>,
+    ) -> Result<(), StoreFull> {
         if record == NONE && value.is_unobserved() {
             return Ok(());
         }

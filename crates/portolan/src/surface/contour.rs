@@ -2,7 +2,7 @@
 
 use super::{ContourSettings, Polyline, marching_squares};
 use crate::geom::vector::{distance, point_segment};
-use crate::map::{Abilities, DerivedField, Tsdf};
+use crate::map::{Abilities, DerivedField, Tsdf2};
 
 /// Segments with shared vertices; free space lies on the left of every segment.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -84,7 +84,7 @@ impl Contour {
 impl DerivedField<2> for Contour {
     type Settings = ContourSettings;
 
-    fn derive(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Self {
+    fn derive(tsdf: &Tsdf2, settings: &ContourSettings) -> Self {
         marching_squares(tsdf, settings)
     }
 

@@ -3,7 +3,7 @@
 use super::Contour;
 use crate::geom::interpolate;
 use crate::geom::vector::{add, along, distance, dot, scale, sub, unit};
-use crate::map::Tsdf;
+use crate::map::Tsdf2;
 use rustc_hash::FxHashMap;
 
 /// Contour with a second, parallel contour near it: the mark of poses that do not agree.
@@ -72,7 +72,7 @@ pub struct ThinWalls {
 
 /// Looks behind every segment of a contour, in steps of half a cell along the normal, for free space within
 /// twice the truncation. O(segments).
-pub fn thin_walls(tsdf: &Tsdf<2>, contour: &Contour) -> ThinWalls {
+pub fn thin_walls(tsdf: &Tsdf2, contour: &Contour) -> ThinWalls {
     let grid = tsdf.grid();
     let strides = grid.strides();
     let planes = tsdf.store().planes();

@@ -3,7 +3,7 @@
 use crate::cell::{Planes, SignedDistance};
 use crate::geom::vector::{along, norm, unit};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, interpolate};
-use crate::map::Tsdf;
+use crate::map::DenseTsdf;
 use crate::store::{Bricks, Store};
 use crate::sweep::clip;
 
@@ -64,7 +64,7 @@ impl RayCastSettings {
 /// its sign turns from free to occupied, then the root of the line between the two samples. What is no ray (NaN, a
 /// direction far from length one) is outside at once. O(length).
 pub fn cast_ray<const D: usize>(
-    tsdf: &Tsdf<D>,
+    tsdf: &DenseTsdf<D>,
     origin: [f64; D],
     direction: [f64; D],
     settings: &RayCastSettings,
@@ -75,11 +75,11 @@ pub fn cast_ray<const D: usize>(
 /// [`cast_ray`], with what the ray went through and the normal where it hits.
 ///
 /// ```
-/// use portolan::map::{Tsdf2, Tsdf2Config};
+/// use portolan::map::{Tsdf2, TsdfConfig};
 /// use portolan::surface::{RayCast, RayCastSettings, trace_ray};
 ///
 /// // A wall at x = 1 m, and a gap in what was seen before it.
-/// let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [24, 8], resolution: 0.05, ..Default::default() })?;
+/// let mut tsdf = Tsdf2::new(TsdfConfig { cells: [24, 8], resolution: 0.05, ..Default::default() })?;
 /// for i in (0..192).filter(|i| !(8..12).contains(&(i % 24))) {
 ///     let cell = [i % 24, i / 24];
 ///     tsdf.fuse(cell, 1.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
@@ -95,7 +95,7 @@ pub fn cast_ray<const D: usize>(
 /// # Ok::<(), portolan::map::MapError>(())
 /// ```
 pub fn trace_ray<const D: usize>(
-    tsdf: &Tsdf<D>,
+    tsdf: &DenseTsdf<D>,
     origin: [f64; D],
     direction: [f64; D],
     settings: &RayCastSettings,
@@ -109,7 +109,7 @@ pub fn trace_ray<const D: usize>(
 }
 
 fn cast_dense<const D: usize>(
-    tsdf: &Tsdf<D>,
+    tsdf: &DenseTsdf<D>,
     origin: [f64; D],
     direction: [f64; D],
     settings: &RayCastSettings,
@@ -122,7 +122,7 @@ fn cast_dense<const D: usize>(
 }
 
 #[inline(always)]
-fn look_dense<const D: usize>(tsdf: &Tsdf<D>, p: [f64; D], s: f64, settings: &RayCastSettings) -> Seen<D> {
+fn look_dense<const D: usize>(tsdf: &DenseTsdf<D>, p: [f64; D], s: f64, settings: &RayCastSettings) -> Seen<D> {
     let grid = tsdf.grid();
     let strides = grid.strides();
     let planes = tsdf.store().planes();
@@ -303,7 +303,7 @@ mod tests {
     use super::*;
     use crate::map::TsdfConfig;
 
-    fn wall<const D: usize>() -> Tsdf<D> {
+    fn wall<const D: usize>() -> DenseTsdf<D> {
         let mut tsdf =
             Tsdf::new(TsdfConfig { cells: [20; D], resolution: 0.1, truncation: 0.3, ..Default::default() })
                 .unwrap();
@@ -342,7 +342,7 @@ mod tests {
     }
 
     /// The same cells in bricks.
-    fn in_bricks<const D: usize>(tsdf: &Tsdf<D>) -> Bricks<SignedDistance, D> {
+    fn in_bricks<const D: usize>(tsdf: &DenseTsdf<D>) -> Bricks<SignedDistance, D> {
         let mut bricks = Bricks::new(tsdf.grid().lattice);
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);

@@ -2,7 +2,7 @@
 
 use super::Contour;
 use crate::geom::Grid;
-use crate::map::Tsdf;
+use crate::map::Tsdf2;
 
 /// What to do with a square whose diagonal corners agree and whose neighbours differ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl Default for ContourSettings {
 impl ContourSettings {
     /// The default with a `W_min` of half of what one ordinary beam weighs in this map (the chapter's 0.5 where all
     /// beams weigh 1).
-    pub fn of(tsdf: &Tsdf<2>) -> Self {
+    pub fn of(tsdf: &Tsdf2) -> Self {
         Self { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..Self::default() }
     }
 }
@@ -55,7 +55,7 @@ struct RowEdges {
 /// Squares join the centres of four neighbouring cells; a crossing is placed on an edge by linear
 /// interpolation, `t = D_a / (D_a - D_b)`, which is exact for the piecewise-linear field of the samples.
 /// Negative is inside, zero is free. O(cells).
-pub fn marching_squares(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Contour {
+pub fn marching_squares(tsdf: &Tsdf2, settings: &ContourSettings) -> Contour {
     let planes = tsdf.store().planes();
     let weight = planes.weights();
     let observed = |i: usize| weight[i] > 0.0 && weight[i] >= settings.min_weight;
@@ -174,7 +174,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// A field with these values at the centres, observed where the value is not NaN.
-    pub(crate) fn field(shape: [usize; 2], value: impl Fn([f64; 2]) -> f64) -> Tsdf<2> {
+    pub(crate) fn field(shape: [usize; 2], value: impl Fn([f64; 2]) -> f64) -> Tsdf2 {
         let mut tsdf =
             Tsdf::new(TsdfConfig { cells: shape, resolution: 1.0, truncation: 1e6, ..Default::default() })
                 .unwrap();
@@ -227,7 +227,7 @@ mod tests {
                 (false, true) => e,
             })
         };
-        let joined = |tsdf: &Tsdf<2>, ambiguity| {
+        let joined = |tsdf: &Tsdf2, ambiguity| {
             let contour = marching_squares(tsdf, &ContourSettings { ambiguity, ..Default::default() });
             assert_eq!(contour.segments.len(), 2);
             // A segment around the lower left corner alone keeps the inside apart.

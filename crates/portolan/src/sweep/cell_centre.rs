@@ -3,10 +3,10 @@
 use super::fan::{Fan, Spoke};
 use super::fan_plan::{BlockBitmap, Outline, Stretch};
 use super::nearest_ray::NearestRay;
-use super::{Sweep, WeightModel};
-use crate::cell::Distances;
-use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
-use crate::scan::{BeamOrder, Scan, connected};
+use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel, beam_stats};
+use crate::cell::{Distances, Evidence};
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
+use crate::scan::{BeamOrder, Scan, ScanStats, connected};
 
 /// Gives every cell the distance at its **centre**.
 ///
@@ -64,7 +64,7 @@ impl<const D: usize> CellCentre<D> {
         world_from_sensor: &Pose<D>,
         lattice: &Lattice<D>,
         bounds: &Aabb<D>,
-    ) {
+    ) -> Result<(), PlanError> {
         let settings = (self.truncation, self.carve_weight, lattice.resolution);
         self.fan.rebuild(scan, world_from_sensor, &self.weights, settings, &mut self.spokes);
         let origin = world_from_sensor.translation;
@@ -77,9 +77,13 @@ impl<const D: usize> CellCentre<D> {
             window.min[k] = window.min[k].max(origin[k] - reach);
             window.max[k] = window.max[k].min(origin[k] + reach);
         }
-        self.bitmap.reset(lattice, &window);
+        self.keys.clear();
+        if !self.bitmap.reset(lattice, &window) {
+            return Err(PlanError::TooManyBlocks);
+        }
         self.outline_beams(scan, lattice, origin);
         self.bitmap.collect(&mut self.keys);
+        Ok(())
     }
 }
 
@@ -138,17 +142,42 @@ impl<const D: usize> CellCentre<D> {
 }
 
 impl<const D: usize> Sweep<D> for CellCentre<D> {
-    type Evidence = Distances;
+    type Scan = Scan<D>;
 
-    fn plan(&mut self, scan: &Scan<D>, world_from_sensor: &Pose<D>, lattice: &Lattice<D>, bounds: &Aabb<D>) {
+    fn plan(
+        &mut self,
+        scan: &Scan<D>,
+        world_from_sensor: &Pose<D>,
+        lattice: &Lattice<D>,
+        limits: &PlanLimits<D>,
+    ) -> Result<ScanStats, PlanError> {
         self.model.weigh(scan, &mut self.cosines, &mut self.weights);
         self.ordered = matches!(scan.order(), BeamOrder::Fan { .. }) && Fan::can_hold(scan.len());
+        let bounds = limits.bounds_or_everywhere();
         if self.ordered {
-            self.plan_fan(scan, world_from_sensor, lattice, bounds);
+            self.plan_fan(scan, world_from_sensor, lattice, &bounds)?;
         } else {
             let how = (self.truncation, self.carve_weight);
-            self.rays.plan(scan, world_from_sensor, (lattice, bounds), &self.weights, how);
+            let most = limits.most_blocks;
+            if !self.rays.plan(scan, world_from_sensor, (lattice, &bounds), &self.weights, how, most) {
+                return Err(PlanError::TooManyBlocks);
+            }
         }
+        if self.blocks().len() > limits.most_blocks {
+            return Err(PlanError::TooManyBlocks);
+        }
+        Ok(beam_stats(scan, world_from_sensor, limits))
+    }
+}
+
+impl<const D: usize> SweptColors<D> for CellCentre<D> {}
+
+impl<const D: usize> Swept<D> for CellCentre<D> {
+    type Evidence = Distances;
+    type Scratch = Distances;
+
+    fn scratch(&self) -> Distances {
+        Distances::silent(block_cells::<D>())
     }
 
     fn blocks(&self) -> &[BlockKey<D>] {

@@ -3,6 +3,9 @@
 use super::fan::Spoke;
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
 
+/// Blocks in the box around a scan: 32 MiB of bits, 6.5 km across at cells of 5 cm.
+const MOST_BLOCKS: i64 = 1 << 28;
+
 /// Marks blocks in a bitmap over the scan's surroundings, one bit a block, row by row.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BlockBitmap {
@@ -13,8 +16,9 @@ pub(super) struct BlockBitmap {
 }
 
 impl BlockBitmap {
-    /// An empty bitmap over the blocks that meet the box (world).
-    pub(super) fn reset<const D: usize>(&mut self, lattice: &Lattice<D>, window: &Aabb<D>) {
+    /// An empty bitmap over the blocks that meet the box (world); `false` where these are too many.
+    #[must_use]
+    pub(super) fn reset<const D: usize>(&mut self, lattice: &Lattice<D>, window: &Aabb<D>) -> bool {
         let block = |v: f64, k: usize| {
             let cells = (v - lattice.origin[k]) / lattice.resolution;
             (cells / BLOCK_EDGE as f64).floor().clamp(-1e8, 1e8) as i64
@@ -25,7 +29,11 @@ impl BlockBitmap {
         }
         self.words = (self.size[0] as usize).div_ceil(64);
         self.bits.clear();
-        self.bits.resize(self.words * self.size[1] as usize, 0);
+        let fits = self.size[0] * self.size[1] <= MOST_BLOCKS;
+        if fits {
+            self.bits.resize(self.words * self.size[1] as usize, 0);
+        }
+        fits
     }
 
     /// Marks the blocks of row `y` (block index) from `x0` to `x1`, both included, as far as they are inside.

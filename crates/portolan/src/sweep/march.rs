@@ -1,11 +1,12 @@
 //! The textbook's march: samples along every beam.
 
+use super::occupancy::LONGEST_RAY;
 use super::touched::Touched;
-use super::{Sweep, WeightModel, clip};
+use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel, beam_stats, clip};
 use crate::cell::{DistanceObservation, Distances};
 use crate::geom::vector::along;
-use crate::geom::{Aabb, BlockKey, Lattice, Pose};
-use crate::scan::Scan;
+use crate::geom::{BlockKey, Lattice, Pose};
+use crate::scan::{Scan, ScanStats};
 
 /// Marches along every beam in steps of half a cell and gives each cell `d = z - s` of the first sample `s`
 /// that falls into it (chapter 3.3, `tsdf_integrate`). The weight tapers linearly to 0 at `-truncation`
@@ -38,12 +39,37 @@ impl<const D: usize> March<D> {
     }
 }
 
-impl<const D: usize> Sweep<D> for March<D> {
+impl<const D: usize> Swept<D> for March<D> {
     type Evidence = Distances;
+    type Scratch = ();
 
-    fn plan(&mut self, scan: &Scan<D>, world_from_sensor: &Pose<D>, lattice: &Lattice<D>, bounds: &Aabb<D>) {
+    fn scratch(&self) {}
+
+    fn blocks(&self) -> &[BlockKey<D>] {
+        self.touched.keys()
+    }
+
+    fn evidence<'a>(&'a self, i: usize, (): &'a mut ()) -> &'a Distances {
+        self.touched.evidence(i)
+    }
+}
+
+impl<const D: usize> SweptColors<D> for March<D> {}
+
+impl<const D: usize> Sweep<D> for March<D> {
+    type Scan = Scan<D>;
+
+    fn plan(
+        &mut self,
+        scan: &Scan<D>,
+        world_from_sensor: &Pose<D>,
+        lattice: &Lattice<D>,
+        limits: &PlanLimits<D>,
+    ) -> Result<ScanStats, PlanError> {
         self.touched.clear();
+        let bounds = limits.bounds_or_everywhere();
         self.model.weigh(scan, &mut self.cosines, &mut self.weights);
+        let mut stats = beam_stats(scan, world_from_sensor, limits);
         let (tau, step) = (self.truncation, 0.5 * lattice.resolution);
         let carve = self.carve_weight > 0.0;
         let origin = world_from_sensor.translation;
@@ -55,7 +81,11 @@ impl<const D: usize> Sweep<D> for March<D> {
             let first = if carve { 0.5 * step } else { (z - tau).max(0.5 * step) };
             let last = if beam.is_hit() { z + tau } else { z };
             let direction = world_from_sensor.rotate(beam.direction);
-            let Some((near, far)) = clip(bounds, origin, direction, last) else { continue };
+            let Some((near, far)) = clip(&bounds, origin, direction, last) else { continue };
+            if far - near > LONGEST_RAY * lattice.resolution {
+                stats.refuse_far(beam.is_hit());
+                continue;
+            }
             let skipped = ((near - first) / step).ceil().max(0.0);
             let mut n = 0.0;
             loop {
@@ -78,16 +108,12 @@ impl<const D: usize> Sweep<D> for March<D> {
                     evidence.set(i, DistanceObservation { distance: d.min(tau) as f32, weight: w });
                 }
             }
+            if self.touched.keys().len() > limits.most_blocks {
+                return Err(PlanError::TooManyBlocks);
+            }
         }
         self.touched.sort();
-    }
-
-    fn blocks(&self) -> &[BlockKey<D>] {
-        self.touched.keys()
-    }
-
-    fn evidence<'a>(&'a self, i: usize, _: &'a mut Distances) -> &'a Distances {
-        self.touched.evidence(i)
+        Ok(stats)
     }
 }
 

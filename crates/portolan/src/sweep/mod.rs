@@ -12,11 +12,12 @@ mod bands;
 mod cell_centre;
 mod fan;
 mod fan_plan;
+mod inside;
 mod lens;
 mod march;
 mod nearest_ray;
 mod observe;
-pub(crate) mod occupancy;
+mod occupancy;
 mod padded_image;
 mod point_rays;
 mod projective;
@@ -26,31 +27,121 @@ mod touched;
 mod weight;
 
 pub use cell_centre::CellCentre;
+pub(crate) use inside::Inside;
 pub use march::March;
+pub(crate) use occupancy::LONGEST_RAY;
+pub use occupancy::{HitsAndMisses, OccupancySweep};
 pub use point_rays::PointRays;
-pub(crate) use projective::PlanError;
 pub use projective::{Projective, ProjectiveSettings};
 pub use rays::Rays;
 pub use weight::WeightModel;
 
-use crate::cell::Evidence;
+use crate::cell::{Colors, Distances, Evidence};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose};
-use crate::scan::Scan;
+use crate::scan::{Scan, ScanStats};
 
-/// Turns scans into evidence about blocks of cells. Keeps its scratch memory from scan to scan.
-pub trait Sweep<const D: usize> {
-    /// What it says about a block.
+/// A scan that was swept: the blocks of cells that it observes, and the evidence about each.
+///
+/// Stores fuse it block by block, on several threads: what one thread needs of its own is its scratch.
+pub trait Swept<const D: usize>: Sync {
+    /// What a scan yields about the cells of a block.
     type Evidence: Evidence;
+    /// Memory in which one thread computes evidence.
+    type Scratch: Send;
 
-    /// Looks at a scan and finds the blocks that it says something about. Beams are followed only inside
-    /// `bounds` (world). The pose must be rigid.
-    fn plan(&mut self, scan: &Scan<D>, world_from_sensor: &Pose<D>, lattice: &Lattice<D>, bounds: &Aabb<D>);
+    /// Memory for one thread.
+    fn scratch(&self) -> Self::Scratch;
 
-    /// The planned blocks, ascending.
+    /// The planned blocks, ascending, each once.
     fn blocks(&self) -> &[BlockKey<D>];
 
     /// The evidence about the `i`-th planned block: from the plan, or computed into `scratch`.
-    fn evidence<'a>(&'a self, i: usize, scratch: &'a mut Self::Evidence) -> &'a Self::Evidence;
+    fn evidence<'a>(&'a self, i: usize, scratch: &'a mut Self::Scratch) -> &'a Self::Evidence;
+}
+
+/// Turns scans into evidence about blocks of cells. Keeps its memory from scan to scan.
+pub trait Sweep<const D: usize>: Swept<D> {
+    /// The kind of scan that it reads.
+    type Scan: ?Sized;
+
+    /// Finds the blocks that a scan observes, within the limits. The pose must be rigid, and its translation must have a
+    /// cell. Returns what became of the beams; `cells` is still 0.
+    ///
+    /// # Errors
+    /// [`PlanError`] where the scan contradicts itself or observes too many blocks; nothing is planned then.
+    fn plan(
+        &mut self,
+        scan: &Self::Scan,
+        world_from_sensor: &Pose<D>,
+        lattice: &Lattice<D>,
+        limits: &PlanLimits<D>,
+    ) -> Result<ScanStats, PlanError>;
+}
+
+/// A swept scan of distances that may have colors, too.
+pub trait SweptColors<const D: usize>: Swept<D, Evidence = Distances> {
+    /// The colors of the `i`-th planned block, for cells within `band` metres of the surface, with the weight of their
+    /// distances; `distances` is the block's evidence. Without colors `colors` is cleared.
+    fn colors(&self, _i: usize, _distances: &Distances, _band: f32, colors: &mut Colors) {
+        colors.clear();
+    }
+
+    /// Whether the `i`-th planned block is known to hold no surface.
+    fn is_free(&self, _i: usize) -> bool {
+        false
+    }
+}
+
+/// How far a sweep follows beams.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanLimits<const D: usize> {
+    /// Beams are followed only inside this box (world, metres); `None`: everywhere.
+    pub bounds: Option<Aabb<D>>,
+    /// No scan may touch more blocks than this.
+    pub most_blocks: usize,
+}
+
+impl<const D: usize> Default for PlanLimits<D> {
+    fn default() -> Self {
+        Self { bounds: None, most_blocks: usize::MAX }
+    }
+}
+
+impl<const D: usize> PlanLimits<D> {
+    /// The bounds as a box; without bounds an infinite one.
+    pub fn bounds_or_everywhere(&self) -> Aabb<D> {
+        self.bounds.unwrap_or(Aabb::new([f64::NEG_INFINITY; D], [f64::INFINITY; D]))
+    }
+}
+
+/// Why a scan cannot be swept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// A range image contradicts itself.
+    #[error("a range image cannot be used: {0}")]
+    BadImage(&'static str),
+    /// It touches more blocks than it may.
+    #[error("the scan touches more blocks of cells than it may")]
+    TooManyBlocks,
+}
+
+/// What became of the beams of a scan that maps read beam by beam.
+fn beam_stats<const D: usize>(
+    scan: &Scan<D>,
+    world_from_sensor: &Pose<D>,
+    limits: &PlanLimits<D>,
+) -> ScanStats {
+    let outside = |bounds: Aabb<D>| {
+        scan.hits_world(world_from_sensor).filter(|&p| !bounds.contains(p)).count() as u64
+    };
+    ScanStats {
+        scans: 1,
+        beams: scan.counts(),
+        refused: scan.refused(),
+        hits_outside: limits.bounds.map_or(0, outside),
+        ..Default::default()
+    }
 }
 
 /// The part of `origin + s * direction`, `0 <= s <= length`, inside a box: `None` where it misses.

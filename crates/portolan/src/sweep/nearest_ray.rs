@@ -52,6 +52,10 @@ impl Evidence for NearestBeam {
     fn observed(&self) -> usize {
         self.distances.observed()
     }
+
+    fn keep(&mut self, inside: impl Fn(usize) -> bool) {
+        self.distances.keep(inside);
+    }
 }
 
 /// Walks every beam through the cells exactly; a cell listens to the beam that passes nearest to its centre,
@@ -73,7 +77,8 @@ impl<const D: usize> NearestRay<D> {
         (lattice, bounds): (&Lattice<D>, &Aabb<D>),
         weights: &[f32],
         how: (f64, f32),
-    ) {
+        most: usize,
+    ) -> bool {
         let rays = scan.beams().zip(weights).map(|(beam, &weight)| Ray {
             origin: world_from_sensor.translation,
             direction: world_from_sensor.rotate(beam.direction),
@@ -81,7 +86,7 @@ impl<const D: usize> NearestRay<D> {
             hit: beam.is_hit(),
             weight,
         });
-        self.plan_rays(rays, (lattice, bounds), how, usize::MAX);
+        self.plan_rays(rays, (lattice, bounds), how, most)
     }
 
     /// Stops where more than `most` blocks are touched, and says so with `false`.

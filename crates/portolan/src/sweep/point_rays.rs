@@ -1,11 +1,12 @@
 //! The sweep for scans of space without rows and columns: exact rays, the nearest of which counts.
 
 use super::nearest_ray::{NearestRay, Ray};
-use super::projective::{PlanError, ProjectiveSettings};
+use super::projective::ProjectiveSettings;
+use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors};
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
 use crate::geom::vector::{norm, scale, sub};
-use crate::geom::{Aabb, BlockKey, Lattice, Pose};
-use crate::scan::{BeamCounts, PointScan, RefusedBeams};
+use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
+use crate::scan::{BeamCounts, Origin, PointScan, RefusedBeams, ScanStats};
 
 /// Walks the ray of every point through the cells exactly. A cell listens to the ray that passes nearest to its centre, and
 /// gets that ray's distance at the centre; ties go to the earlier ray.
@@ -16,29 +17,29 @@ use crate::scan::{BeamCounts, PointScan, RefusedBeams};
 pub struct PointRays {
     settings: ProjectiveSettings,
     rays: NearestRay<3>,
-    bounds: Option<(Lattice<3>, Aabb<3>)>,
     colors: Vec<[u8; 3]>,
 }
 
 impl PointRays {
     /// Bytes that a touched block takes.
-    pub(crate) const BLOCK_BYTES: usize = super::nearest_ray::CELL_BYTES * crate::geom::block_cells::<3>();
+    pub(crate) const BLOCK_BYTES: usize = super::nearest_ray::CELL_BYTES * block_cells::<3>();
 
     /// A sweep with these settings, which has seen nothing yet.
     pub fn new(settings: ProjectiveSettings) -> Self {
-        Self { settings, rays: NearestRay::new(), bounds: None, colors: Vec::new() }
+        Self { settings, rays: NearestRay::new(), colors: Vec::new() }
     }
+}
 
-    /// Looks at a scan, taken at a rigid pose, and gathers what it says: about no more than `most` blocks, about no cells
-    /// but those whose centre lies in `bounds` (world). Says what became of the points.
-    pub(crate) fn plan(
+impl Sweep<3> for PointRays {
+    type Scan = PointScan;
+
+    fn plan(
         &mut self,
         scan: &PointScan,
         world_from_scan: &Pose<3>,
         lattice: &Lattice<3>,
-        bounds: Option<&Aabb<3>>,
-        (colors, most): (bool, usize),
-    ) -> Result<(BeamCounts, RefusedBeams), PlanError> {
+        limits: &PlanLimits<3>,
+    ) -> Result<ScanStats, PlanError> {
         let how = &self.settings;
         let (mut beams, mut refused) = (BeamCounts::default(), RefusedBeams::default());
         // One pass over the points alone: rays are counted whether they reach into the bounds or not.
@@ -48,8 +49,8 @@ impl PointRays {
                 None => (&scan.free_ends[i - scan.points.len()], false),
             };
             let origin = match &scan.origin {
-                crate::scan::Origin::Common(o) => Some(*o),
-                crate::scan::Origin::PerPoint(all) => all.get(i).map(|o| o.map(f64::from)),
+                Origin::Common(o) => Some(*o),
+                Origin::PerPoint(all) => all.get(i).map(|o| o.map(f64::from)),
             };
             let offset = sub(end.map(f64::from), origin.unwrap_or([f64::NAN; 3]));
             let length = norm(offset);
@@ -84,51 +85,60 @@ impl PointRays {
         }
         let silent =
             Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0], range: 0.0, hit: false, weight: 0.0 };
-        let everywhere = Aabb::new([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
-        let within = bounds.unwrap_or(&everywhere);
+        let bounds = limits.bounds_or_everywhere();
         let fits = self.rays.plan_rays(
             (0..count).map(|i| ray(i).unwrap_or(silent)),
-            (lattice, within),
+            (lattice, &bounds),
             (how.truncation, how.carve_weight),
-            most,
+            limits.most_blocks,
         );
-        self.bounds = bounds.map(|b| (*lattice, *b));
+        if !fits {
+            return Err(PlanError::TooManyBlocks);
+        }
         self.colors.clear();
-        if colors && scan.colors.len() == scan.points.len() {
+        if how.color && scan.colors.len() == scan.points.len() {
             self.colors.extend_from_slice(&scan.colors);
         }
-        if fits { Ok((beams, refused)) } else { Err(PlanError::TooManyBlocks) }
+        let outside = |bounds: Aabb<3>| {
+            let is_outside = |p: &[f32; 3]| !bounds.contains(world_from_scan.transform_point(p.map(f64::from)));
+            scan.points.iter().filter(|p| is_outside(p)).count() as u64
+        };
+        Ok(ScanStats {
+            scans: 1,
+            beams,
+            refused: scan.refused + refused,
+            hits_outside: limits.bounds.map_or(0, outside),
+            ..Default::default()
+        })
     }
+}
 
-    /// The touched blocks, ascending.
-    pub fn blocks(&self) -> &[BlockKey<3>] {
+impl Swept<3> for PointRays {
+    type Evidence = Distances;
+    type Scratch = ();
+
+    fn scratch(&self) {}
+
+    fn blocks(&self) -> &[BlockKey<3>] {
         self.rays.blocks()
     }
 
-    /// The evidence about the `i`-th block, into `evidence`; returns for how many cells there is some.
-    pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
-        evidence.clone_from(self.rays.evidence(i));
-        if let Some((lattice, bounds)) = &self.bounds {
-            super::projective::keep_inside(lattice, bounds, self.blocks()[i], evidence.planes_mut().1);
-        }
-        evidence.observed()
+    fn evidence<'a>(&'a self, i: usize, (): &'a mut ()) -> &'a Distances {
+        self.rays.evidence(i)
     }
+}
 
-    /// The colours of the `i`-th block: of the rays that the distances come from, for cells within `band` metres of the
-    /// surface, with the weight of their distances. `distances` is the block's evidence. Returns for how many cells there is
-    /// one.
-    pub fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) -> usize {
+impl SweptColors<3> for PointRays {
+    /// Those of the rays that the distances come from.
+    fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) {
         colors.clear();
         let rays = &self.rays.nearest(i).ray;
-        let mut found = 0;
         for (cell, &ray) in rays.iter().enumerate() {
             let one = distances.one(cell).filter(|d| d.distance.abs() <= band);
             if let (Some(seen), Some(&rgb)) = (one, self.colors.get(ray as usize)) {
                 colors.set(cell, ColorObservation { rgb, weight: seen.weight });
-                found += 1;
             }
         }
-        found
     }
 }
 

@@ -1,14 +1,14 @@
 //! The sweep for organised scans of space: every cell's centre is looked up in the range image.
 
-use super::WeightModel;
+use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel};
 use super::lens::{BAD_IMAGE, LANES, Lens, Window};
 use super::observe::{Centres, Octants, View, cell_of, nearest, observe_block, places};
 use super::padded_image::{Cleaning, PaddedImage};
 use super::range_pyramid::RangePyramid;
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
-use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
 use crate::parallel;
-use crate::scan::{BeamCounts, RangeImage, RefusedBeams};
+use crate::scan::{RangeImage, ScanStats};
 
 /// How a range image becomes distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,15 +23,8 @@ pub struct ProjectiveSettings {
     pub min_range: f64,
     /// Surfaces further than this are not used; the space up to there is free (metres along the ray).
     pub max_range: f64,
-}
-
-/// Why an image cannot be swept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PlanError {
-    /// It contradicts itself.
-    BadImage(&'static str),
-    /// It sees more blocks than there may be.
-    TooManyBlocks,
+    /// Whether colors are kept for [`SweptColors::colors`].
+    pub color: bool,
 }
 
 /// Gives every cell the distance at its **centre**, measured along the ray through it.
@@ -76,45 +69,8 @@ impl Projective {
         }
     }
 
-    /// Looks at an image, taken at a rigid pose, and finds the blocks that it says something about: no more than `most`,
-    /// no cells but those whose centre lies in `bounds` (world). Says what became of the pixels.
-    pub(crate) fn plan(
-        &mut self,
-        image: &RangeImage,
-        world_from_image: &Pose<3>,
-        lattice: &Lattice<3>,
-        bounds: Option<&Aabb<3>>,
-        (colors, most): (bool, usize),
-    ) -> Result<(BeamCounts, RefusedBeams), PlanError> {
-        self.keys.clear();
-        self.octants.clear();
-        let lens = Lens::of(image).ok_or(PlanError::BadImage(BAD_IMAGE))?;
-        let tau = self.settings.truncation;
-        let cleaning = Cleaning {
-            min_range: self.settings.min_range,
-            max_range: self.settings.max_range,
-            step: (0.5 * tau).min(0.03),
-            weights: self.settings.weights,
-            colors,
-        };
-        let counted = self.image.fill(image, &lens, &cleaning);
-        self.pyramid.build(self.image.stride, &self.image.value, !self.carves());
-        self.lens = Some(lens);
-        self.lattice = *lattice;
-        self.origin = world_from_image.translation;
-        self.image_from_world = world_from_image.inverse().rotation;
-        self.bounds = bounds.copied();
-        self.find_blocks(world_from_image, most)?;
-        Ok(counted)
-    }
-
     fn carves(&self) -> bool {
         self.settings.carve_weight > 0.0
-    }
-
-    /// The planned blocks, ascending.
-    pub fn blocks(&self) -> &[BlockKey<3>] {
-        &self.keys
     }
 
     fn find_blocks(&mut self, world_from_image: &Pose<3>, most: usize) -> Result<(), PlanError> {
@@ -190,14 +146,9 @@ impl Projective {
         }
     }
 
-    /// Whether all cells of the `i`-th planned block are free beyond the truncation.
-    pub(crate) fn is_free(&self, i: usize) -> bool {
-        self.octants[i].mixed == 0
-    }
-
-    /// The evidence about the `i`-th planned block, into `evidence`; returns for how many cells there is some.
-    pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
-        let Some(lens) = &self.lens else { return 0 };
+    /// The evidence about the `i`-th planned block, into `evidence`.
+    fn observe(&self, i: usize, evidence: &mut Distances) {
+        let Some(lens) = &self.lens else { return };
         let (distance, weight) = evidence.planes_mut();
         let mut octants = self.octants[i];
         if self.settings.weights != WeightModel::Constant {
@@ -206,25 +157,85 @@ impl Projective {
         }
         let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight))
         else {
-            return 0;
+            return;
         };
-        let observed =
-            observe_block(&self.view(lens), &self.centres(self.keys[i]), octants, distance, weight);
-        match &self.bounds {
-            Some(bounds) if keep_inside(&self.lattice, bounds, self.keys[i], weight) => evidence.observed(),
-            _ => observed,
-        }
+        observe_block(&self.view(lens), &self.centres(self.keys[i]), octants, distance, weight);
+    }
+}
+
+impl Sweep<3> for Projective {
+    type Scan = RangeImage;
+
+    fn plan(
+        &mut self,
+        image: &RangeImage,
+        world_from_image: &Pose<3>,
+        lattice: &Lattice<3>,
+        limits: &PlanLimits<3>,
+    ) -> Result<ScanStats, PlanError> {
+        self.keys.clear();
+        self.octants.clear();
+        let lens = Lens::of(image).ok_or(PlanError::BadImage(BAD_IMAGE))?;
+        let tau = self.settings.truncation;
+        let cleaning = Cleaning {
+            min_range: self.settings.min_range,
+            max_range: self.settings.max_range,
+            step: (0.5 * tau).min(0.03),
+            weights: self.settings.weights,
+            colors: self.settings.color,
+        };
+        let (beams, cleaned) = self.image.fill(image, &lens, &cleaning);
+        self.pyramid.build(self.image.stride, &self.image.value, !self.carves());
+        self.lens = Some(lens);
+        self.lattice = *lattice;
+        self.origin = world_from_image.translation;
+        self.image_from_world = world_from_image.inverse().rotation;
+        self.bounds = limits.bounds;
+        self.find_blocks(world_from_image, limits.most_blocks)?;
+        let outside = |bounds: Aabb<3>| {
+            let is_outside = |p: [f64; 3]| !bounds.contains(world_from_image.transform_point(p));
+            image.points().filter(|(_, p)| is_outside(*p)).count() as u64
+        };
+        Ok(ScanStats {
+            scans: 1,
+            beams,
+            refused: image.refused + cleaned,
+            hits_outside: limits.bounds.map_or(0, outside),
+            ..Default::default()
+        })
+    }
+}
+
+impl Swept<3> for Projective {
+    type Evidence = Distances;
+    type Scratch = Distances;
+
+    fn scratch(&self) -> Distances {
+        Distances::silent(block_cells::<3>())
     }
 
-    /// The colours of the `i`-th planned block: those of the nearest pixels, for cells within `band` metres of the surface,
-    /// with the weight of their distances. `distances` is the block's evidence. Returns for how many cells there is one.
-    pub fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) -> usize {
+    fn blocks(&self) -> &[BlockKey<3>] {
+        &self.keys
+    }
+
+    fn evidence<'a>(&'a self, i: usize, scratch: &'a mut Distances) -> &'a Distances {
+        self.observe(i, scratch);
+        scratch
+    }
+}
+
+impl SweptColors<3> for Projective {
+    fn is_free(&self, i: usize) -> bool {
+        self.octants[i].mixed == 0
+    }
+
+    /// Those of the nearest pixels.
+    fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) {
         colors.clear();
-        let Some(lens) = self.lens.as_ref().filter(|_| !self.image.colors.is_empty()) else { return 0 };
+        let Some(lens) = self.lens.as_ref().filter(|_| !self.image.colors.is_empty()) else { return };
         let near = |cell: usize| distances.weights()[cell] > 0.0 && distances.distances()[cell].abs() <= band;
         let centres = self.centres(self.keys[i]);
         let image = &self.image;
-        let mut found = 0;
         for octant in 0..8 {
             if !(0..LANES).any(|l| near(cell_of(octant, l))) {
                 continue;
@@ -239,31 +250,10 @@ impl Projective {
                     let column = (column + image.columns - 1) % image.columns;
                     let rgb = image.colors[row * image.columns + column];
                     colors.set(cell, ColorObservation { rgb, weight: distances.weights()[cell] });
-                    found += 1;
                 }
             }
         }
-        found
     }
-}
-
-/// Silences the cells whose centre is not inside; returns whether there may be such cells.
-pub(super) fn keep_inside(
-    lattice: &Lattice<3>,
-    bounds: &Aabb<3>,
-    key: BlockKey<3>,
-    weight: &mut [f32],
-) -> bool {
-    let (low, high) = (lattice.center(key.first_cell()), lattice.center(key.cell(weight.len() - 1)));
-    if bounds.contains(low) && bounds.contains(high) {
-        return false;
-    }
-    for (i, w) in weight.iter_mut().enumerate() {
-        if !bounds.contains(lattice.center(key.cell(i))) {
-            *w = 0.0;
-        }
-    }
-    true
 }
 
 /// The search for blocks, from large boxes of blocks to single ones.

@@ -1,11 +1,12 @@
 //! Exact rays: every cell that a beam passes through.
 
+use super::occupancy::LONGEST_RAY;
 use super::touched::Touched;
-use super::{Sweep, clip};
+use super::{PlanError, PlanLimits, Sweep, Swept, beam_stats, clip};
 use crate::cell::HitMiss;
 use crate::geom::vector::{along, distance};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
-use crate::scan::Scan;
+use crate::scan::{Scan, ScanStats};
 
 /// Walks every beam through the cells (Amanatides & Woo 1987) and marks hits and misses.
 ///
@@ -25,20 +26,23 @@ impl<const D: usize> Rays<D> {
         Self { wall_depth, touched: Touched::new() }
     }
 
-    fn beam(
+    /// Marks the cells of one beam; `false` where it is too long to be walked, and nothing is marked.
+    fn walk(
         &mut self,
         lattice: &Lattice<D>,
         bounds: &Aabb<D>,
-        origin: [f64; D],
-        direction: [f64; D],
-        z: f64,
-        hit: bool,
-    ) {
+        ray: &Ray<D>,
+        most: usize,
+    ) -> Result<bool, PlanError> {
+        let Ray { origin, direction, range: z, hit } = *ray;
         let half = 0.5 * self.wall_depth;
         let length = if hit { z + half } else { z };
-        let Some((near, far)) = clip(bounds, origin, direction, length) else { return };
+        let Some((near, far)) = clip(bounds, origin, direction, length) else { return Ok(true) };
+        if far - near > LONGEST_RAY * lattice.resolution {
+            return Ok(false);
+        }
         let start = if near > 0.0 { along(origin, direction, near) } else { origin };
-        let Some(mut walk) = RayWalk::new(lattice, start, direction) else { return };
+        let Some(mut walk) = RayWalk::new(lattice, start, direction) else { return Ok(true) };
         // Up to here every centre is nearer than z - half, whatever the angle: no square root needed.
         let diagonal = 0.5 * lattice.resolution * (D as f64).sqrt();
         let surely_missed = z - half - diagonal;
@@ -57,34 +61,65 @@ impl<const D: usize> Rays<D> {
                 self.touched.of_cell(cell).mark_miss(BlockKey::offset(cell));
             }
             if near + walk.exit() >= far {
-                return;
+                break;
             }
             walk.advance();
         }
+        if self.touched.keys().len() > most { Err(PlanError::TooManyBlocks) } else { Ok(true) }
     }
 }
 
-impl<const D: usize> Sweep<D> for Rays<D> {
-    type Evidence = HitMiss;
+/// A beam in the world's frame (metres).
+struct Ray<const D: usize> {
+    origin: [f64; D],
+    /// Unit vector.
+    direction: [f64; D],
+    range: f64,
+    /// Whether there is a surface at the end.
+    hit: bool,
+}
 
-    fn plan(&mut self, scan: &Scan<D>, world_from_sensor: &Pose<D>, lattice: &Lattice<D>, bounds: &Aabb<D>) {
-        self.touched.clear();
-        for beam in scan.beams() {
-            let z = beam.free_range();
-            if z > 0.0 {
-                let direction = world_from_sensor.rotate(beam.direction);
-                self.beam(lattice, bounds, world_from_sensor.translation, direction, z, beam.is_hit());
-            }
-        }
-        self.touched.sort();
-    }
+impl<const D: usize> Swept<D> for Rays<D> {
+    type Evidence = HitMiss;
+    type Scratch = ();
+
+    fn scratch(&self) {}
 
     fn blocks(&self) -> &[BlockKey<D>] {
         self.touched.keys()
     }
 
-    fn evidence<'a>(&'a self, i: usize, _: &'a mut HitMiss) -> &'a HitMiss {
+    fn evidence<'a>(&'a self, i: usize, (): &'a mut ()) -> &'a HitMiss {
         self.touched.evidence(i)
+    }
+}
+
+impl<const D: usize> Sweep<D> for Rays<D> {
+    type Scan = Scan<D>;
+
+    fn plan(
+        &mut self,
+        scan: &Scan<D>,
+        world_from_sensor: &Pose<D>,
+        lattice: &Lattice<D>,
+        limits: &PlanLimits<D>,
+    ) -> Result<ScanStats, PlanError> {
+        self.touched.clear();
+        let bounds = limits.bounds_or_everywhere();
+        let mut stats = beam_stats(scan, world_from_sensor, limits);
+        for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
+            let ray = Ray {
+                origin: world_from_sensor.translation,
+                direction: world_from_sensor.rotate(beam.direction),
+                range: beam.free_range(),
+                hit: beam.is_hit(),
+            };
+            if !self.walk(lattice, &bounds, &ray, limits.most_blocks)? {
+                stats.refuse_far(beam.is_hit());
+            }
+        }
+        self.touched.sort();
+        Ok(stats)
     }
 }
 

@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use portolan::geom::{Grid, Pose};
-use portolan::map::{SweepKind, Tsdf2, Tsdf2Config};
+use portolan::map::{BeamSweep, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan_sim::{Lap, World};
 use std::sync::OnceLock;
@@ -28,8 +28,8 @@ pub(crate) fn grid() -> Grid<2> {
     Grid::new([0.0; 2], 0.05, [240, 180])
 }
 
-pub(crate) fn tsdf(sweep: SweepKind, carve: bool, log: &[(Pose<2>, Scan<2>)]) -> Tsdf2 {
-    let config = Tsdf2Config { sweep, ..Default::default() }.with_grid(&grid());
+pub(crate) fn tsdf(sweep: BeamSweep, carve: bool, log: &[(Pose<2>, Scan<2>)]) -> Tsdf2 {
+    let config = TsdfConfig { sweep, ..Default::default() }.with_grid(&grid());
     let mut tsdf = Tsdf2::new(config).unwrap();
     for (pose, scan) in log {
         tsdf.integrate(pose, scan, carve);

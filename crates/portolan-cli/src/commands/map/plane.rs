@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::{Context, bail};
 use portolan::geom::{Aabb, Grid, Pose};
-use portolan::map::SweepKind;
+use portolan::map::BeamSweep;
 use portolan::scan::RangeLimits;
 use portolan_io::{CarmenLog, MapFile, sweep_of, weights_of, write_atomic};
 
@@ -152,8 +152,8 @@ impl Args {
                 None => saved.word("weights").and_then(weights_of).unwrap_or_default(),
             },
             sweep: match self.sweep {
-                Some(SweepArg::March) => SweepKind::March,
-                Some(_) => SweepKind::CellCentre,
+                Some(SweepArg::March) => BeamSweep::March,
+                Some(_) => BeamSweep::CellCentre,
                 None => saved.word("sweep").and_then(sweep_of).unwrap_or_default(),
             },
             carve: !self.no_carve && saved.flag("carve").unwrap_or(true),

@@ -1,6 +1,6 @@
 //! What the page's sliders set.
 
-use portolan::map::Tsdf2Config;
+use portolan::map::TsdfConfig;
 use portolan_io::{sweep_of, sweep_word, weights_of, weights_word};
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +41,7 @@ impl Settings {
 impl Default for Settings {
     /// The chapter's, with the default sweep.
     fn default() -> Self {
-        let config = Tsdf2Config::default();
+        let config = TsdfConfig::default();
         Self {
             resolution: config.resolution,
             truncation: config.truncation,
@@ -60,7 +60,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(in crate::engine) fn config(&self) -> Result<Tsdf2Config, Refusal> {
+    pub(in crate::engine) fn config(&self) -> Result<TsdfConfig, Refusal> {
         let within = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
             true => Ok(value),
             false => Err(Refusal::new(format!("{name} must be from {low} to {high}, and is {value}"))),
@@ -71,14 +71,14 @@ impl Settings {
         let carve_weight = within("carve_weight", self.carve_weight, 0.01, 1.0)?;
         let w_max = self.w_max.map_or(Ok(f64::INFINITY), |w| within("w_max", w, 0.5, 1e6))?;
         let unknown = |what: &str, word: &str| Refusal::new(format!("there is no {what} \"{word}\""));
-        Ok(Tsdf2Config {
+        Ok(TsdfConfig {
             resolution,
             truncation,
             w_max: w_max as f32,
             carve_weight: carve_weight as f32,
             sweep: sweep_of(&self.sweep).ok_or_else(|| unknown("sweep", &self.sweep))?,
             weights: weights_of(&self.weights).ok_or_else(|| unknown("weight model", &self.weights))?,
-            ..Tsdf2Config::default()
+            ..TsdfConfig::default()
         })
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use portolan::cell::FusionEvent;
 use portolan::geom::{Grid, Pose};
-use portolan::map::{SweepKind, Tsdf2, Tsdf2Config};
+use portolan::map::{BeamSweep, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan_sim::{LapConfig, apartment, lap};
 use serde_json::{Value, json};
@@ -37,7 +37,7 @@ fn said(session: &mut Session, question: Value) -> Value {
 }
 
 /// The events of a cell as the library tells them, fused without a studio.
-fn events(scans: &[(Pose<2>, Scan<2>)], config: Tsdf2Config, cell: [i32; 2]) -> Vec<(usize, FusionEvent)> {
+fn events(scans: &[(Pose<2>, Scan<2>)], config: TsdfConfig, cell: [i32; 2]) -> Vec<(usize, FusionEvent)> {
     let mut tsdf = Tsdf2::new(config.with_grid(&Grid::new([0.0; 2], 0.05, [240, 180]))).unwrap();
     tsdf.watch([cell]);
     let mut events = Vec::new();
@@ -64,14 +64,14 @@ fn same(told: &Value, events: &[(usize, FusionEvent)]) {
 #[test]
 fn a_cells_history_is_what_the_library_says() {
     let scans = lap(&apartment().world, &LapConfig::default());
-    for (word, sweep) in [("cell-centre", SweepKind::CellCentre), ("march", SweepKind::March)] {
+    for (word, sweep) in [("cell-centre", BeamSweep::CellCentre), ("march", BeamSweep::March)] {
         let mut session = session(Logs::default());
         let mut settings = ask(&mut session, json!({ "op": "open" }))["all"]["settings"].clone();
         settings["sweep"] = json!(word);
         settings["w_max"] = json!(8);
         ask(&mut session, json!({ "op": "set", "settings": settings }));
         ask(&mut session, json!({ "op": "seek", "scan": 150 }));
-        let config = Tsdf2Config { sweep, w_max: 8.0, ..Default::default() };
+        let config = TsdfConfig { sweep, w_max: 8.0, ..Default::default() };
         for cell in [[31, 60], [100, 90], [37, 70], [20, 50]] {
             let told = ask(&mut session, json!({ "op": "watch", "cell": cell }));
             let expected = events(&scans, config, cell);

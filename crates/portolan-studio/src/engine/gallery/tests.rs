@@ -7,7 +7,7 @@ use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::gallery::{Gallery, GallerySettings, LEVEL, Truth, run};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Tsdf2, Tsdf2Config};
+use portolan::map::{Tsdf2, TsdfConfig};
 use portolan::scan::{Beam, BeamKind, Scan};
 use portolan::surface::ContourSettings;
 use portolan_sim::{LapConfig, apartment, lap};
@@ -53,10 +53,10 @@ fn library() -> Gallery {
     let world = apartment().world;
     let scans: Vec<(Pose<2>, Scan<2>)> = lap(&world, &LapConfig::default()).into_iter().take(SCANS).collect();
     let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
-    let tsdf = Tsdf2::new(Tsdf2Config::default().with_grid(&grid)).unwrap();
+    let tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&grid)).unwrap();
     let settings = GallerySettings {
         grid,
-        tsdf: Tsdf2Config::default(),
+        tsdf: TsdfConfig::default(),
         model: OccupancyModel::default(),
         contour: ContourSettings::of(&tsdf),
         esdf: EsdfSettings::of(&tsdf),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use portolan::cell::FusionEvent;
 use portolan::geom::Aabb;
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig};
 use serde_json::{Value, json};
 
 use super::source::Source;
@@ -18,7 +18,7 @@ pub(super) struct Watched {
     pub(super) cell: [i32; 3],
     /// Frames before this one are fused again to see what they did.
     since: usize,
-    again: Option<(SparseTsdf, usize)>,
+    again: Option<(Tsdf3, usize)>,
     before: Vec<(usize, FusionEvent)>,
     after: Vec<(usize, FusionEvent)>,
 }
@@ -26,8 +26,8 @@ pub(super) struct Watched {
 impl Watched {
     /// Watches from frame `since` on. What came before is found by fusing it again into a map of this cell alone: the
     /// evidence about a cell does not depend on which others are kept.
-    pub(super) fn new(cell: [i32; 3], since: usize, config: SparseTsdfConfig) -> Result<Self, Refusal> {
-        let mut map = SparseTsdf::new(config).map_err(Refusal::new)?;
+    pub(super) fn new(cell: [i32; 3], since: usize, config: TsdfConfig) -> Result<Self, Refusal> {
+        let mut map = Tsdf3::new(config).map_err(Refusal::new)?;
         let center = map.lattice().center(cell);
         let near = 0.25 * config.resolution;
         map.set_bounds(Some(Aabb::new(center.map(|v| v - near), center.map(|v| v + near))));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use portolan::field::SparseEsdf;
 use portolan::geom::vector::sub;
 use portolan::geom::{BlockKey, Pose};
-use portolan::map::{MapError, SparseOccupancy, SparseTsdf};
+use portolan::map::{MapError, Occupancy, Tsdf3};
 use portolan::scan::{Frame, ScanStats};
 use portolan::surface::IncrementalMesh;
 
@@ -37,8 +37,8 @@ pub(super) struct Seconds {
 pub(super) struct Made {
     /// Frames that are fused.
     pub(super) at: usize,
-    pub(super) tsdf: SparseTsdf,
-    pub(super) occupancy: Option<SparseOccupancy>,
+    pub(super) tsdf: Tsdf3,
+    pub(super) occupancy: Option<Occupancy>,
     pub(super) esdf: Option<SparseEsdf<3>>,
     /// The map's epoch when the Euclidean field was made.
     measured: u64,
@@ -69,7 +69,7 @@ impl Made {
                 let r = settings.resolution;
                 let anchor = start.map(|v| if (v / r).abs() < FAR_CELLS { 0.0 } else { (v / r).round() * r });
                 let config = settings.config(anchor, source.has_color())?;
-                let tsdf = SparseTsdf::new(config).map_err(Refusal::new)?;
+                let tsdf = Tsdf3::new(config).map_err(Refusal::new)?;
                 let occupancy = settings.occupancy.then(|| settings.empty_occupancy(*tsdf.lattice()));
                 (tsdf, occupancy.transpose()?)
             }
@@ -128,7 +128,7 @@ impl Made {
         memory: usize,
         clock: &Clock,
     ) -> Result<(), MapError> {
-        let others = self.occupancy.as_ref().map_or(0, SparseOccupancy::memory_bytes);
+        let others = self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes);
         self.tsdf.set_limit(memory.saturating_sub(others));
         let (stats, seconds) = clock.time(|| self.tsdf.integrate(pose, frame));
         self.seconds.tsdf += seconds;
@@ -207,7 +207,7 @@ impl Made {
 
     pub(super) fn memory_bytes(&self) -> usize {
         self.tsdf.memory_bytes()
-            + self.occupancy.as_ref().map_or(0, SparseOccupancy::memory_bytes)
+            + self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes)
             + self.esdf.as_ref().map_or(0, SparseEsdf::memory_bytes)
             + self.mesh.memory_bytes()
             + self.drawn.memory_bytes()

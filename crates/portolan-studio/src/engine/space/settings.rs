@@ -3,7 +3,7 @@
 use portolan::cell::OccupancyModel;
 use portolan::field::SparseEsdfSettings;
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{OccupancySweep, Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::MeshSettings;
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +46,7 @@ pub(in crate::engine) enum Sensor {
 impl Default for Settings {
     /// Those of `map`: 5 cm, truncation three cells, W_max 64, with carving.
     fn default() -> Self {
-        let config = SparseTsdfConfig::default();
+        let config = TsdfConfig::default();
         Self {
             resolution: config.resolution,
             truncation: config.truncation,
@@ -63,7 +63,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<SparseTsdfConfig, Refusal> {
+    pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<TsdfConfig, Refusal> {
         let within = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
             true => Ok(value),
             false => Err(Refusal::new(format!("{name} must be from {low} to {high}, and is {value}"))),
@@ -71,7 +71,7 @@ impl Settings {
         let resolution = within("resolution", self.resolution, 0.005, 1.0)?;
         let truncation = within("truncation", self.truncation, resolution, 20.0 * resolution)?;
         let w_max = within("w_max", self.w_max, 0.5, 1e6)?;
-        Ok(SparseTsdfConfig {
+        Ok(TsdfConfig {
             resolution,
             origin,
             truncation,
@@ -80,23 +80,23 @@ impl Settings {
             carve_weight: CARVE_WEIGHT,
             color,
             max_range: FARTHEST_CELLS * resolution - truncation,
-            ..SparseTsdfConfig::default()
+            ..TsdfConfig::default()
         })
     }
 
     /// A map that is occupied or free beside that of distances.
-    pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<SparseOccupancy, Refusal> {
-        SparseOccupancy::new(lattice, OccupancyModel::default(), OccupancySweep::Auto).map_err(Refusal::new)
+    pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<Occupancy, Refusal> {
+        Occupancy::new(lattice, OccupancyModel::default(), OccupancySweep::Auto).map_err(Refusal::new)
     }
 }
 
 /// As `map` does: half of what one ordinary ray weighs; what was seen once is a surface.
-pub(super) fn mesh_settings(tsdf: &SparseTsdf) -> MeshSettings {
+pub(super) fn mesh_settings(tsdf: &Tsdf3) -> MeshSettings {
     MeshSettings { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..MeshSettings::default() }
 }
 
 /// As `map` does: half of what one ordinary observation of free space weighs; what was seen free once is known.
-pub(super) fn esdf_settings(tsdf: &SparseTsdf) -> SparseEsdfSettings {
+pub(super) fn esdf_settings(tsdf: &Tsdf3) -> SparseEsdfSettings {
     let config = tsdf.config();
     let min_weight = 0.5 * config.weights.typical_low() * config.carve_weight;
     SparseEsdfSettings { min_weight, ..SparseEsdfSettings::default() }

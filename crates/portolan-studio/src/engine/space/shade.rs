@@ -1,6 +1,6 @@
 //! What the colour of a vertex tells, in four bytes.
 
-use portolan::map::SparseTsdf;
+use portolan::map::Tsdf3;
 use portolan::store::Store;
 use portolan::surface::Mesh;
 use portolan_sim::space::SpaceWorld;
@@ -16,7 +16,7 @@ const ERROR_CELLS: f64 = 1.0;
 pub(super) fn shades(
     by: ColorBy,
     piece: &Mesh,
-    tsdf: &SparseTsdf,
+    tsdf: &Tsdf3,
     world: Option<&SpaceWorld>,
     out: &mut Vec<u8>,
 ) {
@@ -37,7 +37,7 @@ pub(super) fn shades(
 }
 
 /// The weight of the cell that holds a place.
-fn weight_at(tsdf: &SparseTsdf, p_world: [f64; 3]) -> Option<f32> {
+fn weight_at(tsdf: &Tsdf3, p_world: [f64; 3]) -> Option<f32> {
     Some(tsdf.store().cell(tsdf.lattice().cell_of(p_world)?)?.weight)
 }
 
@@ -47,7 +47,7 @@ fn step(share: f64) -> u8 {
 }
 
 /// What the ends of the ramp mean.
-pub(super) fn ramp(by: ColorBy, tsdf: &SparseTsdf, heights: Option<[f32; 2]>) -> Value {
+pub(super) fn ramp(by: ColorBy, tsdf: &Tsdf3, heights: Option<[f32; 2]>) -> Value {
     match by {
         ColorBy::Height => {
             json!({ "low": heights.map(|h| h[0]), "high": heights.map(|h| h[1]), "unit": "m" })

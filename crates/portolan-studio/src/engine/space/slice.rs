@@ -2,7 +2,7 @@
 
 use portolan::field::SparseEsdf;
 use portolan::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
-use portolan::map::{SparseOccupancy, SparseTsdf};
+use portolan::map::{Occupancy, Tsdf3};
 use portolan::store::Store;
 
 use super::ask::{Field, Slice};
@@ -20,7 +20,7 @@ pub(super) struct Extent {
 
 impl Extent {
     /// `None` where nothing was observed. O(bricks).
-    pub(super) fn of(tsdf: &SparseTsdf) -> Option<Self> {
+    pub(super) fn of(tsdf: &Tsdf3) -> Option<Self> {
         let keys = || tsdf.store().bricks_by_age().map(|(key, _)| key);
         let side = |k: usize| Some((keys().map(|key| key.0[k]).min()?, keys().map(|key| key.0[k]).max()?));
         let [x, y, z] = [side(0)?, side(1)?, side(2)?];
@@ -76,8 +76,8 @@ pub(super) fn layer_index(
 /// What a field says of a cell; NaN: nothing.
 pub(super) fn value_of<'a>(
     field: Field,
-    tsdf: &'a SparseTsdf,
-    occupancy: Option<&'a SparseOccupancy>,
+    tsdf: &'a Tsdf3,
+    occupancy: Option<&'a Occupancy>,
     esdf: Option<&'a SparseEsdf<3>>,
 ) -> impl Fn([i32; 3]) -> f32 + 'a {
     move |cell| {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use portolan::geom::Pose;
 use portolan::geom::vector::{add, norm, scale};
-use portolan::map::SparseTsdf;
+use portolan::map::Tsdf3;
 use portolan::scan::Frame;
 use portolan_io::space_log::SpaceLog;
 use portolan_sim::SEED;
@@ -72,7 +72,7 @@ impl Source {
     }
 
     /// The map that stands for frames.
-    pub(super) fn map(&self) -> Option<&SparseTsdf> {
+    pub(super) fn map(&self) -> Option<&Tsdf3> {
         match &self.logs.space {
             SpaceSource::Map { tsdf, .. } => Some(tsdf),
             SpaceSource::Building | SpaceSource::Recorded { .. } => None,

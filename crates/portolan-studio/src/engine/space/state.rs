@@ -5,7 +5,7 @@ use std::sync::Arc;
 use portolan::field::SparseEsdf;
 use portolan::geom::BLOCK_EDGE;
 use portolan::geom::vector::{add, dot, sub};
-use portolan::map::SparseOccupancy;
+use portolan::map::Occupancy;
 use serde_json::{Value, json};
 
 use super::ask::{Ask, ColorBy, ExportFile, Field, Slice};
@@ -217,7 +217,7 @@ impl Space {
             "bricks": tsdf.store().len(),
             "bytes": {
                 "tsdf": tsdf.memory_bytes(),
-                "occupancy": made.occupancy.as_ref().map(SparseOccupancy::memory_bytes),
+                "occupancy": made.occupancy.as_ref().map(Occupancy::memory_bytes),
                 "esdf": made.esdf.as_ref().map(SparseEsdf::memory_bytes),
                 "mesh": made.mesh.memory_bytes(),
             },

@@ -234,7 +234,7 @@ proptest! {
 }
 
 /// A ball of 0.8 m in an array that is no multiple of a brick, with a corner that was not observed.
-fn ball<const D: usize>() -> Tsdf<D> {
+fn ball<const D: usize>() -> DenseTsdf<D> {
     let config = TsdfConfig { cells: [37; D], resolution: R, truncation: 0.3, ..Default::default() };
     let mut tsdf = Tsdf::new(config).unwrap();
     for i in 0..tsdf.grid().len() {

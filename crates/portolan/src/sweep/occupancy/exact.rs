@@ -55,7 +55,7 @@ pub(crate) struct ExactRays {
 const RAYS_A_PART: usize = 2048;
 
 impl ExactRays {
-    /// Marks `count` rays; `further` only count for [`ExactRays::reach`]. Cells outside of `bounds` may be marked, too: see `CellBox::mask`.
+    /// Marks `count` rays; `further` only count for [`ExactRays::reach`]. Cells outside of `bounds` may be marked, too.
     ///
     /// Stops where more than `most` bricks are touched, whatever the number of threads, and forgets them. Each thread holds
     /// up to `most` bricks of its own until then.

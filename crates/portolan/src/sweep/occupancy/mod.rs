@@ -5,16 +5,15 @@
 //! once a scan, the cell of the end point is hit, a hit overrules misses), and [`projective`](Projective) misses for scans of
 //! rows and columns, whose hits are exact as well.
 
-mod cell_box;
 mod exact;
 mod guard;
+mod hits_and_misses;
 mod lens;
 mod masks;
 mod projective;
 mod trace;
 
-pub(crate) use cell_box::CellBox;
-pub(crate) use exact::{ExactRays, LONGEST_RAY, Ray, Tally};
-pub(crate) use guard::Guard;
-pub(crate) use masks::Bits;
-pub(crate) use projective::Projective;
+pub(crate) use exact::LONGEST_RAY;
+pub use hits_and_misses::{HitsAndMisses, OccupancySweep};
+use masks::Bits;
+use projective::Projective;

@@ -8,12 +8,12 @@ use crate::scan::{Frame, Orthographic, Pinhole, PointScan, Projection, RangeImag
 use crate::store::Store;
 use std::f64::consts::TAU;
 
-type Map = SparseOccupancy<LogOdds8>;
+type Map = Occupancy<3>;
 
 const LATTICE: Lattice<3> = Lattice { origin: [0.0; 3], resolution: 0.1 };
 
 fn map(sweep: OccupancySweep) -> Map {
-    Map::new(LATTICE, OccupancyModel::default(), sweep).unwrap()
+    Map::new(LATTICE, OccupancyModel::default()).unwrap().with_sweep(sweep)
 }
 
 /// Distance to the walls of a room of 8 m x 6 m x 2.6 m about the origin with a table and a pillar in it.

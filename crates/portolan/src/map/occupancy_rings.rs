@@ -1,81 +1,11 @@
-//! The flat occupancy grid: one byte a cell.
+//! The nearest occupied cell of a dense map, by search.
 
-use super::error::check_grid;
-use super::integrate::integrate;
-use super::{Abilities, MapError, MapRepr};
-use crate::answer::Answer;
-use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, OccupancyModel, ProbabilityTable};
+use super::Occupancy;
+use crate::cell::LogOddsValue;
 use crate::geom::vector::distance;
-use crate::geom::{Aabb, Grid, Pose, block_cells};
-use crate::scan::{Scan, ScanStats};
-use crate::store::{Dense, Store};
-use crate::sweep::Rays;
+use crate::store::Dense;
 
-/// Clamped log odds of every cell of a box, one byte each (Moravec & Elfes 1985).
-///
-/// Answers "is this point occupied?" with one index. Has no distance: it can only search for one
-/// ([`OccupancyGrid::search_distance_by_rings`]).
-#[derive(Clone, Debug)]
-pub struct OccupancyGrid<const D: usize> {
-    store: Dense<LogOdds8, D>,
-    rule: LogOddsRule<i8>,
-    probabilities: ProbabilityTable,
-    model: OccupancyModel,
-    bounds: Aabb<D>,
-    sweep: Rays<D>,
-    scratch: HitMiss,
-}
-
-impl<const D: usize> OccupancyGrid<D> {
-    /// A grid in which nothing was observed.
-    ///
-    /// # Errors
-    /// Where the grid or the model is not possible.
-    pub fn new(grid: Grid<D>, model: OccupancyModel) -> Result<Self, MapError> {
-        check_grid(&grid)?;
-        Self::from_store(Dense::new(grid), model)
-    }
-
-    /// A grid from stored cells.
-    ///
-    /// # Errors
-    /// Where the grid or the model is not possible.
-    pub fn from_store(store: Dense<LogOdds8, D>, model: OccupancyModel) -> Result<Self, MapError> {
-        check_grid(store.grid())?;
-        let rule = LogOddsRule::<i8>::new(&model)?;
-        let bounds = store.grid().aabb();
-        let sweep = Rays::new(model.wall_depth.unwrap_or(store.grid().lattice.resolution));
-        let probabilities = ProbabilityTable::new(&rule);
-        let scratch = HitMiss::silent(block_cells::<D>());
-        Ok(Self { store, rule, probabilities, model, bounds, sweep, scratch })
-    }
-
-    /// Fuses a scan taken at a known pose.
-    pub fn integrate(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        let at = (world_from_sensor, scan);
-        integrate::<LogOdds8, _, _, D>(
-            &mut self.store,
-            &mut self.sweep,
-            &mut self.scratch,
-            &self.rule,
-            &self.bounds,
-            at,
-        )
-    }
-
-    /// P(occupied) at a point. O(1).
-    #[inline]
-    pub fn probability(&self, p_world: impl Into<[f64; D]>) -> Answer<f64> {
-        let Some(i) = self.store.grid().index_of(p_world.into()) else { return Answer::Outside };
-        self.store.at(i).map_or(Answer::Unknown, |v| Answer::Known(self.probabilities.of(v)))
-    }
-
-    /// Whether a cell is more likely occupied than not; `None`: never observed or outside.
-    #[inline]
-    pub fn is_occupied(&self, cell: [i32; D]) -> Option<bool> {
-        self.store.cell(cell).map(|v| v.0 > 0)
-    }
-
+impl<const D: usize, V: LogOddsValue> Occupancy<D, V, Dense<V, D>> {
     /// Distance from a point to the centre of the nearest occupied cell (metres), found by **searching** ring
     /// by ring up to `limit` metres: the cost grows with the square (in space the cube) of the distance, which
     /// is why this is not called `distance`. `None` where no occupied cell is within the limit, and outside of the grid.
@@ -101,26 +31,6 @@ impl<const D: usize> OccupancyGrid<D> {
             });
         }
         (best <= limit).then_some(best)
-    }
-
-    /// Cells and where they are.
-    pub fn store(&self) -> &Dense<LogOdds8, D> {
-        &self.store
-    }
-
-    /// The model that the filter's numbers come from.
-    pub fn model(&self) -> &OccupancyModel {
-        &self.model
-    }
-
-    /// The filter.
-    pub fn rule(&self) -> &LogOddsRule<i8> {
-        &self.rule
-    }
-
-    /// Number of cells that were observed.
-    pub fn observed_cells(&self) -> usize {
-        (0..self.store.grid().len()).filter(|&i| self.store.at(i).is_some()).count()
     }
 }
 
@@ -159,31 +69,13 @@ fn for_each_on_ring<const D: usize>(centre: [i32; D], ring: i32, mut visit: impl
     }
 }
 
-impl<const D: usize> MapRepr<D> for OccupancyGrid<D> {
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        self.integrate(world_from_sensor, scan)
-    }
-
-    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
-        self.probability(p_world).known()
-    }
-
-    fn distance(&self, _: [f64; D]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { occupancy: true, distance: false }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::answer::Answer;
+    use crate::cell::OccupancyModel;
+    use crate::geom::{Grid, Pose};
+    use crate::map::{MapError, OccupancyGrid};
     use crate::scan::{Beam, BeamKind};
 
     fn rings_visit_every_cell_once<const D: usize>() {
@@ -205,12 +97,12 @@ mod tests {
 
     fn one_beam<const D: usize>() {
         let mut map =
-            OccupancyGrid::<D>::new(Grid::new([0.0; D], 0.1, [40; D]), OccupancyModel::default()).unwrap();
+            OccupancyGrid::<D>::covering(&Grid::new([0.0; D], 0.1, [40; D]), OccupancyModel::default()).unwrap();
         let mut direction = [0.0; D];
         direction[0] = 1.0;
         let scan = Scan::from_beams([Beam { direction, range: 2.0, kind: BeamKind::Hit }]);
         let pose = Pose { translation: [1.05; D], ..Pose::IDENTITY };
-        let stats = map.integrate(&pose, &scan);
+        let stats = map.integrate(&pose, &scan).unwrap();
         assert_eq!((stats.scans, stats.cells, stats.beams.hit), (1, 21, 1));
         let at = |x: f64| {
             let mut p = [1.05; D];
@@ -225,14 +117,13 @@ mod tests {
         assert!((d - 1.0).abs() < 1e-9);
         assert_eq!(map.search_distance_by_rings(at(2.05), 0.9), None);
         assert_eq!(map.search_distance_by_rings(at(1e6), f64::INFINITY), None);
-        assert_eq!(map.abilities(), Abilities { occupancy: true, distance: false });
 
         let tilted = Pose { rotation: [[0.5; D]; D], translation: [1.0; D] };
-        assert_eq!(map.integrate(&tilted, &scan).refused_poses, 1);
+        assert_eq!(map.integrate(&tilted, &scan).unwrap().refused_poses, 1);
         let lost = Pose { translation: [f64::NAN; D], ..Pose::IDENTITY };
-        assert_eq!(map.integrate(&lost, &scan).refused_poses, 1);
+        assert_eq!(map.integrate(&lost, &scan).unwrap().refused_poses, 1);
         let far = Pose { translation: [1e12; D], ..Pose::IDENTITY };
-        assert_eq!(map.integrate(&far, &scan).refused_poses, 1);
+        assert_eq!(map.integrate(&far, &scan).unwrap().refused_poses, 1);
     }
 
     #[test]
@@ -244,7 +135,7 @@ mod tests {
     #[test]
     fn impossible_maps_are_refused() {
         let new = |r: f64, n: usize| {
-            OccupancyGrid::<2>::new(Grid::new([0.0; 2], r, [n; 2]), OccupancyModel::default())
+            OccupancyGrid::<2>::covering(&Grid::new([0.0; 2], r, [n; 2]), OccupancyModel::default())
         };
         assert!(matches!(new(-0.1, 10), Err(MapError::Resolution(_))));
         assert!(matches!(new(f64::NAN, 10), Err(MapError::Resolution(_))));
