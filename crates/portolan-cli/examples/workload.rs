@@ -14,9 +14,10 @@ use anyhow::{Context, bail, ensure};
 use clap::{Parser, ValueEnum};
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Lattice, Pose};
-use portolan::map::{OccupancySweep, Occupancy, Tsdf3, TsdfConfig};
+use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::scan::Frame;
 use portolan::surface::isosurface;
+use portolan::sweep::OccupancySweep;
 use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
 use serde_json::{Value, json};
 

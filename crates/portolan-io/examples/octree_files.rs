@@ -11,8 +11,9 @@ use std::time::Instant;
 
 use portolan::cell::{LogOdds8, LogOdds32, LogOddsValue, OccupancyModel};
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, Occupancy};
+use portolan::map::Occupancy;
 use portolan::store::{Store, Tree};
+use portolan::sweep::OccupancySweep;
 use portolan_io::{OctomapTree, write_atomic, write_octomap_bt, write_octomap_ot};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -31,7 +32,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Ten scans inside of a box of 12 x 8 x 3 m that has a ball in it; the lattice's zero is not the world's.
 fn write<V: LogOddsValue>(out: &Path, name: &str, quantum: f64) -> Result<(), Box<dyn Error>> {
     let lattice = Lattice::new([-7.2, 3.0, 0.8], 0.1);
-    let mut map = Occupancy::<3, V>::new(lattice, OccupancyModel::default(), OccupancySweep::Exact)?;
+    let mut map =
+        Occupancy::<3, V>::new(lattice, OccupancyModel::default())?.with_sweep(OccupancySweep::Exact);
     for scan in 0..10 {
         let origin = [-3.0 + 0.5 * f64::from(scan), 0.3 * f64::from(scan) - 1.0, 0.2];
         let points: Vec<[f64; 3]> = (0..6000).map(|i| seen(origin, i + 6000 * scan)).collect();

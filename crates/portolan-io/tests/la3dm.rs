@@ -13,9 +13,10 @@ use std::path::PathBuf;
 use portolan::cell::{LogOdds32, LogOddsValue, OccupancyModel};
 use portolan::geom::vector::{along, distance, scale, sub};
 use portolan::geom::{Lattice, Pose};
-use portolan::map::{OccupancySweep, Occupancy};
+use portolan::map::Occupancy;
 use portolan::scan::{Frame, PointScan};
 use portolan::store::{Leaf, Store, Tree};
+use portolan::sweep::OccupancySweep;
 use portolan_io::{OctomapTree, read_pcd};
 
 const RESOLUTION: f64 = 0.1;
@@ -38,7 +39,7 @@ fn folder() -> Option<PathBuf> {
 fn fused(folder: &std::path::Path) -> Occupancy<3, LogOdds32> {
     let model = OccupancyModel { p_min: 0.1192, p_max: 0.971, ..OccupancyModel::default() };
     let lattice = Lattice::new([0.0; 3], RESOLUTION);
-    let mut map = Occupancy::<3, LogOdds32>::new(lattice, model, OccupancySweep::Exact).unwrap();
+    let mut map = Occupancy::<3, LogOdds32>::new(lattice, model).unwrap().with_sweep(OccupancySweep::Exact);
     for k in 1..=12 {
         let cloud = read_pcd(folder.join(format!("sim_structured_{k}.pcd"))).unwrap();
         let origin = cloud.viewpoint.unwrap().position;

@@ -9,7 +9,7 @@ use crate::followed::GhostGroup;
 use crate::ghost_watch::GhostWatch;
 use crate::{CHAIR_MOVE, StaticNoise, World, apartment, static_noise};
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{MapError, BeamSweep, Tsdf, TsdfConfig};
+use portolan::map::{BeamSweep, MapError, Tsdf2, TsdfConfig};
 use portolan::sweep::WeightModel;
 
 /// How the experiment is done.
@@ -112,7 +112,7 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
     for &w_max in &settings.w_max {
         runs.push(Run {
             w_max,
-            tsdf: Tsdf::new(config(settings, w_max).with_grid(&grid))?,
+            tsdf: Tsdf2::covering(&grid, config(settings, w_max))?,
             saturated_after: None,
             laps_before: 0,
             laps_after: 0,
@@ -125,7 +125,7 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
         let scans = lap(&before, &lap_config(settings, k));
         for run in runs.iter_mut().filter(|r| r.saturated_after.is_none()) {
             for (pose, scan) in &scans {
-                run.tsdf.integrate(pose, scan, true);
+                run.tsdf.integrate(pose, scan)?;
             }
             run.laps_before = k + 1;
             let all = old_place(&run.tsdf, places[0]);
@@ -145,7 +145,7 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
         // Laps of another number than any before: other noise.
         let scans = lap(&after, &lap_config(settings, (1 << 20) + k));
         for run in runs.iter_mut().filter(|r| !r.done) {
-            run.drive(&scans, settings);
+            run.drive(&scans, settings)?;
         }
     }
     let mut per_w_max: Vec<_> = runs.into_iter().map(Run::tell).collect();
@@ -160,7 +160,7 @@ fn config(settings: &GhostSettings, w_max: f32) -> TsdfConfig<2> {
     TsdfConfig {
         w_max,
         truncation: settings.truncation,
-        sweep: settings.sweep,
+        beams: settings.sweep,
         weights: settings.weights,
         ..Default::default()
     }
@@ -210,14 +210,15 @@ impl Run {
         &mut self,
         scans: &[(portolan::geom::Pose<2>, portolan::scan::Scan<2>)],
         settings: &GhostSettings,
-    ) {
-        let Some(watch) = &mut self.watch else { return };
+    ) -> Result<(), MapError> {
+        let Some(watch) = &mut self.watch else { return Ok(()) };
         for (pose, scan) in scans {
-            self.tsdf.integrate(pose, scan, true);
+            self.tsdf.integrate(pose, scan)?;
             watch.observe(self.tsdf.events());
         }
         self.laps_after += 1;
         self.done = watch.is_measured(self.tsdf.rule(), settings.half_lives);
+        Ok(())
     }
 
     fn tell(self) -> GhostRun {

@@ -5,7 +5,7 @@ use crate::followed::{Fate, Followed, GhostGroup};
 use crate::ghost::{StoreCell, cells_in, old_place};
 use portolan::cell::{FusionEvent, TsdfRule};
 use portolan::geom::Aabb;
-use portolan::map::Tsdf;
+use portolan::map::Tsdf2;
 
 /// Cells where a thing stood and where it stands now, and what scans did to them since it moved.
 #[derive(Clone, Debug)]

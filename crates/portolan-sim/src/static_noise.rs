@@ -3,7 +3,7 @@
 use crate::drive::{LapConfig, lap};
 use crate::{GhostSettings, apartment};
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{MapError, Tsdf, TsdfConfig};
+use portolan::map::{MapError, Tsdf2, TsdfConfig};
 
 /// Noise of a map of a world in which nothing moves.
 ///
@@ -84,11 +84,11 @@ pub fn static_noise(
         let config = TsdfConfig {
             w_max,
             truncation: settings.truncation,
-            sweep: settings.sweep,
+            beams: settings.sweep,
             weights: settings.weights,
             ..Default::default()
         };
-        maps.push(Tsdf2::new(config.with_grid(&grid))?);
+        maps.push(Tsdf2::covering(&grid, config)?);
     }
     let distance = |cell: [i32; 2]| world.signed_distance(grid.lattice.center(cell));
     let front = (0..grid.len()).map(|i| grid.cell(i));
@@ -111,7 +111,7 @@ pub fn static_noise(
         };
         for (i, (pose, scan)) in lap(&world, &config).iter().enumerate() {
             for map in &mut maps {
-                map.integrate(pose, scan, true);
+                map.integrate(pose, scan)?;
             }
             if k < burn_in {
                 continue;

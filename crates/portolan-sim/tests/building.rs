@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
 
-use portolan::cell::LogOdds8;
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, Occupancy, Tsdf3, TsdfConfig};
+use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::{MeshSettings, marching_cubes};
+use portolan::sweep::OccupancySweep;
 use portolan_sim::space::{
     BuildingConfig, BuildingLog, DepthCamera, SpaceSensor, building, free_points, score_free, score_surface,
     seen_surface, surface_errors, surface_points,
@@ -15,9 +15,9 @@ use std::sync::LazyLock;
 /// The default lidar: 40 scans of 64 x 1024 rays, noise 1 cm.
 static LIDAR: LazyLock<BuildingLog> = LazyLock::new(|| building(&BuildingConfig::default()));
 
-fn occupancy(resolution: f64, sweep: OccupancySweep) -> Occupancy {
+fn occupancy(resolution: f64, sweep: OccupancySweep) -> Occupancy<3> {
     let lattice = Lattice::new([0.0; 3], resolution);
-    let mut map = Occupancy::<3, LogOdds8>::new(lattice, Default::default(), sweep).unwrap();
+    let mut map = Occupancy::<3>::new(lattice, Default::default()).unwrap().with_sweep(sweep);
     for (pose, frame) in &LIDAR.scans {
         map.integrate(pose, frame).unwrap();
     }

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
 
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Tsdf, TsdfConfig};
+use portolan::map::{Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use portolan_sim::*;
@@ -85,9 +85,9 @@ fn optimised_poses_are_within_centimetres() {
 /// Distances of the vertices of the map's contour to the nearest true wall (metres).
 fn map_errors(lap: &Lap, poses: &[Pose<2>]) -> ErrorMeasures {
     let grid = Grid::covering(lap.world.aabb().grown(0.5), 0.05).unwrap();
-    let mut tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&grid)).unwrap();
+    let mut tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
     for (pose, scan) in poses.iter().zip(&lap.scans) {
-        tsdf.integrate(pose, scan, true);
+        tsdf.integrate(pose, scan).unwrap();
     }
     let contour = marching_squares(&tsdf, &ContourSettings::default());
     ErrorMeasures::of(contour.vertices.iter().map(|&v| lap.world.signed_distance(v).abs()).collect())

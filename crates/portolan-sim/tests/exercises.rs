@@ -5,7 +5,7 @@
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::field::esdf_from_tsdf;
 use portolan::geom::{Grid, vector::distance};
-use portolan::map::{Cloud, MapRepr, Quadtree, Tsdf, TsdfConfig, crossover_resolution, memory_ratio};
+use portolan::map::{Cloud, MapRepr, Quadtree, Tsdf2, TsdfConfig, crossover_resolution, memory_ratio};
 use portolan_sim::{CHAIR_MOVE, LapConfig, Random, apartment, lap};
 
 /// Sample variance of what a filter believes after `n` observations of variance `sigma^2 / w` of a zero, over
@@ -110,10 +110,10 @@ fn exercise_2_crossovers_of_our_node() {
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
     let mut tree = Quadtree::covering(&grid, OccupancyModel::default()).unwrap();
     for (pose, scan) in lap(&world, &LapConfig::default()) {
-        tree.integrate(&pose, &scan);
+        tree.integrate(&pose, &scan).unwrap();
     }
     tree.compact();
-    let records = tree.tree().inner_nodes();
+    let records = tree.store().inner_nodes();
     let counted = s / 0.05;
     println!(
         "measured: {records} inner records, {counted:.0} by the walls; {} bytes, {:.2} of a byte a cell",
@@ -126,16 +126,10 @@ fn exercise_2_crossovers_of_our_node() {
 /// What the map of a wall at `y = 0` believes along the normal when beams of these angles (radians) were fused with these
 /// weights, their ranges off by `errors`: cell centres at `(k + 1/2) r`, up to tau on both sides.
 fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf2 {
-    let config = TsdfConfig {
-        cells: [1, 2 * (tau / r).ceil() as usize],
-        resolution: r,
-        origin: [0.0, -r * (tau / r).ceil()],
-        truncation: tau,
-        w_max: f32::INFINITY,
-        ..Default::default()
-    };
-    let mut map = Tsdf2::new(config).unwrap();
-    for j in 0..config.cells[1] as i32 {
+    let grid = Grid::new([0.0, -r * (tau / r).ceil()], r, [1, 2 * (tau / r).ceil() as usize]);
+    let config = TsdfConfig { truncation: tau, w_max: f32::INFINITY, ..Default::default() };
+    let mut map = Tsdf2::covering(&grid, config).unwrap();
+    for j in 0..grid.shape[1] as i32 {
         let y = map.grid().lattice.center([0, j])[1];
         for &(theta, weight, error) in beams {
             let d = y / theta.cos() + error;
@@ -301,7 +295,7 @@ fn exercise_6_the_cloud_wins_while_points_are_few() {
     assert!((2..=64).contains(&crossover));
 
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
-    let tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&grid)).unwrap();
+    let tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
     let esdf_bytes = size_of_val(esdf_from_tsdf(&tsdf, 0.5, 1.5).samples());
     // A point is held twice, once with its index: 36 bytes.
     let bytes = 36 * points.len();
@@ -323,12 +317,11 @@ fn exercise_6_a_cloud_cannot_forget() {
     let world = apartment().world;
     let moved = world.with_moved("chair", CHAIR_MOVE);
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
-    let mut tsdf =
-        Tsdf2::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
+    let mut tsdf = Tsdf2::covering(&grid, TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }).unwrap();
     let mut cloud = Cloud::new();
     for (k, world) in [&world, &moved].into_iter().enumerate() {
         for (pose, scan) in lap(world, &LapConfig { first_index: 200 * k as u64, ..Default::default() }) {
-            tsdf.integrate(&pose, &scan, true);
+            tsdf.integrate(&pose, &scan).unwrap();
             cloud.integrate(&pose, &scan);
         }
     }

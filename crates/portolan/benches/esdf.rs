@@ -163,8 +163,7 @@ static WALK: LazyLock<[Tsdf3; 2]> = LazyLock::new(|| {
     let camera = DepthCamera::default();
     let config = BuildingConfig { scans: 600, sensor: SpaceSensor::Camera(camera), seed: SEED };
     let building = building_world(config.seed);
-    let mut map =
-        Tsdf3::new(TsdfConfig { max_range: 5.0, ..Default::default() }).expect("a valid map");
+    let mut map = Tsdf3::new(TsdfConfig { max_range: 5.0, ..Default::default() }).expect("a valid map");
     let mut before = map.clone();
     for (i, pose) in building_poses(&building, &config).iter().enumerate().take(16) {
         before = map.clone();
@@ -188,7 +187,7 @@ fn one_depth_frame_measured(bencher: Bencher, (max_distance, threads): (f64, usi
 
 fn follow(bencher: Bencher, max_distance: f64, threads: usize, measure: bool) {
     let [before, after] = &*WALK;
-    let min_weight = 0.5 * TsdfConfig::default().weights.typical_low();
+    let min_weight = 0.5 * TsdfConfig::<3>::default().weights.typical_low();
     let settings = SparseEsdfSettings { min_weight, max_distance, ..Default::default() };
     let esdf = SparseEsdf::of(before.store(), &settings);
     esdf.measure();

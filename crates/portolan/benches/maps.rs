@@ -6,8 +6,8 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::OccupancyModel;
 use portolan::field::{Esdf2, esdf_from_tsdf};
-use portolan::geom::{Grid, Pose};
-use portolan::map::{Cloud, MapRepr, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
+use portolan::geom::{Grid, Lattice, Pose};
+use portolan::map::{BeamSweep, Cloud, MapRepr, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use std::sync::LazyLock;
@@ -35,26 +35,27 @@ fn scans() -> ItemsCount {
 }
 
 fn occupancy() -> OccupancyGrid<2> {
-    let mut map = OccupancyGrid::covering(grid(), OccupancyModel::default()).expect("a valid map");
+    let mut map = OccupancyGrid::covering(&grid(), OccupancyModel::default()).expect("a valid map");
     for (pose, scan) in LOG.iter() {
-        map.integrate(pose, scan);
+        map.integrate(pose, scan).expect("memory without limit");
     }
     map
 }
 
 fn quadtree(resolution: f64) -> Quadtree {
-    let mut map = Quadtree::new([0.0; 2], resolution, 8, OccupancyModel::default()).expect("a valid map");
+    let mut map = Quadtree::with_depth(Lattice::new([0.0; 2], resolution), 8, OccupancyModel::default())
+        .expect("a valid map");
     for (pose, scan) in LOG.iter() {
-        map.integrate(pose, scan);
+        map.integrate(pose, scan).expect("memory without limit");
     }
     map
 }
 
 fn tsdf(sweep: BeamSweep, carve: bool) -> Tsdf2 {
-    let config = TsdfConfig { sweep, ..Default::default() }.with_grid(&grid());
-    let mut map = Tsdf2::new(config).expect("a valid map");
+    let config = TsdfConfig { beams: sweep, carve, ..Default::default() };
+    let mut map = Tsdf2::covering(&grid(), config).expect("a valid map");
     for (pose, scan) in LOG.iter() {
-        map.integrate(pose, scan, carve);
+        map.integrate(pose, scan).expect("memory without limit");
     }
     map
 }

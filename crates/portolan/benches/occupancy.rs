@@ -8,8 +8,9 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::{LogOdds8, OccupancyModel};
 use portolan::geom::{Lattice, Pose};
-use portolan::map::{OccupancySweep, Occupancy};
+use portolan::map::Occupancy;
 use portolan::scan::{Frame, PointScan};
+use portolan::sweep::OccupancySweep;
 use std::sync::LazyLock;
 
 type Map = Occupancy<3, LogOdds8>;
@@ -89,7 +90,7 @@ fn range(o: [f64; 3], d: [f64; 3]) -> f64 {
 
 fn fused(sweep: OccupancySweep, resolution: f64) -> Map {
     let lattice = Lattice::new([0.0; 3], resolution);
-    let mut map = Map::new(lattice, OccupancyModel::default(), sweep).expect("a valid map");
+    let mut map = Map::new(lattice, OccupancyModel::default()).expect("a valid map").with_sweep(sweep);
     for (pose, frame) in LOG.iter() {
         map.integrate(pose, frame).expect("memory without limit");
     }

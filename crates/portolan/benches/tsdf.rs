@@ -156,17 +156,11 @@ fn made_up_lidar() -> Log {
     made_up(&Projection::Spherical(rings()), AZIMUTHS, RINGS, Pose::<3>::IDENTITY.rotation)
 }
 
-fn config(resolution: f64, carve: bool) -> TsdfConfig {
-    TsdfConfig {
-        resolution,
-        truncation: 4.0 * resolution,
-        carve,
-        max_range: 60.0,
-        ..Default::default()
-    }
+fn config(resolution: f64, carve: bool) -> TsdfConfig<3> {
+    TsdfConfig { resolution, truncation: 4.0 * resolution, carve, max_range: 60.0, ..Default::default() }
 }
 
-fn fuse(bencher: Bencher, log: &Log, config: TsdfConfig, threads: usize) {
+fn fuse(bencher: Bencher, log: &Log, config: TsdfConfig<3>, threads: usize) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     bencher.counter(ItemsCount::new(log.len())).bench(|| {
         pool.install(|| {
@@ -196,6 +190,6 @@ fn lidar_with_carving(bencher: Bencher, (resolution, threads): (f64, usize)) {
 
 #[divan::bench(args = [0.1, 0.05], sample_count = 3)]
 fn lidar_rays_with_carving(bencher: Bencher, resolution: f64) {
-    let config = TsdfConfig { sweep: PointSweep::Rays, ..config(resolution, true) };
+    let config = TsdfConfig { points: PointSweep::Rays, ..config(resolution, true) };
     fuse(bencher, &RAYS, config, 1);
 }

@@ -249,13 +249,11 @@ fn unknown_cells_are_bounded_in_the_plane() {
     // The contour of a plane field is a line.
     unknown_cells_are_bounded::<2>(40, 20_000, |store| {
         let cells = store.keys().into_iter().flat_map(|key| (0..64).map(move |i| key.cell(i)));
-        let mut tsdf =
-            Tsdf2::new(TsdfConfig { truncation: 1.0, ..Default::default() }.with_grid(&Grid::new(
-                [500_000.0 - 1.6; 2],
-                0.1,
-                [64; 2],
-            )))
-            .unwrap();
+        let mut tsdf = Tsdf2::covering(
+            &Grid::new([500_000.0 - 1.6; 2], 0.1, [64; 2]),
+            TsdfConfig { truncation: 1.0, ..Default::default() },
+        )
+        .unwrap();
         for (cell, d) in cells.filter_map(|c| Some((c, store.cell(c)?))) {
             tsdf.fuse(cell.map(|v| v + 16), d.distance.into(), 1.0);
         }

@@ -9,6 +9,7 @@ use parry2d::query::PointQuery;
 use parry2d::shape::Polyline;
 use portolan::cell::TsdfRule;
 use portolan::field::esdf_from_tsdf;
+use portolan::geom::Grid;
 use portolan::geom::vector::{distance, point_segment};
 use portolan::map::{BeamSweep, Tsdf2, TsdfConfig};
 use portolan::surface::{Contour, ContourSettings, marching_squares};
@@ -25,9 +26,8 @@ const TABLE: [[f64; 5]; 6] = [
 
 #[test]
 fn chapter19_voxel_filter_table() {
-    let config =
-        TsdfConfig { cells: [1, 1], resolution: 1.0, truncation: 0.20, w_max: 4.0, ..Default::default() };
-    let mut tsdf = Tsdf2::new(config).unwrap();
+    let config = TsdfConfig { truncation: 0.20, w_max: 4.0, ..Default::default() };
+    let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 1.0, [1, 1]), config).unwrap();
     let rule = TsdfRule { truncation: 0.20, w_max: 4.0 };
     let (mut d, mut w) = (0.0, 0.0);
     for (row, [observation, weight, gain, want_d, want_w]) in TABLE.into_iter().enumerate() {

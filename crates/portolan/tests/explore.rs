@@ -9,7 +9,7 @@ use portolan::explore::{
     Frontier, FrontierMap, FrontierSettings, GainSettings, expected_gain, expected_gains, fan, spherical,
 };
 use portolan::geom::{Aabb, Pose, vector};
-use portolan::map::{Tsdf3, TsdfConfig, BeamSweep};
+use portolan::map::{BeamSweep, Tsdf3, TsdfConfig};
 use portolan::store::{Bricks, Store};
 use portolan_sim::space::{BuildingConfig, SpaceLidar, SpaceSensor, building};
 
@@ -73,7 +73,7 @@ fn the_expected_gain_is_what_a_scan_adds_and_more() {
     };
     let before = observed(&tsdf);
     let lidar = portolan_sim::Lidar::default();
-    tsdf.integrate(&poses[best], &portolan_sim::scan_at(world, &poses[best], &lidar, 999, 1), true);
+    tsdf.integrate(&poses[best], &portolan_sim::scan_at(world, &poses[best], &lidar, 999, 1)).unwrap();
     let new = observed(&tsdf) - before;
     println!("{new} cells are new, {} were hoped for", gains[best].cells);
     // A metre of the unknown is about what lies behind a door.

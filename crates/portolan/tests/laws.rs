@@ -8,7 +8,7 @@ use portolan::Answer;
 use portolan::cell::OccupancyModel;
 use portolan::field::{esdf_from_tsdf, squared_distance_transform};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{OccupancyGrid, Quadtree, BeamSweep, Tsdf, Tsdf2, TsdfConfig};
+use portolan::map::{BeamSweep, DenseTsdf, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::scan::{Beam, Scan, ScanStats};
 use portolan::store::Store;
 use portolan::surface::{ContourSettings, marching_squares};
@@ -16,8 +16,8 @@ use portolan::surface::{ContourSettings, marching_squares};
 type Log = [(Pose<2>, Scan<2>)];
 
 fn occupancy(grid: Grid<2>, log: &Log) -> OccupancyGrid<2> {
-    let mut map = OccupancyGrid::covering(grid, OccupancyModel::default()).unwrap();
-    log.iter().for_each(|(pose, scan)| drop_stats(map.integrate(pose, scan)));
+    let mut map = OccupancyGrid::covering(&grid, OccupancyModel::default()).unwrap();
+    log.iter().for_each(|(pose, scan)| drop_stats(map.integrate(pose, scan).unwrap()));
     map
 }
 
@@ -30,14 +30,14 @@ fn quadtree_and_grid_agree_at_every_cell_of_the_apartment() {
     let log = &apartment().log;
     let dense = occupancy(grid(), log);
     let mut tree = Quadtree::covering(&grid(), OccupancyModel::default()).unwrap();
-    log.iter().for_each(|(pose, scan)| drop_stats(tree.integrate(pose, scan)));
-    tree.tree().check_invariants();
+    log.iter().for_each(|(pose, scan)| drop_stats(tree.integrate(pose, scan).unwrap()));
+    tree.store().check_invariants();
     let mut compact = tree.clone();
     compact.compact();
     for i in 0..grid().len() {
         let cell = grid().cell(i);
-        assert_eq!(tree.tree().cell(cell), dense.store().cell(cell));
-        assert_eq!(compact.tree().cell(cell), dense.store().cell(cell));
+        assert_eq!(tree.store().cell(cell), dense.store().cell(cell));
+        assert_eq!(compact.store().cell(cell), dense.store().cell(cell));
     }
     for p in points(2000) {
         assert_eq!(tree.probability(p), dense.probability(p));
@@ -64,8 +64,8 @@ fn far_from_zero_nothing_changes() {
     assert!(differing <= 60, "{differing} cells differ");
 
     let near = tsdf(BeamSweep::CellCentre, true, near_log);
-    let mut far = Tsdf2::new(TsdfConfig::default().with_grid(&far_grid)).unwrap();
-    far_log.iter().for_each(|(pose, scan)| drop_stats(far.integrate(pose, scan, true)));
+    let mut far = Tsdf2::covering(&far_grid, TsdfConfig::default()).unwrap();
+    far_log.iter().for_each(|(pose, scan)| drop_stats(far.integrate(pose, scan).unwrap()));
     let values = |t: &Tsdf2, i| t.store().at(i).map(|c| (c.distance, c.weight));
     let mut worst: f32 = 0.0;
     let mut differing = 0;
@@ -86,8 +86,8 @@ fn a_quarter_turn_of_everything_turns_the_contour() {
     let turned_log: Vec<_> = log.iter().map(|(pose, scan)| (turn * *pose, scan.clone())).collect();
     let turned_grid = Grid::new([0.0; 2], 0.05, [180, 240]);
     let straight = tsdf(BeamSweep::CellCentre, true, log);
-    let mut turned = Tsdf2::new(TsdfConfig::default().with_grid(&turned_grid)).unwrap();
-    turned_log.iter().for_each(|(pose, scan)| drop_stats(turned.integrate(pose, scan, true)));
+    let mut turned = Tsdf2::covering(&turned_grid, TsdfConfig::default()).unwrap();
+    turned_log.iter().for_each(|(pose, scan)| drop_stats(turned.integrate(pose, scan).unwrap()));
     let a = esdf_from_tsdf(&straight, 0.5, 1.5);
     let b = esdf_from_tsdf(&turned, 0.5, 1.5);
     let (mut asked, mut differing) = (0, 0);
@@ -107,9 +107,9 @@ fn a_slice_of_space_is_the_plane() {
     let log = &apartment().log[..40];
     let plane = occupancy(grid(), log);
     let space_grid = Grid::new([0.0, 0.0, -0.1], 0.05, [240, 180, 4]);
-    let mut space = OccupancyGrid::<3>::covering(space_grid, OccupancyModel::default()).unwrap();
+    let mut space = OccupancyGrid::<3>::covering(&space_grid, OccupancyModel::default()).unwrap();
     let mut space_tsdf =
-        Tsdf::<3>::new(TsdfConfig { sweep: BeamSweep::March, ..Default::default() }.with_grid(&space_grid))
+        DenseTsdf::covering(&space_grid, TsdfConfig { beams: BeamSweep::March, ..Default::default() })
             .unwrap();
     for (pose, scan) in log {
         let [[c, s], _] = [[pose.rotation[0][0], pose.rotation[1][0]], [0.0; 2]];
@@ -120,8 +120,8 @@ fn a_slice_of_space_is_the_plane() {
             range: b.range,
             kind: b.kind,
         }));
-        drop_stats(space.integrate(&pose, &scan));
-        drop_stats(space_tsdf.integrate(&pose, &scan, true));
+        drop_stats(space.integrate(&pose, &scan).unwrap());
+        drop_stats(space_tsdf.integrate(&pose, &scan).unwrap());
     }
     let plane_tsdf = tsdf(BeamSweep::March, true, log);
     let (mut differing, mut off) = (0, 0.0f32);
@@ -142,9 +142,9 @@ fn a_slice_of_space_is_the_plane() {
 fn carving_costs_five_times_as_much_and_does_not_move_the_contour() {
     let log = &apartment().log;
     let count = |carve| {
-        let mut map = Tsdf2::new(TsdfConfig::default().with_grid(&grid())).unwrap();
+        let mut map = Tsdf2::covering(&grid(), TsdfConfig { carve, ..Default::default() }).unwrap();
         let mut stats = ScanStats::default();
-        log.iter().for_each(|(pose, scan)| stats += map.integrate(pose, scan, carve));
+        log.iter().for_each(|(pose, scan)| stats += map.integrate(pose, scan).unwrap());
         (stats.cells, marching_squares(&map, &ContourSettings::default()).segments.len())
     };
     let ((carved, with), (banded, without)) = (count(true), count(false));

@@ -9,7 +9,7 @@ mod scenes;
 use common::{apartment, points, tsdf};
 use portolan::field::{SparseEsdf, SparseEsdfSettings};
 use portolan::geom::{Pose, vector};
-use portolan::map::{Tsdf3, TsdfConfig, BeamSweep, Tsdf2};
+use portolan::map::{BeamSweep, Tsdf2, Tsdf3, TsdfConfig};
 use portolan::plan::{
     Body, Cause, Curve, Demand, Motion, MotionCheck, NearestFree, PathCheck, PathClearance, Spline,
     Waypoints, check_motion, check_path, check_pose, nearest_free,
@@ -145,8 +145,7 @@ fn from_a_wall_the_nearest_free_place_is_before_it() {
 fn certified_motions_through_the_building_keep_their_clearance() {
     let sensor = SpaceSensor::Lidar(SpaceLidar { rings: 32, columns: 512, ..Default::default() });
     let log = building(&BuildingConfig { scans: 24, sensor, ..Default::default() });
-    let mut map =
-        Tsdf3::new(TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
+    let mut map = Tsdf3::new(TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();
     }

@@ -58,7 +58,7 @@ fn project(image: &RangeImage, p: [f64; 3]) -> Option<(f64, f64, f64, f64)> {
 
 /// What a cell may get: between the same four pixels in any case but where it lies on a line between fours, and rounding
 /// decides which of them it is.
-fn said(image: &RangeImage, pose: &Pose<3>, centre: [f64; 3], config: &TsdfConfig) -> Vec<Said> {
+fn said(image: &RangeImage, pose: &Pose<3>, centre: [f64; 3], config: &TsdfConfig<3>) -> Vec<Said> {
     let p = pose.inverse().transform_point(centre);
     let Some(seen) = project(image, p) else { return vec![Said::Nothing] };
     let firsts = |x: f64| {
@@ -75,7 +75,7 @@ fn said_between(
     image: &RangeImage,
     (c, r): (i64, i64),
     (u, v, length, scale): (f64, f64, f64, f64),
-    config: &TsdfConfig,
+    config: &TsdfConfig<3>,
 ) -> Said {
     let (tau, resolution) = (config.truncation, config.resolution);
     let (w, h) = (image.columns as i64, image.rows as i64);
@@ -188,7 +188,7 @@ fn agrees(said: Said, cell: Option<SignedDistance>) -> bool {
 }
 
 /// Every cell of a box around everything, and nothing beyond it.
-fn equals_its_definition(image: RangeImage, pose: &Pose<3>, config: &TsdfConfig, reach: f64) {
+fn equals_its_definition(image: RangeImage, pose: &Pose<3>, config: &TsdfConfig<3>, reach: f64) {
     let mut map = Tsdf3::new(*config).expect("a valid map");
     let frame = Frame::Image(image.clone());
     map.integrate(pose, &frame).unwrap();
@@ -255,7 +255,7 @@ fn poses() -> impl Strategy<Value = Pose<3>> {
     })
 }
 
-fn configs(resolution: f64, pose: &Pose<3>, carve: bool, squared: bool) -> TsdfConfig {
+fn configs(resolution: f64, pose: &Pose<3>, carve: bool, squared: bool) -> TsdfConfig<3> {
     let anchor = pose.translation.map(|v| (v / resolution / 64.0).round() * 64.0 * resolution);
     TsdfConfig {
         resolution,
@@ -377,8 +377,7 @@ fn watched_cells_tell_what_happened() {
     let camera = Pinhole { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 };
     let frame = Frame::Image(image(Projection::Pinhole(camera), 64, 48, patchy(3, 0.8, 2.5)));
     let mut map =
-        Tsdf3::new(TsdfConfig { w_max: 2.0, ..configs(0.05, &Pose::IDENTITY, true, false) })
-            .unwrap();
+        Tsdf3::new(TsdfConfig { w_max: 2.0, ..configs(0.05, &Pose::IDENTITY, true, false) }).unwrap();
     map.integrate(&Pose::IDENTITY, &frame).unwrap();
     map.watch((-10..10).flat_map(|x| (0..30).map(move |z| [x, 1, z])));
     for _ in 0..3 {
@@ -399,7 +398,6 @@ fn watched_cells_tell_what_happened() {
 #[test]
 fn lattice_is_the_one_that_was_asked_for() {
     let map =
-        Tsdf3::new(TsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..Default::default() })
-            .unwrap();
+        Tsdf3::new(TsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..Default::default() }).unwrap();
     assert_eq!(*map.lattice(), Lattice::new([1.0, 2.0, 3.0], 0.1));
 }

@@ -89,7 +89,7 @@ fn quantiles(mut errors: Vec<f64>) -> (f64, f64) {
     (errors[errors.len() / 2], errors[errors.len() * 95 / 100])
 }
 
-fn config(resolution: f64, cells: f64) -> TsdfConfig {
+fn config(resolution: f64, cells: f64) -> TsdfConfig<3> {
     TsdfConfig { resolution, truncation: cells * resolution, ..Default::default() }
 }
 
@@ -292,7 +292,7 @@ fn bare_points_get_their_rows_and_columns_back() {
     });
     let points: Vec<[f32; 3]> = image.points().map(|(_, p)| p.map(|v| v as f32)).collect();
     let fused = |frame: &Frame, sweep| {
-        let mut map = Tsdf3::new(TsdfConfig { sweep, ..config(0.05, 3.0) }).unwrap();
+        let mut map = Tsdf3::new(TsdfConfig { points: sweep, ..config(0.05, 3.0) }).unwrap();
         let stats = map.integrate(&Pose::IDENTITY, frame).unwrap();
         (map, stats)
     };

@@ -24,12 +24,12 @@ fn extracted(thickness: f64, sweep: BeamSweep, truncation: f64) -> (f64, f64) {
     ]);
     let grid = Grid::new([-3.5, -2.5], 0.05, [140, 100]);
     let mut tsdf =
-        Tsdf2::new(TsdfConfig { sweep, truncation, ..Default::default() }.with_grid(&grid)).unwrap();
+        Tsdf2::covering(&grid, TsdfConfig { beams: sweep, truncation, ..Default::default() }).unwrap();
     for i in 0..40u32 {
         let side = if i % 2 == 0 { 1.0 } else { -1.0 };
         let step = f64::from(i / 2);
         let pose = Pose::<2>::new(side * (0.6 + 0.1 * (step % 7.0)), -1.5 + 0.15 * step, 0.3 * step);
-        tsdf.integrate(&pose, &scan_at(&world, &pose, &Lidar::default(), 5, u64::from(i)), true);
+        tsdf.integrate(&pose, &scan_at(&world, &pose, &Lidar::default(), 5, u64::from(i))).unwrap();
     }
     let contour = marching_squares(&tsdf, &ContourSettings::default());
     let mut faces = [vec![], vec![]];

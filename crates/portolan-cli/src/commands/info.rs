@@ -106,9 +106,9 @@ fn of_map(file: &MapFile) -> Value {
     if let Some(map) = &file.tree {
         maps["tree"] = json!({
             "cell": "log odds, one byte",
-            "extent": json::aabb(&map.tree().grid().aabb()),
+            "extent": json::aabb(&map.store().grid().aabb()),
             "depth": map.tree().depth(),
-            "nodes": map.tree().nodes(),
+            "nodes": map.store().nodes(),
             "bytes": map.memory_bytes(),
         });
     }

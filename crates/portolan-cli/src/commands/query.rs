@@ -7,8 +7,9 @@ use anyhow::bail;
 use portolan::Answer;
 use portolan::field::{Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
 use portolan::geom::Pose;
-use portolan::map::{MapRepr, OccupancySweep, Occupancy};
+use portolan::map::{MapRepr, Occupancy};
 use portolan::store::Store;
+use portolan::sweep::OccupancySweep;
 use portolan_io::{
     AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
     SpaceMapFile, certified_reach, write_answer, write_answer_header,

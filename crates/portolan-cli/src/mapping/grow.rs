@@ -30,7 +30,7 @@ pub(crate) fn grown(maps: Maps, grid: &Grid<2>) -> anyhow::Result<Maps> {
 /// reaching further to where the grid reaches further.
 fn grown_tree(map: Quadtree, grid: &Grid<2>) -> anyhow::Result<Quadtree> {
     let r = grid.lattice.resolution;
-    let root = map.tree().grid();
+    let root = map.store().grid();
     let mut depth = map.tree().depth();
     let mut first = root.lattice.origin.map(|v| (v / r).round() as i64);
     let wanted = grid.lattice.origin.map(|v| (v / r).round() as i64);
@@ -101,13 +101,13 @@ mod tests {
                 assert_eq!(grown.probability(p), tree.probability(p));
             }
             let mut leaves = 0;
-            grown.tree().for_each_leaf(|_| leaves += 1);
+            grown.store().for_each_leaf(|_| leaves += 1);
             let mut before = 0;
-            tree.tree().for_each_leaf(|_| before += 1);
+            tree.store().for_each_leaf(|_| before += 1);
             assert_eq!(leaves, before);
-            let root = grown.tree().grid().aabb().grown(1e-9);
+            let root = grown.store().grid().aabb().grown(1e-9);
             assert!(root.contains(large.aabb().min) && root.contains(large.aabb().max));
-            assert!(grown_tree(empty.clone(), &large).unwrap().tree().cell([0, 0]).is_none());
+            assert!(grown_tree(empty.clone(), &large).unwrap().store().cell([0, 0]).is_none());
         }
     }
 }

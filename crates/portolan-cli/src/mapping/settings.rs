@@ -2,7 +2,7 @@
 
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{OccupancyGrid, Quadtree, BeamSweep, Tsdf, TsdfConfig};
+use portolan::map::{BeamSweep, OccupancyGrid, Quadtree, Tsdf, TsdfConfig};
 use portolan::scan::RangeLimits;
 use portolan::sweep::WeightModel;
 use portolan_io::{MapFile, sweep_word, weights_word};

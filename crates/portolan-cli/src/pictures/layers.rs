@@ -108,11 +108,11 @@ fn grid(canvas: &mut Canvas, view: &View, scene: &Scene) {
 
 fn tree(canvas: &mut Canvas, view: &View, scene: &Scene) {
     let map = &scene.gallery.tree;
-    let lattice = *map.tree().lattice();
+    let lattice = *map.store().lattice();
     let line = color::POSITIVE.mix(color::PAPER, 0.55);
     canvas.fill_rect(view.rect(), color::UNKNOWN);
     let frame = view.rect();
-    map.tree().for_each_leaf(|leaf| {
+    map.store().for_each_leaf(|leaf| {
         let end = leaf.cell.map(|c| c + (1 << leaf.height));
         let low = view.pixel_from_world(lattice.corner(leaf.cell)).map(f64::round);
         let high = view.pixel_from_world(lattice.corner(end)).map(f64::round);

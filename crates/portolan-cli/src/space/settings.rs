@@ -2,8 +2,9 @@
 
 use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Lattice};
-use portolan::map::{OccupancySweep, PointSweep, Occupancy, Tsdf3, TsdfConfig};
+use portolan::map::{Occupancy, PointSweep, Tsdf3, TsdfConfig};
 use portolan::scan::{Body, FrameFilter};
+use portolan::sweep::OccupancySweep;
 use portolan::sweep::WeightModel;
 use portolan_io::weights_word;
 use serde_json::{Map, Value, json};
@@ -67,9 +68,8 @@ impl Settings {
     /// Empty maps about a lattice's origin.
     pub(crate) fn empty_maps(&self, origin: [f64; 3]) -> anyhow::Result<SpaceMaps> {
         let lattice = Lattice::new(origin, self.resolution);
-        let occupancy = self
-            .wants(MapKind::Tree)
-            .then(|| Occupancy::new(lattice, OccupancyModel::default(), self.sweep));
+        let occupancy =
+            self.wants(MapKind::Tree).then(|| Occupancy::new(lattice, OccupancyModel::default(), self.sweep));
         let tsdf = self.wants(MapKind::Tsdf).then(|| Tsdf3::new(self.tsdf_config(origin)));
         Ok(SpaceMaps { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()? })
     }

@@ -1,7 +1,7 @@
 //! What a `map.portolan` of the plane holds.
 
 use portolan::geom::Pose;
-use portolan::map::{OccupancyGrid, Quadtree, Tsdf};
+use portolan::map::{OccupancyGrid, Quadtree, Tsdf2};
 use serde_json::Value;
 
 use super::{MapHeader, UnknownChunk};
@@ -30,7 +30,6 @@ mod tests {
     use crate::testing::bad_bytes;
     use portolan::cell::OccupancyModel;
     use portolan::geom::Grid;
-    use portolan::map::MapRepr;
     use portolan::map::TsdfConfig;
     use portolan::scan::{RangeLimits, Scan};
     use serde_json::json;
@@ -45,11 +44,9 @@ mod tests {
                 more: [("studio".to_owned(), json!({"colour": 0.1}))].into_iter().collect(),
                 ..Default::default()
             },
-            grid: Some(OccupancyGrid::covering(grid, OccupancyModel::default()).unwrap()),
+            grid: Some(OccupancyGrid::covering(&grid, OccupancyModel::default()).unwrap()),
             tree: Some(Quadtree::covering(&grid, OccupancyModel::default()).unwrap()),
-            tsdf: Some(
-                Tsdf::new(TsdfConfig { truncation: 0.3, ..Default::default() }.with_grid(&grid)).unwrap(),
-            ),
+            tsdf: Some(Tsdf2::covering(&grid, TsdfConfig { truncation: 0.3, ..Default::default() }).unwrap()),
             ..Default::default()
         };
         let bearings: Vec<f64> = (0..180).map(|i| f64::from(i) * 0.0349).collect();
@@ -57,9 +54,9 @@ mod tests {
         let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
         for k in 0..3 {
             let pose = Pose::<2>::new(0.1 * f64::from(k), 0.0, 0.3);
-            file.grid.as_mut().unwrap().integrate_scan(&pose, &scan);
-            file.tree.as_mut().unwrap().integrate_scan(&pose, &scan);
-            file.tsdf.as_mut().unwrap().integrate_scan(&pose, &scan);
+            file.grid.as_mut().unwrap().integrate(&pose, &scan).unwrap();
+            file.tree.as_mut().unwrap().integrate(&pose, &scan).unwrap();
+            file.tsdf.as_mut().unwrap().integrate(&pose, &scan).unwrap();
             file.poses.push(pose);
         }
         file.unknown_maps.push(json!({"kind": "wavelets", "cell": "i16", "chunk": "WAVE"}));
@@ -79,15 +76,16 @@ mod tests {
         assert_eq!(back.grid.unwrap().store(), file.grid.unwrap().store());
         assert_eq!(back.tsdf.as_ref().unwrap().store(), file.tsdf.as_ref().unwrap().store());
         assert_eq!(back.tsdf.unwrap().config(), file.tsdf.unwrap().config());
-        assert_eq!(back.tree.unwrap().tree().records(), file.tree.unwrap().tree().records());
+        assert_eq!(back.tree.unwrap().store().records(), file.tree.unwrap().store().records());
         let empty = MapFile::default().to_bytes().unwrap();
         assert_eq!(MapFile::parse(empty.clone(), "m".as_ref()).unwrap().to_bytes().unwrap(), empty);
     }
 
     #[test]
     fn never_forgetting_survives() {
-        let config = TsdfConfig { cells: [4, 4], w_max: f32::INFINITY, ..Default::default() };
-        let file = MapFile { tsdf: Some(Tsdf::new(config).unwrap()), ..Default::default() };
+        let config = TsdfConfig { w_max: f32::INFINITY, ..Default::default() };
+        let tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [4, 4]), config).unwrap();
+        let file = MapFile { tsdf: Some(tsdf), ..Default::default() };
         let back = MapFile::parse(file.to_bytes().unwrap(), "m".as_ref()).unwrap();
         assert_eq!(back.tsdf.unwrap().config(), &config);
     }

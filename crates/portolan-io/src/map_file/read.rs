@@ -4,7 +4,7 @@ use std::path::Path;
 
 use portolan::cell::{DistancePlanes, LogOdds8};
 use portolan::geom::Grid;
-use portolan::map::{OccupancyGrid, Quadtree, Tsdf, TsdfConfig};
+use portolan::map::{OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::store::{Dense, Tree, TreeRecords};
 use serde_json::Value;
 
@@ -96,7 +96,7 @@ impl Reading<'_> {
                 };
                 let tree = Tree::from_records(origin, resolution, depth, &records);
                 let tree = self.made(&kind, tree)?;
-                file.tree = Some(self.made(&kind, Quadtree::from_tree(tree, model.model()))?);
+                file.tree = Some(self.made(&kind, Quadtree::from_store(tree, model.model()))?);
             }
             Entry::Tsdf { chunk, place, truncation, w_max, carve_weight, sweep, weights, .. } => {
                 let grid = self.grid_of(&place)?;
@@ -112,12 +112,12 @@ impl Reading<'_> {
                     truncation,
                     w_max: w_max.unwrap_or(f32::INFINITY),
                     carve_weight,
-                    sweep: sweep_of(&sweep).ok_or_else(|| word("the sweep", &sweep))?,
+                    beams: sweep_of(&sweep).ok_or_else(|| word("the sweep", &sweep))?,
                     weights: weights_of(&weights).ok_or_else(|| word("the weights", &weights))?,
                     ..TsdfConfig::default()
                 };
                 let store = self.dense(&kind, Dense::from_planes(grid, planes))?;
-                file.tsdf = Some(self.made(&kind, Tsdf::from_store(store, config))?);
+                file.tsdf = Some(self.made(&kind, Tsdf2::from_stores(store, None, config))?);
             }
         }
         Ok(())

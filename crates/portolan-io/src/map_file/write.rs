@@ -31,7 +31,7 @@ impl MapFile {
             write_plane(&mut writer, "GRID", "occupancy", &plane)?;
         }
         if let Some(tree) = &self.tree {
-            let records = tree.tree().records();
+            let records = tree.store().records();
             let mut content = vec![records.root_value.0 as u8];
             content.extend(&records.masks);
             content.extend(records.values.iter().map(|v| v.0 as u8));
@@ -57,13 +57,13 @@ impl MapFile {
             });
         }
         if let Some(tree) = &self.tree {
-            let root = tree.tree().grid();
+            let root = tree.store().grid();
             entries.push(Entry::Quadtree {
                 cell: LOG_ODDS.into(),
                 chunk: "TREE".into(),
                 origin: root.lattice.origin,
                 resolution: root.lattice.resolution,
-                depth: tree.tree().depth(),
+                depth: tree.store().depth(),
                 model: Model::of(tree.model()),
             });
         }
@@ -76,7 +76,7 @@ impl MapFile {
                 truncation: config.truncation,
                 w_max: config.w_max.is_finite().then_some(config.w_max),
                 carve_weight: config.carve_weight,
-                sweep: sweep_word(config.sweep).into(),
+                sweep: sweep_word(config.beams).into(),
                 weights: weights_word(config.weights).into(),
             });
         }

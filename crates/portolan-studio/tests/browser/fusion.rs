@@ -79,11 +79,11 @@ fn the_main_thread_has_little_to_do() {
 /// What the library says that scans did to a cell, with the page's settings.
 fn events(cell: [i32; 2], scans: usize) -> Vec<(usize, FusionEvent)> {
     let config = TsdfConfig::default();
-    let mut tsdf = Tsdf2::new(config.with_grid(&Grid::new([0.0; 2], 0.05, [240, 180]))).unwrap();
+    let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [240, 180]), config).unwrap();
     tsdf.watch([cell]);
     let mut events = Vec::new();
     for (i, (pose, scan)) in lap(&apartment().world, &LapConfig::default()).iter().take(scans).enumerate() {
-        tsdf.integrate(pose, scan, true);
+        tsdf.integrate(pose, scan).unwrap();
         events.extend(tsdf.events().iter().map(|e| (i, e.1)));
     }
     events

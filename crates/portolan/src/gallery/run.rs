@@ -11,7 +11,7 @@ use crate::cell::OccupancyModel;
 use crate::field::{Esdf2, EsdfSettings};
 use crate::geom::{Grid, Lattice, Pose, vector};
 use crate::map::{
-    Cloud, DerivedField, MapError, MapRepr, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig,
+    BeamSweep, Cloud, DerivedField, MapError, MapRepr, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig,
     inner_only_node_bytes,
 };
 use crate::scan::{Scan, ScanStats};
@@ -143,8 +143,9 @@ fn build(
         ..Default::default()
     };
     let derived = |row: Row| Row { derived: true, ..row };
-    let nodes =
-        |map: &Quadtree| format!("{} nodes, {} of them inner", map.store().nodes(), map.store().inner_nodes());
+    let nodes = |map: &Quadtree| {
+        format!("{} nodes, {} of them inner", map.store().nodes(), map.store().inner_nodes())
+    };
     let segments = |map: &Tsdf2| marching_squares(map, &settings.contour).segments.len();
     // What a workload costs comes in this order, too: `costs.rs`.
     let rows = vec![

@@ -33,9 +33,8 @@ impl<const D: usize> CellBox<D> {
         if bounds.is_empty() {
             return Self { first: [0; D], last: [-1; D] };
         }
-        let cell = |p, snap: &dyn Fn(f64) -> f64| {
-            lattice.to_cells(p).map(|v| snap(v).clamp(-LIMIT, LIMIT) as i32)
-        };
+        let cell =
+            |p, snap: &dyn Fn(f64) -> f64| lattice.to_cells(p).map(|v| snap(v).clamp(-LIMIT, LIMIT) as i32);
         Self { first: cell(bounds.min, &first), last: cell(bounds.max, &last) }
     }
 
@@ -63,7 +62,8 @@ mod tests {
     fn boxes_of_cells<const D: usize>() {
         let lattice = Lattice::new([0.0; D], 0.5);
         let world = Aabb::new([-1.2; D], [2.0; D]);
-        let (covering, centers) = (CellBox::covering(&world, &lattice), CellBox::of_centers(&world, &lattice));
+        let (covering, centers) =
+            (CellBox::covering(&world, &lattice), CellBox::of_centers(&world, &lattice));
         for n in 0..12i32.pow(D as u32) {
             let cell: [i32; D] = std::array::from_fn(|k| n / 12i32.pow(k as u32) % 12 - 6);
             let corner = lattice.aabb(cell, cell.map(|v| v + 1));

@@ -79,7 +79,9 @@ pub(super) fn most_blocks(limit: usize, bytes: usize) -> usize {
 pub(super) fn too_many(error: PlanError, most: usize, limit: usize, bytes: usize) -> MapError {
     match error {
         PlanError::BadImage(why) => MapError::Image(why),
-        PlanError::TooManyBlocks if most == MOST_BLOCKS || limit == usize::MAX => MapError::TooFar { bricks: most },
+        PlanError::TooManyBlocks if most == MOST_BLOCKS || limit == usize::MAX => {
+            MapError::TooFar { bricks: most }
+        }
         PlanError::TooManyBlocks => MapError::Full(StoreFull { limit, bytes }),
     }
 }

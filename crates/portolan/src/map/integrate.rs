@@ -54,7 +54,9 @@ where
         return Ok(None);
     }
     let planned = sweep.plan(scan, world_from_sensor, store.lattice(), limits);
-    planned.map(Some).map_err(|error| too_many(error, limits.most_blocks, store.limit(), store.memory_bytes()))
+    planned
+        .map(Some)
+        .map_err(|error| too_many(error, limits.most_blocks, store.limit(), store.memory_bytes()))
 }
 
 /// Limits for a store whose touched blocks cost the sweep `bytes` each, inside of `bounds` if there are any.

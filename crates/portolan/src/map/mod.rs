@@ -5,9 +5,9 @@ mod error;
 mod integrate;
 mod occupancy;
 mod occupancy_3d;
-mod occupancy_rings;
 #[cfg(test)]
 mod occupancy_projective_tests;
+mod occupancy_rings;
 #[cfg(test)]
 mod occupancy_tests;
 mod occupancy_tree;

@@ -1,11 +1,12 @@
 //! The projective sweep against its definition and against truth.
 
-use super::{OccupancySweep, SparseOccupancy};
+use super::Occupancy;
 use crate::cell::{LogOdds8, OccupancyModel, Planes};
 use crate::geom::vector::{norm, sub};
 use crate::geom::{BlockKey, Lattice, Pose};
 use crate::scan::{Frame, Orthographic, Pinhole, PointScan, Projection, RangeImage, RefusedBeams, Spherical};
 use crate::store::Store;
+use crate::sweep::OccupancySweep;
 use std::f64::consts::TAU;
 
 type Map = Occupancy<3>;
@@ -189,7 +190,7 @@ fn parallel_rays_free_what_is_above_the_surface() {
 /// No cell in which a beam ends is ever lowered, and nothing is hit but those.
 #[test]
 fn cells_with_a_return_are_raised() {
-    let (mut map, mut exact) = (map(OccupancySweep::Projective), map(OccupancySweep::Exact));
+    let (mut map, mut exact) = (map(OccupancySweep::Auto), map(OccupancySweep::Exact));
     for pose in poses() {
         let seen = look(image(Projection::Spherical(spherical()), 700, 48), &pose);
         let points = seen.points().map(|(_, p)| p.map(|v| v as f32));
@@ -219,7 +220,7 @@ fn cells_with_a_return_are_raised() {
 #[test]
 fn truth() {
     let lattice = Lattice { origin: [0.0; 3], resolution: 0.05 };
-    let mut map = Map::new(lattice, OccupancyModel::default(), OccupancySweep::Auto).unwrap();
+    let mut map = Map::new(lattice, OccupancyModel::default()).unwrap();
     let mut seed = 7u64;
     let mut random = move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -265,7 +266,7 @@ fn truth() {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
-    for sweep in [OccupancySweep::Exact, OccupancySweep::Projective] {
+    for sweep in [OccupancySweep::Exact, OccupancySweep::Auto] {
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
@@ -294,7 +295,7 @@ fn near_walls_and_odd_values_do_no_harm() {
     near.values[77] = f32::NAN;
     near.values[78] = f32::INFINITY;
     near.values[79] = 1e30;
-    let mut map = map(OccupancySweep::Projective);
+    let mut map = map(OccupancySweep::Auto);
     let stats = map.integrate(&Pose::IDENTITY, &Frame::Image(near)).unwrap();
     assert!(stats.refused.not_finite > 0);
     for (cell, value) in observed(&map).into_iter().filter(|c| c.1.0 < 0) {

@@ -76,7 +76,7 @@ mod tests {
     use crate::cell::OccupancyModel;
     use crate::geom::{Grid, Pose};
     use crate::map::{MapError, OccupancyGrid};
-    use crate::scan::{Beam, BeamKind};
+    use crate::scan::{Beam, BeamKind, Scan};
 
     fn rings_visit_every_cell_once<const D: usize>() {
         let mut seen = std::collections::HashSet::new();
@@ -97,7 +97,8 @@ mod tests {
 
     fn one_beam<const D: usize>() {
         let mut map =
-            OccupancyGrid::<D>::covering(&Grid::new([0.0; D], 0.1, [40; D]), OccupancyModel::default()).unwrap();
+            OccupancyGrid::<D>::covering(&Grid::new([0.0; D], 0.1, [40; D]), OccupancyModel::default())
+                .unwrap();
         let mut direction = [0.0; D];
         direction[0] = 1.0;
         let scan = Scan::from_beams([Beam { direction, range: 2.0, kind: BeamKind::Hit }]);

@@ -1,9 +1,13 @@
 //! Occupancy maps in bricks: every way in, limits, refusals.
 
 use super::*;
-use crate::cell::LogOdds32;
-use crate::geom::BlockKey;
-use crate::scan::{Beam, BeamKind, Pinhole, Projection, RefusedBeams};
+use crate::cell::{LogOdds32, LogOddsValue, OccupancyModel, Planes};
+use crate::geom::{Aabb, BlockKey, CellBox, Lattice, Pose};
+use crate::scan::{
+    Beam, BeamKind, Frame, Origin, Pinhole, PointScan, Projection, RangeImage, RefusedBeams, Scan,
+};
+use crate::store::Store;
+use crate::sweep::OccupancySweep;
 
 type Map = Occupancy<3>;
 
@@ -17,8 +21,7 @@ fn shell(n: usize) -> Vec<[f32; 3]> {
     let at = |i: usize, a: f64| (0.5 + i as f64 * a).fract();
     (0..n)
         .map(|i| {
-            let (z, a) =
-                (2.0 * at(i, 0.754_877_666_246_692_7) - 1.0, 6.3 * at(i, 0.569_840_290_998_053_2));
+            let (z, a) = (2.0 * at(i, 0.754_877_666_246_692_7) - 1.0, 6.3 * at(i, 0.569_840_290_998_053_2));
             let (r, across) = (2.0 + at(i, 0.618_033_988_7), (1.0 - z * z).sqrt());
             [r * across * a.cos(), r * across * a.sin(), r * z].map(|v| v as f32)
         })
@@ -50,12 +53,9 @@ fn every_way_in_is_the_same_map() {
     by_origins.integrate(&pose, &Frame::Points(origins)).unwrap();
     assert_eq!(cells(&by_frame), cells(&by_origins));
 
-    let mut wide = SparseOccupancy::<LogOdds32>::new(
-        Lattice::new([0.0; 3], 0.1),
-        OccupancyModel::default(),
-        OccupancySweep::Exact,
-    )
-    .unwrap();
+    let mut wide = Occupancy::<3, LogOdds32>::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default())
+        .unwrap()
+        .with_sweep(OccupancySweep::Exact);
     wide.integrate_points(&world, pose.translation).unwrap();
     assert_eq!(wide.observed_cells(), by_frame.observed_cells());
     for p in &world {
@@ -92,9 +92,7 @@ fn what_cannot_be_fused_is_refused_and_counted() {
     let stats = map.integrate_points(&[[f64::NAN; 3], [1.0, 0.0, 0.0]], [0.0; 3]).unwrap();
     assert_eq!(stats.refused.not_finite, 1);
     assert_eq!(map.integrate_points(&[[1.0; 3]], [f64::NAN; 3]).unwrap().refused_poses, 1);
-    assert!(
-        Map::new(Lattice::new([0.0; 3], 0.0), OccupancyModel::default(), OccupancySweep::Auto).is_err()
-    );
+    assert!(Map::new(Lattice::new([0.0; 3], 0.0), OccupancyModel::default()).is_err());
 }
 
 #[test]
@@ -135,7 +133,7 @@ fn bounds_and_limits_hold() {
     part.set_bounds(Some(bounds));
     let stats = part.integrate(&Pose::IDENTITY, &frame).unwrap();
     assert!(stats.hits_outside > 1000);
-    let inside = CellBox::of(&bounds, all.store().lattice());
+    let inside = CellBox::covering(&bounds, all.store().lattice());
     for (key, values) in cells(&part) {
         for (i, v) in values.iter().enumerate() {
             assert!(v.is_none() || inside.contains(key.cell(i)));
@@ -144,8 +142,7 @@ fn bounds_and_limits_hold() {
     // A ray that enters the box starts anew at its border: at a corner it may take the other cell.
     let (mut held, mut same) = (0, 0);
     for (key, values) in cells(&all) {
-        for (i, v) in
-            values.iter().enumerate().filter(|(i, v)| v.is_some() && inside.contains(key.cell(*i)))
+        for (i, v) in values.iter().enumerate().filter(|(i, v)| v.is_some() && inside.contains(key.cell(*i)))
         {
             held += 1;
             same += usize::from(part.store().cell(key.cell(i)) == *v);
@@ -164,7 +161,7 @@ fn what_contradicts_itself_is_refused() {
     for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
         for (image, why) in crate::scan::broken_images() {
             let mut map =
-                Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default(), sweep).unwrap();
+                Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default()).unwrap().with_sweep(sweep);
             let mut scan = PointScan::new([[0.0, 0.0, 1.0]], [0.0; 3]);
             scan.image = Some(image.clone());
             let got = map.integrate(&Pose::IDENTITY, &Frame::Image(image));
@@ -184,7 +181,8 @@ fn what_contradicts_itself_is_refused() {
 #[test]
 fn readings_that_are_too_far_cost_nothing_and_are_counted() {
     for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
-        let mut map = Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default(), sweep).unwrap();
+        let mut map =
+            Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default()).unwrap().with_sweep(sweep);
         let mut points = shell(3000);
         points.extend([[1e6, 0.0, 0.0], [1e7, 1e7, 1e7], [1e20, 0.0, 0.0]]);
         let mut scan = PointScan::new(points, [0.0; 3]);
@@ -218,7 +216,7 @@ fn rays_that_pass_more_than_the_limit_holds_end_early() {
     small.set_limit(60_000);
     let full = small.integrate_points(&ends, [0.0; 3]);
     assert!(matches!(full, Err(MapError::Full(_))));
-    assert!(small.store().is_empty() && small.exact.keys().is_empty());
+    assert!(small.store().is_empty());
 }
 
 #[test]

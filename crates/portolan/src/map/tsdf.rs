@@ -5,7 +5,9 @@ use super::integrate::{limits, plan};
 use super::watch::Watch;
 use super::{BeamSweep, MapError, ScanKind, TsdfConfig};
 use crate::answer::Answer;
-use crate::cell::{Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule};
+use crate::cell::{
+    Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
+};
 use crate::geom::{Aabb, BlockKey, CellBox, Grid, Lattice, Pose, block_cells};
 use crate::scan::{LayoutFinder, Scan, ScanStats};
 use crate::store::{Bricks, Dense, Store};
@@ -75,11 +77,6 @@ impl<const D: usize> Tsdf<D> {
         let lattice = Lattice::new(config.origin, config.resolution);
         let colors = config.color.then(|| Bricks::new(lattice));
         Self::from_stores(Bricks::new(lattice), colors, config)
-    }
-
-    /// The stores of the map: distances, colors.
-    pub fn into_stores(self) -> (Bricks<SignedDistance, D>, Option<Bricks<Color, D>>) {
-        (self.distances, self.colors)
     }
 
     /// Number of cells with a weight of at least `min_weight` (and above 0).
@@ -271,6 +268,11 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
     /// The colors beside them; `None` where the map keeps none.
     pub fn colors(&self) -> Option<&Bricks<Color, D>> {
         self.colors.as_ref()
+    }
+
+    /// The stores of the map: distances, colors.
+    pub fn into_stores(self) -> (S, Option<Bricks<Color, D>>) {
+        (self.distances, self.colors)
     }
 
     /// Allows no more than `bytes` for distances and colors together from now on.

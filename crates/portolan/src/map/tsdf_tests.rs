@@ -89,12 +89,13 @@ fn bricks_within_bounds_hold_what_an_array_holds() {
 #[test]
 fn a_scan_that_reaches_too_far_is_refused_with_a_clear_error() {
     let bearings: Vec<f64> = (0..90).map(|i| f64::from(i) * 0.07 - 3.1).collect();
-    let limits = RangeLimits { max_range: 1e9, ..Default::default() };
+    let limits = RangeLimits { max: 1e9, ..Default::default() };
     let far = Scan::from_laser(&bearings, &[1e8; 90], &limits);
     let mut map = Tsdf::<2>::new(TsdfConfig::default()).unwrap();
     let error = map.integrate(&Pose::<2>::IDENTITY, &far).unwrap_err();
     assert!(matches!(error, MapError::TooFar { .. }), "{error}");
-    let mut grid = Occupancy::<2>::new(crate::geom::Lattice::new([0.0; 2], 0.05), Default::default()).unwrap();
+    let mut grid =
+        Occupancy::<2>::new(crate::geom::Lattice::new([0.0; 2], 0.05), Default::default()).unwrap();
     let stats = grid.integrate(&Pose::<2>::IDENTITY, &far).unwrap();
     assert_eq!((stats.refused.too_far, stats.beams.dropped, stats.cells), (90, 90, 0));
     // Inside of bounds they are walked as far as these go.

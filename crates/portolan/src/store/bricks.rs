@@ -225,7 +225,8 @@ impl<C: Cell, const D: usize> Store<C, D> for Bricks<C, D> {
     }
 
     fn apply(&mut self, key: BlockKey<D>, evidence: &C::Evidence, rule: &C::Rule) -> Result<(), StoreFull> {
-        let fuse = |_: usize, brick: &mut Option<C::Brick>, (): &mut ()| fuse_brick::<C, D>(brick, evidence, rule);
+        let fuse =
+            |_: usize, brick: &mut Option<C::Brick>, (): &mut ()| fuse_brick::<C, D>(brick, evidence, rule);
         self.update(&[key], || (), fuse).map(|_| ())
     }
 

@@ -3,7 +3,7 @@
 use super::arena::NONE;
 use super::tree::{BLOCK_HEIGHT, Tree};
 use super::tree_build::expand;
-use super::{Bricks, StoreFull, Store};
+use super::{Bricks, Store, StoreFull};
 use crate::cell::{LogOddsBrick, LogOddsValue, Planes};
 use crate::geom::{BlockKey, Lattice, block_cells};
 
@@ -140,8 +140,8 @@ mod tests {
             }
             for b in blocks {
                 let key: [i32; D] = std::array::from_fn(|k| ((b >> (2 * k)) & 3) - 2);
-                bricks.apply(BlockKey(key), &e, rule);
-                direct.apply(BlockKey(key.map(|v| v + 8)), &e, rule);
+                bricks.apply(BlockKey(key), &e, rule).unwrap();
+                direct.apply(BlockKey(key.map(|v| v + 8)), &e, rule).unwrap();
             }
         }
         let tree = Tree::from_bricks(&bricks).unwrap();

@@ -275,8 +275,8 @@ mod tests {
             for &(block, hit, miss, style) in scan {
                 let key = BlockKey(std::array::from_fn(|k| i32::from(block >> (2 * k) & 3)));
                 let e = evidence::<D>(hit, miss, style);
-                tree.apply(key, &e, rule);
-                dense.apply(key, &e, rule);
+                tree.apply(key, &e, rule).unwrap();
+                dense.apply(key, &e, rule).unwrap();
                 for i in 0..block_cells::<D>() {
                     let o: Option<Endpoint> = e.one(i);
                     if let Some(o) = o {
@@ -332,7 +332,7 @@ mod tests {
         let rule = LogOddsRule::<i8>::new(&OccupancyModel::default()).unwrap();
         let mut tree = Tree::<LogOdds8, 2>::new([0.0; 2], 1.0, 3).unwrap();
         for style in [4, 0, 4, 1, 0, 0, 0, 4] {
-            tree.apply(BlockKey([0, 0]), &evidence::<2>(0x1234, 0x00ff_1234, style), &rule);
+            tree.apply(BlockKey([0, 0]), &evidence::<2>(0x1234, 0x00ff_1234, style), &rule).unwrap();
             tree.check_invariants();
         }
         assert!(Tree::<LogOdds8, 2>::new([0.0; 2], 1.0, 2).is_none());
@@ -345,7 +345,7 @@ mod tests {
         for _ in 0..5 {
             for x in 0..4 {
                 for y in 0..4 {
-                    tree.apply(BlockKey([x, y]), &evidence::<2>(0, 0, 1), &rule);
+                    tree.apply(BlockKey([x, y]), &evidence::<2>(0, 0, 1), &rule).unwrap();
                 }
             }
         }
@@ -365,7 +365,8 @@ mod tests {
                     key,
                     &evidence::<2>(noise, !noise.rotate_left(17), (noise >> 60) as u8 % 6),
                     &rule,
-                );
+                )
+                .unwrap();
             }
             tree.arena.slots()
         };

@@ -75,11 +75,12 @@ pub fn cast_ray<const D: usize>(
 /// [`cast_ray`], with what the ray went through and the normal where it hits.
 ///
 /// ```
+/// use portolan::geom::Grid;
 /// use portolan::map::{Tsdf2, TsdfConfig};
 /// use portolan::surface::{RayCast, RayCastSettings, trace_ray};
 ///
 /// // A wall at x = 1 m, and a gap in what was seen before it.
-/// let mut tsdf = Tsdf2::new(TsdfConfig { cells: [24, 8], resolution: 0.05, ..Default::default() })?;
+/// let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [24, 8]), TsdfConfig::default())?;
 /// for i in (0..192).filter(|i| !(8..12).contains(&(i % 24))) {
 ///     let cell = [i % 24, i / 24];
 ///     tsdf.fuse(cell, 1.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
@@ -122,7 +123,12 @@ fn cast_dense<const D: usize>(
 }
 
 #[inline(always)]
-fn look_dense<const D: usize>(tsdf: &DenseTsdf<D>, p: [f64; D], s: f64, settings: &RayCastSettings) -> Seen<D> {
+fn look_dense<const D: usize>(
+    tsdf: &DenseTsdf<D>,
+    p: [f64; D],
+    s: f64,
+    settings: &RayCastSettings,
+) -> Seen<D> {
     let grid = tsdf.grid();
     let strides = grid.strides();
     let planes = tsdf.store().planes();
@@ -301,12 +307,15 @@ impl<'a, const D: usize> RayCaster<'a, D> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::Grid;
     use crate::map::TsdfConfig;
 
     fn wall<const D: usize>() -> DenseTsdf<D> {
-        let mut tsdf =
-            Tsdf::new(TsdfConfig { cells: [20; D], resolution: 0.1, truncation: 0.3, ..Default::default() })
-                .unwrap();
+        let mut tsdf = DenseTsdf::covering(
+            &Grid::new([0.0; D], 0.1, [20; D]),
+            TsdfConfig { truncation: 0.3, ..Default::default() },
+        )
+        .unwrap();
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);
             let x = tsdf.grid().lattice.center(cell)[0];
@@ -359,7 +368,8 @@ mod tests {
     fn bricks_say_what_an_array_says<const D: usize>() {
         // Whole bricks, so that both end at the same place; with a hole in what was observed.
         let whole = wall::<D>();
-        let mut tsdf = Tsdf::new(TsdfConfig { cells: [16; D], ..*whole.config() }).unwrap();
+        let mut tsdf =
+            DenseTsdf::covering(&Grid { shape: [16; D], ..*whole.grid() }, *whole.config()).unwrap();
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);
             if let Some(v) = whole.store().cell(cell).filter(|_| !(cell[0] == 8 && cell[1] < 9)) {

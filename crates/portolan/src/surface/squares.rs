@@ -175,9 +175,11 @@ mod tests {
 
     /// A field with these values at the centres, observed where the value is not NaN.
     pub(crate) fn field(shape: [usize; 2], value: impl Fn([f64; 2]) -> f64) -> Tsdf2 {
-        let mut tsdf =
-            Tsdf::new(TsdfConfig { cells: shape, resolution: 1.0, truncation: 1e6, ..Default::default() })
-                .unwrap();
+        let mut tsdf = Tsdf2::covering(
+            &Grid::new([0.0; 2], 1.0, shape),
+            TsdfConfig { truncation: 1e6, ..Default::default() },
+        )
+        .unwrap();
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);
             let v = value(tsdf.grid().lattice.center(cell));

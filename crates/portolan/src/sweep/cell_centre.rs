@@ -302,7 +302,7 @@ mod tests {
         let scan = laser(&(0..90).map(reading).collect::<Vec<_>>(), 90.0);
         let lattice = Lattice::new([0.0; 2], 0.05);
         let mut sweep = CellCentre::new(0.15, if carve { 1.0 } else { 0.0 }, WeightModel::Constant);
-        sweep.plan(&scan, pose, &lattice, &Aabb::new([-4.0; 2], [4.0; 2]));
+        sweep.plan(&scan, pose, &lattice, &PlanLimits::inside(Aabb::new([-4.0; 2], [4.0; 2]))).unwrap();
         assert!(sweep.blocks().is_sorted());
         let said = said(&sweep);
         let want = oracle(&scan, pose, &lattice, 0.15, carve);
@@ -346,7 +346,14 @@ mod tests {
             let scan = Scan::from_fan(&bearings, beams);
             let mut sweep = CellCentre::new(0.15, carve_weight, WeightModel::Constant);
             let pose = Pose::<2>::new(0.0, 0.0, 0.0);
-            sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.05), &Aabb::new([-4.0; 2], [4.0; 2]));
+            sweep
+                .plan(
+                    &scan,
+                    &pose,
+                    &Lattice::new([0.0; 2], 0.05),
+                    &PlanLimits::inside(Aabb::new([-4.0; 2], [4.0; 2])),
+                )
+                .unwrap();
             said(&sweep)
         };
         let cells = |area: f64| (area / 0.05f64.powi(2)) as usize;
@@ -373,7 +380,14 @@ mod tests {
         let scan = Scan::from_points(&[ahead]);
         let pose = Pose { translation: [0.05; D], ..Pose::IDENTITY };
         let mut sweep = CellCentre::<D>::new(0.25, 1.0, WeightModel::Constant);
-        sweep.plan(&scan, &pose, &Lattice::new([0.0; D], 0.1), &Aabb::new([-3.0; D], [3.0; D]));
+        sweep
+            .plan(
+                &scan,
+                &pose,
+                &Lattice::new([0.0; D], 0.1),
+                &PlanLimits::inside(Aabb::new([-3.0; D], [3.0; D])),
+            )
+            .unwrap();
         let said = said(&sweep);
         let mut cell = [0; D];
         cell[0] = 9;

@@ -121,8 +121,8 @@ impl<const D: usize> Sweep<D> for March<D> {
 mod tests {
     use super::*;
     use crate::cell::Evidence;
-    use crate::geom::block_cells;
     use crate::geom::vector::unit;
+    use crate::geom::{Aabb, block_cells};
     use crate::scan::{Beam, BeamKind};
     use proptest::prelude::*;
     use std::collections::HashMap;
@@ -152,12 +152,11 @@ mod tests {
             }
         }
         let mut sweep = March::new(tau, if carve { 1.0 } else { 0.0 }, WeightModel::Constant);
-        sweep.plan(&scan, &pose, &lattice, &Aabb::new([-100.0; D], [100.0; D]));
+        sweep.plan(&scan, &pose, &lattice, &PlanLimits::inside(Aabb::new([-100.0; D], [100.0; D]))).unwrap();
         let mut said = HashMap::new();
-        let mut scratch = Distances::silent(block_cells::<D>());
         for (i, key) in sweep.blocks().iter().enumerate() {
             for k in 0..block_cells::<D>() {
-                if let Some(o) = sweep.evidence(i, &mut scratch).one(k) {
+                if let Some(o) = sweep.evidence(i, &mut ()).one(k) {
                     said.insert(key.cell(k), (o.distance, o.weight));
                 }
             }

@@ -108,6 +108,11 @@ impl<const D: usize> Default for PlanLimits<D> {
 }
 
 impl<const D: usize> PlanLimits<D> {
+    /// Limits that follow beams only inside a box (world, metres).
+    pub fn inside(bounds: Aabb<D>) -> Self {
+        Self { bounds: Some(bounds), ..Self::default() }
+    }
+
     /// The bounds as a box; without bounds an infinite one.
     pub fn bounds_or_everywhere(&self) -> Aabb<D> {
         self.bounds.unwrap_or(Aabb::new([f64::NEG_INFINITY; D], [f64::INFINITY; D]))
@@ -132,9 +137,8 @@ fn beam_stats<const D: usize>(
     world_from_sensor: &Pose<D>,
     limits: &PlanLimits<D>,
 ) -> ScanStats {
-    let outside = |bounds: Aabb<D>| {
-        scan.hits_world(world_from_sensor).filter(|&p| !bounds.contains(p)).count() as u64
-    };
+    let outside =
+        |bounds: Aabb<D>| scan.hits_world(world_from_sensor).filter(|&p| !bounds.contains(p)).count() as u64;
     ScanStats {
         scans: 1,
         beams: scan.counts(),

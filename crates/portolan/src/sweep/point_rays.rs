@@ -100,7 +100,8 @@ impl Sweep<3> for PointRays {
             self.colors.extend_from_slice(&scan.colors);
         }
         let outside = |bounds: Aabb<3>| {
-            let is_outside = |p: &[f32; 3]| !bounds.contains(world_from_scan.transform_point(p.map(f64::from)));
+            let is_outside =
+                |p: &[f32; 3]| !bounds.contains(world_from_scan.transform_point(p.map(f64::from)));
             scan.points.iter().filter(|p| is_outside(p)).count() as u64
         };
         Ok(ScanStats {

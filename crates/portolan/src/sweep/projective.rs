@@ -1,10 +1,10 @@
 //! The sweep for organised scans of space: every cell's centre is looked up in the range image.
 
-use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel};
 use super::lens::{BAD_IMAGE, LANES, Lens, Window};
 use super::observe::{Centres, Octants, View, cell_of, nearest, observe_block, places};
 use super::padded_image::{Cleaning, PaddedImage};
 use super::range_pyramid::RangePyramid;
+use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel};
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
 use crate::parallel;

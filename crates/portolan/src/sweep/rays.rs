@@ -177,12 +177,12 @@ mod tests {
         let mut sweep = Rays::new(depth);
         let everywhere = Aabb::new([-100.0; D], [100.0; D]);
         for _ in 0..2 {
-            sweep.plan(&scan, &pose, &lattice, &everywhere);
+            sweep.plan(&scan, &pose, &lattice, &PlanLimits::inside(everywhere)).unwrap();
         }
         assert!(sweep.blocks().is_sorted());
         let mut said = HashMap::new();
         for (i, key) in sweep.blocks().iter().enumerate() {
-            let mut scratch = HitMiss::silent(block_cells::<D>());
+            let mut scratch = ();
             let e = sweep.evidence(i, &mut scratch);
             for k in 0..block_cells::<D>() {
                 if let Some(o) = e.one(k) {
@@ -216,12 +216,18 @@ mod tests {
             let mut sweep = Rays::<2>::new(0.1);
             let scan = Scan::from_beams([Beam { direction: [1.0, 0.0], range: 1.0, kind }]);
             let pose = Pose::<2>::new(0.05, 0.05, 0.0);
-            sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.1), &Aabb::new([0.0; 2], [5.0; 2]));
+            sweep
+                .plan(
+                    &scan,
+                    &pose,
+                    &Lattice::new([0.0; 2], 0.1),
+                    &PlanLimits::inside(Aabb::new([0.0; 2], [5.0; 2])),
+                )
+                .unwrap();
             let mut counts = (0, 0);
-            let mut scratch = HitMiss::silent(64);
             for i in 0..sweep.blocks().len() {
                 for k in 0..64 {
-                    match sweep.evidence(i, &mut scratch).one(k) {
+                    match sweep.evidence(i, &mut ()).one(k) {
                         Some(Endpoint::Hit) => counts.0 += 1,
                         Some(Endpoint::Miss) => counts.1 += 1,
                         None => {}
@@ -242,7 +248,14 @@ mod tests {
         let mut sweep = Rays::<2>::new(0.1);
         let scan = Scan::from_beams([Beam { direction: [1.0, 0.0], range: 1e7, kind: BeamKind::Hit }]);
         let pose = Pose::<2>::new(-5e6, 0.5, 0.0);
-        sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.1), &Aabb::new([0.0; 2], [5.0; 2]));
+        sweep
+            .plan(
+                &scan,
+                &pose,
+                &Lattice::new([0.0; 2], 0.1),
+                &PlanLimits::inside(Aabb::new([0.0; 2], [5.0; 2])),
+            )
+            .unwrap();
         assert_eq!(sweep.blocks().len(), 7);
     }
 }

@@ -29,10 +29,10 @@ pub(crate) fn grid() -> Grid<2> {
 }
 
 pub(crate) fn tsdf(sweep: BeamSweep, carve: bool, log: &[(Pose<2>, Scan<2>)]) -> Tsdf2 {
-    let config = TsdfConfig { sweep, ..Default::default() }.with_grid(&grid());
-    let mut tsdf = Tsdf2::new(config).unwrap();
+    let config = TsdfConfig { beams: sweep, carve, ..Default::default() };
+    let mut tsdf = Tsdf2::covering(&grid(), config).unwrap();
     for (pose, scan) in log {
-        tsdf.integrate(pose, scan, carve);
+        tsdf.integrate(pose, scan).unwrap();
     }
     tsdf
 }

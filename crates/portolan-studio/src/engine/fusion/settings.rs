@@ -41,7 +41,7 @@ impl Settings {
 impl Default for Settings {
     /// The chapter's, with the default sweep.
     fn default() -> Self {
-        let config = TsdfConfig::default();
+        let config = TsdfConfig::<2>::default();
         Self {
             resolution: config.resolution,
             truncation: config.truncation,
@@ -50,7 +50,7 @@ impl Default for Settings {
             carve: true,
             carve_weight: config.carve_weight.into(),
             weights: weights_word(config.weights).into(),
-            sweep: sweep_word(config.sweep).into(),
+            sweep: sweep_word(config.beams).into(),
         }
     }
 }
@@ -60,7 +60,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(in crate::engine) fn config(&self) -> Result<TsdfConfig, Refusal> {
+    pub(in crate::engine) fn config(&self) -> Result<TsdfConfig<2>, Refusal> {
         let within = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
             true => Ok(value),
             false => Err(Refusal::new(format!("{name} must be from {low} to {high}, and is {value}"))),
@@ -76,7 +76,8 @@ impl Settings {
             truncation,
             w_max: w_max as f32,
             carve_weight: carve_weight as f32,
-            sweep: sweep_of(&self.sweep).ok_or_else(|| unknown("sweep", &self.sweep))?,
+            carve: self.carve,
+            beams: sweep_of(&self.sweep).ok_or_else(|| unknown("sweep", &self.sweep))?,
             weights: weights_of(&self.weights).ok_or_else(|| unknown("weight model", &self.weights))?,
             ..TsdfConfig::default()
         })

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use portolan::geom::vector::along;
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{MapRepr, Tsdf2};
+use portolan::map::Tsdf2;
 use portolan::scan::ScanStats;
 use serde_json::json;
 
@@ -145,7 +145,7 @@ impl Fusion {
                 self.limits.memory >> 20
             )));
         }
-        let tsdf = Tsdf2::new(config.with_grid(&grid)).map_err(Refusal::new)?;
+        let tsdf = Tsdf2::covering(&grid, config).map_err(Refusal::new)?;
         let seen = Seen::nothing(grid.shape);
         Ok(Made { at: 0, tsdf, seen, ghost: None, stats: ScanStats::default() })
     }
@@ -198,7 +198,7 @@ impl Fusion {
             made.watch(self.inspected.as_ref());
         }
         while made.at < to {
-            made.fuse_one(&mut self.lap, self.settings.carve, self.inspected.as_mut());
+            made.fuse_one(&mut self.lap, self.inspected.as_mut())?;
             made.at += 1;
             if self.lap.move_before(made.at).is_some() {
                 made.start_ghost(&self.lap);
@@ -291,7 +291,7 @@ impl Fusion {
         let mut inspected = Inspected::new(cell);
         again.watch(Some(&inspected));
         while again.at < at {
-            again.fuse_one(&mut self.lap, self.settings.carve, Some(&mut inspected));
+            again.fuse_one(&mut self.lap, Some(&mut inspected))?;
             again.at += 1;
         }
         let mut body = json!(null);
@@ -328,15 +328,16 @@ impl Fusion {
 
 impl Made {
     /// Fuses the scan after those that are fused.
-    fn fuse_one(&mut self, lap: &mut Lap, carve: bool, inspected: Option<&mut Inspected>) {
+    fn fuse_one(&mut self, lap: &mut Lap, inspected: Option<&mut Inspected>) -> Result<(), Refusal> {
         let (pose, scan) = lap.scan(self.at);
-        self.stats = self.tsdf.integrate(pose, scan, carve);
+        self.stats = self.tsdf.integrate(pose, scan).map_err(Refusal::new)?;
         if let Some(ghost) = &mut self.ghost {
             ghost.observe(self.tsdf.events());
         }
         if let Some(inspected) = inspected {
             inspected.observe(self.at, self.tsdf.events());
         }
+        Ok(())
     }
 
     /// Follows the chair that was just moved, if one was.

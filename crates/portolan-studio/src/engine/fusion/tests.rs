@@ -37,12 +37,12 @@ fn said(session: &mut Session, question: Value) -> Value {
 }
 
 /// The events of a cell as the library tells them, fused without a studio.
-fn events(scans: &[(Pose<2>, Scan<2>)], config: TsdfConfig, cell: [i32; 2]) -> Vec<(usize, FusionEvent)> {
-    let mut tsdf = Tsdf2::new(config.with_grid(&Grid::new([0.0; 2], 0.05, [240, 180]))).unwrap();
+fn events(scans: &[(Pose<2>, Scan<2>)], config: TsdfConfig<2>, cell: [i32; 2]) -> Vec<(usize, FusionEvent)> {
+    let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [240, 180]), config).unwrap();
     tsdf.watch([cell]);
     let mut events = Vec::new();
     for (i, (pose, scan)) in scans.iter().enumerate() {
-        tsdf.integrate(pose, scan, true);
+        tsdf.integrate(pose, scan).unwrap();
         events.extend(tsdf.events().iter().map(|e| (i, e.1)));
     }
     events
@@ -71,7 +71,7 @@ fn a_cells_history_is_what_the_library_says() {
         settings["w_max"] = json!(8);
         ask(&mut session, json!({ "op": "set", "settings": settings }));
         ask(&mut session, json!({ "op": "seek", "scan": 150 }));
-        let config = TsdfConfig { sweep, w_max: 8.0, ..Default::default() };
+        let config = TsdfConfig { beams: sweep, w_max: 8.0, ..Default::default() };
         for cell in [[31, 60], [100, 90], [37, 70], [20, 50]] {
             let told = ask(&mut session, json!({ "op": "watch", "cell": cell }));
             let expected = events(&scans, config, cell);

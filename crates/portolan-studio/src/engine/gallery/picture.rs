@@ -37,7 +37,7 @@ pub(super) fn everything(made: &Made) -> Result<Reply, Refusal> {
         "truth_and_trees": tell::constants(made),
         "picture": {
             "grid": frame::grid(m.tsdf.grid()),
-            "tree": { "origin": m.tree.tree().lattice().origin, "resolution": m.tree.tree().lattice().resolution },
+            "tree": { "origin": m.tree.store().lattice().origin, "resolution": m.tree.store().lattice().resolution },
             "truncation": m.tsdf.config().truncation,
             "ring": spacing,
             "truth": made.truth.as_ref().map(|w| w.boundary().iter().map(|s| [s.a, s.b]).collect::<Vec<_>>()),
@@ -78,9 +78,9 @@ struct Leaves {
 
 fn leaves(made: &Made) -> Leaves {
     let map = &made.measured.tree;
-    let lattice = *map.tree().lattice();
+    let lattice = *map.store().lattice();
     let mut leaves = Leaves { squares: Vec::new(), occupancy: Vec::new() };
-    map.tree().for_each_leaf(|leaf| {
+    map.store().for_each_leaf(|leaf| {
         leaves.squares.extend([leaf.cell[0] as u32, leaf.cell[1] as u32, 1 << leaf.height]);
         leaves.occupancy.push(byte(map.occupancy(lattice.center(leaf.cell))));
     });

@@ -53,7 +53,7 @@ fn library() -> Gallery {
     let world = apartment().world;
     let scans: Vec<(Pose<2>, Scan<2>)> = lap(&world, &LapConfig::default()).into_iter().take(SCANS).collect();
     let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
-    let tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&grid)).unwrap();
+    let tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
     let settings = GallerySettings {
         grid,
         tsdf: TsdfConfig::default(),

@@ -26,7 +26,7 @@ pub(super) struct Watched {
 impl Watched {
     /// Watches from frame `since` on. What came before is found by fusing it again into a map of this cell alone: the
     /// evidence about a cell does not depend on which others are kept.
-    pub(super) fn new(cell: [i32; 3], since: usize, config: TsdfConfig) -> Result<Self, Refusal> {
+    pub(super) fn new(cell: [i32; 3], since: usize, config: TsdfConfig<3>) -> Result<Self, Refusal> {
         let mut map = Tsdf3::new(config).map_err(Refusal::new)?;
         let center = map.lattice().center(cell);
         let near = 0.25 * config.resolution;
@@ -43,7 +43,7 @@ impl Watched {
             // A frame that cannot be read now could not be read then.
             if let Ok((pose, frame)) = source.frame(*at) {
                 let frame: Arc<_> = frame;
-                if map.integrate(&pose, &frame).is_ok() {
+                if map.integrate(&pose, &*frame).is_ok() {
                     self.before.extend(map.events().iter().map(|e| (*at, e.1)));
                 }
             }

@@ -38,7 +38,7 @@ pub(super) struct Made {
     /// Frames that are fused.
     pub(super) at: usize,
     pub(super) tsdf: Tsdf3,
-    pub(super) occupancy: Option<Occupancy>,
+    pub(super) occupancy: Option<Occupancy<3>>,
     pub(super) esdf: Option<SparseEsdf<3>>,
     /// The map's epoch when the Euclidean field was made.
     measured: u64,
@@ -128,7 +128,7 @@ impl Made {
         memory: usize,
         clock: &Clock,
     ) -> Result<(), MapError> {
-        let others = self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes);
+        let others = self.occupancy.as_ref().map_or(0, Occupancy::<3>::memory_bytes);
         self.tsdf.set_limit(memory.saturating_sub(others));
         let (stats, seconds) = clock.time(|| self.tsdf.integrate(pose, frame));
         self.seconds.tsdf += seconds;
@@ -207,7 +207,7 @@ impl Made {
 
     pub(super) fn memory_bytes(&self) -> usize {
         self.tsdf.memory_bytes()
-            + self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes)
+            + self.occupancy.as_ref().map_or(0, Occupancy::<3>::memory_bytes)
             + self.esdf.as_ref().map_or(0, SparseEsdf::memory_bytes)
             + self.mesh.memory_bytes()
             + self.drawn.memory_bytes()

@@ -3,7 +3,7 @@
 use portolan::cell::OccupancyModel;
 use portolan::field::SparseEsdfSettings;
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, Occupancy, Tsdf3, TsdfConfig};
+use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::MeshSettings;
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +46,7 @@ pub(in crate::engine) enum Sensor {
 impl Default for Settings {
     /// Those of `map`: 5 cm, truncation three cells, W_max 64, with carving.
     fn default() -> Self {
-        let config = TsdfConfig::default();
+        let config = TsdfConfig::<3>::default();
         Self {
             resolution: config.resolution,
             truncation: config.truncation,
@@ -63,7 +63,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<TsdfConfig, Refusal> {
+    pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<TsdfConfig<3>, Refusal> {
         let within = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
             true => Ok(value),
             false => Err(Refusal::new(format!("{name} must be from {low} to {high}, and is {value}"))),
@@ -85,8 +85,8 @@ impl Settings {
     }
 
     /// A map that is occupied or free beside that of distances.
-    pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<Occupancy, Refusal> {
-        Occupancy::new(lattice, OccupancyModel::default(), OccupancySweep::Auto).map_err(Refusal::new)
+    pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<Occupancy<3>, Refusal> {
+        Occupancy::<3>::new(lattice, OccupancyModel::default()).map_err(Refusal::new)
     }
 }
 

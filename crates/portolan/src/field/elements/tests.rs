@@ -5,7 +5,7 @@ use super::testing::{Noise, Random, noise_brick};
 use crate::cell::{Planes, SignedDistance};
 use crate::field::sparse::Crossings;
 use crate::geom::{BlockKey, Grid, Lattice, block_cells};
-use crate::map::{Tsdf, TsdfConfig};
+use crate::map::{DenseTsdf, TsdfConfig};
 use crate::store::{Bricks, Store};
 use crate::surface::{ContourSettings, MeshSettings, marching_cubes, marching_squares};
 use proptest::prelude::*;
@@ -83,8 +83,8 @@ fn contour(seed: u64, noise: Noise) {
     let mut random = Random(seed);
     let mut store = Bricks::<SignedDistance, 2>::new(Lattice::new([-16.0; 2], 1.0));
     let grid = Grid::new([-16.0; 2], 1.0, [32; 2]);
-    let config = TsdfConfig { truncation: 1e3, ..TsdfConfig::default().with_grid(&grid) };
-    let mut tsdf = Tsdf::new(config).unwrap();
+    let config = TsdfConfig { truncation: 1e3, ..TsdfConfig::default() };
+    let mut tsdf = DenseTsdf::covering(&grid, config).unwrap();
     for key in (0..16).map(|n| BlockKey([n % 4, n / 4])) {
         let brick = noise_brick::<2>(&mut random, noise);
         for (i, cell) in (0..64).filter_map(|i| Some((i, brick.get(i)?))) {

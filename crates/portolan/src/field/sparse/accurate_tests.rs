@@ -6,7 +6,7 @@ use crate::field::sparse::crossings::Crossings;
 use crate::field::sparse::feature::Feature;
 use crate::field::{Esdf, EsdfMethod, EsdfUpdate, SparseEsdf, SparseEsdfSettings};
 use crate::geom::{BlockKey, Grid, Lattice, block_cells, vector};
-use crate::map::{Tsdf, TsdfConfig};
+use crate::map::{DenseTsdf, TsdfConfig};
 use crate::store::{Bricks, Store};
 use proptest::prelude::*;
 use std::sync::{Mutex, mpsc};
@@ -235,8 +235,8 @@ proptest! {
 
 /// A ball of 0.8 m in an array that is no multiple of a brick, with a corner that was not observed.
 fn ball<const D: usize>() -> DenseTsdf<D> {
-    let config = TsdfConfig { cells: [37; D], resolution: R, truncation: 0.3, ..Default::default() };
-    let mut tsdf = Tsdf::new(config).unwrap();
+    let config = TsdfConfig { truncation: 0.3, ..Default::default() };
+    let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; D], R, [37; D]), config).unwrap();
     for i in 0..tsdf.grid().len() {
         let cell = tsdf.grid().cell(i);
         let d = vector::distance(tsdf.grid().lattice.center(cell), [1.8; D]) - 0.8;

@@ -259,8 +259,9 @@ mod tests {
     use super::*;
     use crate::cell::{DistanceBrick, Planes};
     use crate::field::esdf_from_tsdf;
+    use crate::geom::Grid;
     use crate::geom::block_cells;
-    use crate::map::{Tsdf, TsdfConfig};
+    use crate::map::{DenseTsdf, TsdfConfig};
     use proptest::prelude::*;
 
     const R: f64 = 0.1;
@@ -348,8 +349,8 @@ mod tests {
 
     /// A ball in a box of observed cells, dense and in bricks.
     fn ball<const D: usize>(n: usize) -> (DenseTsdf<D>, Bricks<SignedDistance, D>) {
-        let config = TsdfConfig { cells: [n; D], resolution: R, truncation: 0.3, ..Default::default() };
-        let mut tsdf = Tsdf::new(config).unwrap();
+        let config = TsdfConfig { truncation: 0.3, ..Default::default() };
+        let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; D], R, [n; D]), config).unwrap();
         let mut bricks = Bricks::new(tsdf.grid().lattice);
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);

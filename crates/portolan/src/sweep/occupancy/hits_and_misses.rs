@@ -5,7 +5,9 @@ use super::{Bits, Projective};
 use crate::cell::HitMiss;
 use crate::geom::{Aabb, BlockKey, Lattice, Pose};
 use crate::parallel;
-use crate::scan::{BeamCounts, LayoutFinder, Origin, PointScan, Projection, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{
+    BeamCounts, LayoutFinder, Origin, PointScan, Projection, RangeImage, ScanStats, SphericalLayout,
+};
 use crate::sweep::{PlanError, PlanLimits, Sweep, Swept};
 use std::borrow::Cow;
 use std::marker::PhantomData;
@@ -93,7 +95,8 @@ impl<S: ?Sized> HitsAndMisses<S> {
         self.keys.clear();
         self.parts.clear();
         let (inside, most, ray) = (limits.bounds.as_ref(), limits.most_blocks, &rays.ray);
-        let tally = self.mark(rays, lattice, inside, most).map_err(|TooManyBricks| PlanError::TooManyBlocks)?;
+        let tally =
+            self.mark(rays, lattice, inside, most).map_err(|TooManyBricks| PlanError::TooManyBlocks)?;
         self.view = self.view.take().filter(|_| self.exact.reach_bricks() <= PROJECTIVE_BRICKS);
         let tally = if self.view.is_none() && rays.view.is_some() {
             let passing = |i| Ray { passes: true, ..ray(i) };
