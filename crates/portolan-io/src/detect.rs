@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::bytes::open;
 use crate::mesh::{MeshFormat, mesh_format};
-use crate::space_log::SpaceLogKind;
+use crate::scan_log::ScanLogKind;
 use crate::{IoError, container, esdf_bin};
 
 /// So much of a file is looked at (unpacked bytes).
@@ -34,8 +34,8 @@ pub enum FileKind {
     OctomapBt,
     /// OctoMap's tree of log odds: [`crate::OctomapTree`].
     OctomapOt,
-    /// Scans of space with poses: [`crate::space_log::SpaceLog`].
-    SpaceLog(SpaceLogKind),
+    /// Scans of space with poses: [`crate::scan_log::ScanLog`].
+    ScanLog(ScanLogKind),
     /// A mesh of triangles: [`crate::mesh_counts`], and [`crate::read_ply_mesh`] for PLY.
     Mesh(MeshFormat),
     /// None of these; the text says what was seen and what would be known.
@@ -52,14 +52,14 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
         if path.join("map.portolan").is_file() {
             return Ok(FileKind::PortolanFolder);
         }
-        if let Some(kind) = SpaceLogKind::recognise(path) {
-            return Ok(FileKind::SpaceLog(kind));
+        if let Some(kind) = ScanLogKind::recognise(path) {
+            return Ok(FileKind::ScanLog(kind));
         }
         let what = "a folder without map.portolan and without scans of a known layout; name a file inside it";
         return Ok(FileKind::Unknown(what.into()));
     }
     let head = open(path)?.read_up_to(HEAD)?;
-    let as_log = || SpaceLogKind::recognise(path).map(FileKind::SpaceLog);
+    let as_log = || ScanLogKind::recognise(path).map(FileKind::ScanLog);
     let kind = by_content(path, &head).or_else(as_log).or_else(|| by_name(path, &head));
     Ok(kind.unwrap_or_else(|| unknown(&head)))
 }
@@ -226,12 +226,12 @@ mod tests {
         let cloud = crate::PointCloudFile { points: vec![[1.0; 3]], ..Default::default() };
         let path = folder.path().join("cloud.ply");
         write_ply_cloud(&path, &cloud).unwrap();
-        assert_eq!(detect(&path).unwrap(), FileKind::SpaceLog(SpaceLogKind::Clouds));
+        assert_eq!(detect(&path).unwrap(), FileKind::ScanLog(ScanLogKind::Clouds));
         // MeshLab's clouds have an element of no faces.
         let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
                     element face 0\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n";
-        assert_eq!(kind_of("a.ply", text.as_bytes()), FileKind::SpaceLog(SpaceLogKind::Clouds));
-        assert_eq!(kind_of("a.xyz", b"1 2 3\n4 5 6\n"), FileKind::SpaceLog(SpaceLogKind::Clouds));
+        assert_eq!(kind_of("a.ply", text.as_bytes()), FileKind::ScanLog(ScanLogKind::Clouds));
+        assert_eq!(kind_of("a.xyz", b"1 2 3\n4 5 6\n"), FileKind::ScanLog(ScanLogKind::Clouds));
         assert!(
             matches!(kind_of("a.txt", b"v for vendetta\n"), FileKind::Unknown(text) if text.contains("meshes (PLY"))
         );
@@ -263,7 +263,7 @@ mod tests {
             ("maps_2d/willow-full.pgm", Pgm),
             ("maps_octomap/geb079.bt", OctomapBt),
             ("rangescan_stanford_bunny/reconstruction/bun_zipper.ply", Mesh(MeshFormat::Ply)),
-            ("rgbd_redkitchen", SpaceLog(SpaceLogKind::SevenScenes)),
+            ("rgbd_redkitchen", ScanLog(ScanLogKind::SevenScenes)),
         ] {
             let Some(path) = real_data(name) else { continue };
             assert_eq!(detect(path).unwrap(), kind);

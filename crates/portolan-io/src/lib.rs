@@ -10,8 +10,8 @@
 //! | XYZ, CSV, PTS | [`read_xyz`] | |
 //! | OctoMap scan graph | [`read_scan_graph`] | |
 //! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
-//! | logs of scans of space with poses | [`space_log::SpaceLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
-//! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
+//! | logs of scans of space with poses | [`scan_log::ScanLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
+//! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`]; its chunks: [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | costs of Nav2, as a map_server map | | [`write_costmap`] |
@@ -56,7 +56,7 @@ mod points_csv;
 mod poses;
 pub mod poses3;
 mod scan_graph;
-pub mod space_log;
+pub mod scan_log;
 mod svg;
 #[cfg(test)]
 mod testing;
@@ -79,8 +79,8 @@ pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{
-    AnyMapFile, ColorBricks, MapFile, MapHeader, OccupancyBricks, SpaceMapFile, TsdfBricks, sweep_of,
-    sweep_word, weights_of, weights_word,
+    ColorBricks, MapFile, MapHeader, OccupancyBricks, TsdfBricks, map_dimension, sweep_of, sweep_word,
+    weights_of, weights_word,
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{

@@ -10,7 +10,7 @@ use portolan::cell::{Cell, LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel, 
 use portolan::field::{SparseEsdf, SparseEsdfSettings};
 use portolan::store::{Bricks, Store};
 use portolan::sweep::WeightModel;
-use portolan_io::{MapFile, SpaceMapFile};
+use portolan_io::MapFile;
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
@@ -30,7 +30,7 @@ fn assert_close(value: Option<f64>, expected: f64) {
 #[test]
 fn a_2d_file_is_read() {
     let path = data("room-2d.portolan");
-    let file = MapFile::read(&path).unwrap();
+    let file = MapFile::<2>::read(&path).unwrap();
     assert_eq!(file.to_bytes().unwrap(), std::fs::read(&path).unwrap());
 
     assert_eq!((&*file.header.logs, file.header.scans), (&["room.log".to_owned()][..], 3));
@@ -74,7 +74,7 @@ fn a_2d_file_is_read() {
 #[test]
 fn a_3d_file_is_read() {
     let path = data("corner-3d.portolan");
-    let file = SpaceMapFile::read(&path).unwrap();
+    let file = MapFile::<3>::read(&path).unwrap();
     assert_eq!(file.to_bytes().unwrap(), std::fs::read(&path).unwrap());
 
     assert_eq!((&*file.header.logs, file.header.scans), (&["corner".to_owned()][..], 2));
@@ -82,13 +82,13 @@ fn a_3d_file_is_read() {
     let positions: Vec<_> = file.poses.iter().map(|p| p.translation).collect();
     assert_eq!(positions, [[0.0; 3], [0.1, 0.0, 0.0]]);
 
-    let occupancy = file.occupancy.as_ref().unwrap();
+    let occupancy = file.occupancy_bricks.as_ref().unwrap();
     assert_eq!((occupancy.store.len(), occupancy.model), (50, OccupancyModel::default()));
     assert_close(probability(&occupancy.store, [0.0, 0.0, 0.7]), 0.30552476264292683);
     assert_close(probability(&occupancy.store, [0.0, 0.0, 1.52]), 0.8451416032574319);
     assert_eq!(probability(&occupancy.store, [0.0, -0.7, 0.1]), None);
 
-    let tsdf = file.tsdf.as_ref().unwrap();
+    let tsdf = file.tsdf_bricks.as_ref().unwrap();
     assert_eq!((tsdf.truncation, tsdf.w_max, tsdf.carve_weight), (0.15, 64.0, 0.3));
     assert_eq!((tsdf.weights, tsdf.store.len()), (WeightModel::Constant, 78));
     let settings = SparseEsdfSettings { max_distance: 1.0, min_weight: 0.15, ..Default::default() };
@@ -97,7 +97,7 @@ fn a_3d_file_is_read() {
     assert!((distance - 0.02).abs() < 1e-5, "{distance}");
     assert_eq!(observed(&tsdf.store), 13_862);
 
-    let colors = file.colors.as_ref().unwrap();
+    let colors = file.color_bricks.as_ref().unwrap();
     assert_eq!((colors.store.len(), colors.w_max, observed(&colors.store)), (33, 64.0, 3914));
     let cell = colors.store.lattice().cell_of([0.0, 0.0, 1.5]).unwrap();
     let [r, g, b] = colors.store.cell(cell).unwrap().rgb8();

@@ -38,20 +38,27 @@ impl Container {
     /// Reads a file into memory, packed as it is.
     ///
     /// # Errors
-    /// As [`Container::parse`].
+    /// As [`Container::from_reader`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
-        let mut bytes = Vec::new();
-        // A file of another kind may be huge: the header is looked at first.
-        let mut file = open_file(path)?;
-        let failed = |e| IoError::os(path, "read it", e);
-        file.by_ref().take(HEADER as u64).read_to_end(&mut bytes).map_err(failed)?;
-        Header::of(&bytes, path)?;
-        file.read_to_end(&mut bytes).map_err(failed)?;
-        Self::parse(bytes, path)
+        Self::from_reader(open_file(path)?, path)
     }
 
-    /// Reads a container that is in memory, under the name that errors shall give.
+    /// Reads a source into memory, packed as it is; errors name it `name`.
+    ///
+    /// # Errors
+    /// [`IoError::Os`] where reading fails, and as [`Container::parse`].
+    pub fn from_reader(mut reader: impl Read, name: &Path) -> Result<Self, IoError> {
+        let failed = |e| IoError::os(name, "read it", e);
+        let mut bytes = Vec::new();
+        // Sources of another kind may be huge: the header is checked first.
+        reader.by_ref().take(HEADER as u64).read_to_end(&mut bytes).map_err(failed)?;
+        Header::of(&bytes, name)?;
+        reader.read_to_end(&mut bytes).map_err(failed)?;
+        Self::parse(bytes, name)
+    }
+
+    /// Reads a container in memory; errors name it `name`.
     ///
     /// # Errors
     /// [`IoError::Binary`] where header or index are damaged or claim what cannot be.
@@ -74,6 +81,11 @@ impl Container {
         }
         let chunks = chunks(&bytes, index, header.count, name)?;
         Ok(Self { path: name.into(), bytes, chunks })
+    }
+
+    /// The file, or the name that was given for it.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// The chunks in the order of the file.

@@ -59,7 +59,7 @@ impl LogWriter {
 mod tests {
     use super::super::{LogLayout, LogWriter};
     use super::*;
-    use crate::space_log::{SpaceLog, SpaceLogKind, SpaceLogOptions};
+    use crate::scan_log::{ScanLog, ScanLogKind, ScanLogOptions};
     use portolan::scan::{PointScan, RefusedBeams};
 
     #[test]
@@ -81,8 +81,8 @@ mod tests {
         let pose = Pose::from_quaternion([1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8]).unwrap();
         times.iter().for_each(|t| writer.push(&pose, *t, &frame).unwrap());
         assert_eq!(writer.finish().unwrap(), 4);
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-        assert_eq!(log.kind(), SpaceLogKind::Kitti);
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
+        assert_eq!(log.kind(), ScanLogKind::Kitti);
         assert_eq!([0, 1, 2, 3].map(|i| log.time(i).unwrap()), times);
     }
 }

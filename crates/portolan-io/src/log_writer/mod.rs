@@ -29,7 +29,7 @@ pub enum LogLayout {
         camera_from_lidar: Pose<3>,
     },
     /// TUM RGB-D. TUM's own logs have no place for the numbers of the camera; they are written as `calibration.txt`
-    /// (`fx fy cx cy`), as ETH3D does it, where [`SpaceLog`](crate::space_log::SpaceLog) finds them.
+    /// (`fx fy cx cy`), as ETH3D does it, where [`ScanLog`](crate::scan_log::ScanLog) finds them.
     TumRgbd,
     /// 7-Scenes, with the numbers of the camera beside the frames.
     SevenScenes,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use portolan::scan::Pinhole;
 use serde_json::Value;
 
-use super::SpaceLogOptions;
+use super::ScanLogOptions;
 use crate::IoError;
 use crate::bytes::{open, parse_f64};
 
@@ -106,7 +106,7 @@ pub(super) fn find_camera(
     folder: &Path,
     files: &[&str],
     published: Option<(&'static str, [f64; 4])>,
-    options: &SpaceLogOptions,
+    options: &ScanLogOptions,
 ) -> Result<Camera, IoError> {
     if let Some(given) = &options.intrinsics {
         return given.camera();

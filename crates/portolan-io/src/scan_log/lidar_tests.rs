@@ -7,23 +7,23 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, Origin, PointScan, Projection};
 
-use super::{SpaceLog, SpaceLogKind, SpaceLogOptions};
+use super::{ScanLog, ScanLogKind, ScanLogOptions};
 use crate::poses3::PoseConvention;
 use crate::testing::{Random, bad_bytes, real_data};
 use crate::{PointCloudFile, Viewpoint, write_kitti_bin, write_pcd};
 
-fn open(path: &Path) -> SpaceLog {
-    SpaceLog::open(path, &SpaceLogOptions::default()).unwrap()
+fn open(path: &Path) -> ScanLog {
+    ScanLog::open(path, &ScanLogOptions::default()).unwrap()
 }
 
-fn points(log: &SpaceLog, i: usize) -> PointScan {
+fn points(log: &ScanLog, i: usize) -> PointScan {
     match log.frame(i).unwrap() {
         Frame::Points(scan) => scan,
         Frame::Image(_) => panic!("a lidar gives points"),
     }
 }
 
-fn world(log: &SpaceLog, i: usize) -> Vec<[f64; 3]> {
+fn world(log: &ScanLog, i: usize) -> Vec<[f64; 3]> {
     points(log, i).points.iter().map(|p| log.pose(i).transform_point(p.map(f64::from))).collect()
 }
 
@@ -76,7 +76,7 @@ fn kitti_poses_are_the_cameras_and_lead_to_the_lidar() {
     fs::write(folder.path().join("poses/07.txt"), &rows).unwrap();
 
     let log = open(&root);
-    assert_eq!((log.kind(), log.len(), log.name()), (SpaceLogKind::Kitti, 3, "07"));
+    assert_eq!((log.kind(), log.len(), log.name()), (ScanLogKind::Kitti, 3, "07"));
     assert_eq!((log.time(1), log.stats().mended_poses), (Some(0.1037875), 0));
     for (i, camera) in cameras.iter().enumerate() {
         let expected = camera.transform_point(tr.transform_point([4.0, -5.0, 0.5]));
@@ -87,15 +87,14 @@ fn kitti_poses_are_the_cameras_and_lead_to_the_lidar() {
 
     // Beside the scans they come first; with a convention they are the lidar's own.
     fs::write(root.join("poses.txt"), &rows).unwrap();
-    let own =
-        SpaceLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
-    let log = SpaceLog::open(&root, &own).unwrap();
+    let own = ScanLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
+    let log = ScanLog::open(&root, &own).unwrap();
     assert!(distance(world(&log, 2)[0], cameras[2].transform_point([1.0, 2.0, 3.0])) < 1e-9);
     // So are poses that the caller names: `Tr` is there, and is not for them.
     let named = folder.path().join("odometry.txt");
     fs::write(&named, &rows).unwrap();
-    let named = SpaceLogOptions { poses: Some(named), ..Default::default() };
-    let log = SpaceLog::open(&root, &named).unwrap();
+    let named = ScanLogOptions { poses: Some(named), ..Default::default() };
+    let log = ScanLog::open(&root, &named).unwrap();
     assert!(distance(log.pose(2).translation, cameras[2].translation) < 1e-9);
     assert!(distance(world(&log, 2)[1], cameras[2].transform_point([4.0, -5.0, 0.5])) < 1e-9);
     // A missing scan in the middle keeps the others' poses.
@@ -105,10 +104,10 @@ fn kitti_poses_are_the_cameras_and_lead_to_the_lidar() {
     assert!(distance(log.pose(1).translation, (cameras[2] * tr).translation) < 1e-9);
     // Without calibration the camera's poses would turn the world on its side.
     fs::remove_file(root.join("calib.txt")).unwrap();
-    let error = SpaceLog::open(&root, &SpaceLogOptions::default()).unwrap_err().to_string();
+    let error = ScanLog::open(&root, &ScanLogOptions::default()).unwrap_err().to_string();
     assert!(error.contains("calib.txt is missing; put calib.txt"), "{error}");
     fs::write(root.join("calib.txt"), "P0: 1\nTr: 1 0 0\n").unwrap();
-    let error = SpaceLog::open(&root, &SpaceLogOptions::default()).unwrap_err().to_string();
+    let error = ScanLog::open(&root, &ScanLogOptions::default()).unwrap_err().to_string();
     assert!(error.contains("calib.txt: line 2: Tr is \"Tr: 1 0 0\"; write twelve numbers"), "{error}");
 }
 
@@ -119,19 +118,19 @@ fn folders_of_clouds_with_poses_in_every_layout() {
     for i in [9, 10, 11] {
         fs::write(path.join(format!("scan{i}.xyz")), format!("1 2 {i}\n0 1 0\n")).unwrap();
     }
-    let error = SpaceLog::open(path, &SpaceLogOptions::default()).unwrap_err().to_string();
+    let error = ScanLog::open(path, &ScanLogOptions::default()).unwrap_err().to_string();
     assert!(error.contains("the pose file is missing; looked for a file with \"pose\""), "{error}");
     let given = path.join("given.txt");
     fs::write(&given, "5 0 0 0 0 0 0 1\n6 1 0 0 0 0 0 1\n7 2 0 0 0 0 1 0\n").unwrap();
-    let options = SpaceLogOptions { poses: Some(given), ..Default::default() };
-    let log = SpaceLog::open(path, &options).unwrap();
+    let options = ScanLogOptions { poses: Some(given), ..Default::default() };
+    let log = ScanLog::open(path, &options).unwrap();
     // In the order of numbers, not of letters; half a turn about z.
     assert_eq!((world(&log, 2)[0], log.time(2)), ([1.0, -2.0, 11.0], Some(7.0)));
     // A name that speaks of poses is enough, two are too many.
     fs::write(path.join("lidar_poses.csv"), row(&Pose::IDENTITY).repeat(3)).unwrap();
     assert_eq!(world(&open(path), 0)[0], [1.0, 2.0, 9.0]);
     fs::write(path.join("trajectory.tum"), "").unwrap();
-    let error = SpaceLog::open(path, &SpaceLogOptions::default()).unwrap_err().to_string();
+    let error = ScanLog::open(path, &ScanLogOptions::default()).unwrap_err().to_string();
     assert!(error.contains("the pose file is lidar_poses.csv or trajectory.tum; name the one"), "{error}");
 }
 
@@ -155,9 +154,9 @@ fn names_that_are_times_are_matched_by_time() {
     let path = folder.path();
     fs::write(path.join("poses.tum"), &tum).unwrap();
     fs::write(path.join("1700000000500000000.csv"), "x,y,z\n1,2,3\n").unwrap();
-    assert_eq!(SpaceLogKind::recognise(path), None);
+    assert_eq!(ScanLogKind::recognise(path), None);
     let log =
-        SpaceLog::open(path, &SpaceLogOptions { format: Some(SpaceLogKind::Clouds), ..Default::default() });
+        ScanLog::open(path, &ScanLogOptions { format: Some(ScanLogKind::Clouds), ..Default::default() });
     assert!(distance(world(&log.unwrap(), 0)[0], [10.6, 2.0, 3.0]) < 1e-4);
 }
 
@@ -167,15 +166,15 @@ fn clouds_far_away_keep_their_millimetres() {
     let path = folder.path().join("utm.xyz");
     fs::write(&path, "500000.001 4000000.002 12.003\n500003.5 4000001.25 12\n").unwrap();
     let origin = Some([500_001.0, 4_000_000.5, 14.0]);
-    let log = SpaceLog::open(&path, &SpaceLogOptions { origin, ..Default::default() }).unwrap();
-    assert_eq!((log.kind(), log.len()), (SpaceLogKind::Clouds, 1));
+    let log = ScanLog::open(&path, &ScanLogOptions { origin, ..Default::default() }).unwrap();
+    assert_eq!((log.kind(), log.len()), (ScanLogKind::Clouds, 1));
     assert!(distance(world(&log, 0)[0], [500_000.001, 4_000_000.002, 12.003]) < 1e-6);
     assert!(distance(log.sensor_position(0), [500_001.0, 4_000_000.5, 14.0]) < 1e-9);
     assert_eq!(points(&log, 0).origin, Origin::Common([1.0, 0.5, 2.0]));
     // Moved by a pose.
     let poses = folder.path().join("pose.txt");
     fs::write(&poses, "-500000 -4000000 0 0 0 0 1\n").unwrap();
-    let log = SpaceLog::open(&path, &SpaceLogOptions { poses: Some(poses), ..Default::default() }).unwrap();
+    let log = ScanLog::open(&path, &ScanLogOptions { poses: Some(poses), ..Default::default() }).unwrap();
     assert!(distance(world(&log, 0)[1], [3.5, 1.25, 12.0]) < 1e-6);
     assert!(distance(log.sensor_position(0), [-500_000.0, -4_000_000.0, 0.0]) < 1e-6);
 }
@@ -208,7 +207,7 @@ fn scan_graphs_far_away_keep_their_millimetres() {
     let turned = [-1.0, 2.0, 0.5, 0.0, 0.0, 1.0, 0.0];
     fs::write(&path, graph_of(&[(none, &[]), (none, &far), (turned, &far[1..])])).unwrap();
     let log = open(&path);
-    assert_eq!((log.kind(), log.len()), (SpaceLogKind::ScanGraph, 3));
+    assert_eq!((log.kind(), log.len()), (ScanLogKind::ScanGraph, 3));
     for (p, expected) in world(&log, 1).iter().zip(far) {
         assert!(distance(*p, expected) < 1e-6, "{p:?}");
     }
@@ -219,7 +218,7 @@ fn scan_graphs_far_away_keep_their_millimetres() {
     // Named poses lead to the file's points, too.
     let poses = folder.path().join("poses.txt");
     fs::write(&poses, "-500000 -4000000 0 0 0 0 1\n".repeat(3)).unwrap();
-    let log = SpaceLog::open(&path, &SpaceLogOptions { poses: Some(poses), ..Default::default() }).unwrap();
+    let log = ScanLog::open(&path, &ScanLogOptions { poses: Some(poses), ..Default::default() }).unwrap();
     assert!(distance(world(&log, 1)[1], [3.5, 1.25, 12.0]) < 1e-6);
 }
 
@@ -293,10 +292,10 @@ fn what_viewpoints_mean_is_checked_on_the_points() {
             write_pcd(folder.path().join(format!("{i}.pcd")), &cloud).unwrap();
         }
         let applied =
-            SpaceLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
-        let log = SpaceLog::open(folder.path(), &applied).unwrap();
+            ScanLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
+        let log = ScanLog::open(folder.path(), &applied).unwrap();
         assert_eq!((log.pose(2).translation, points(&log, 2).origin), (places[2], Origin::Common([0.0; 3])));
-        match SpaceLog::open(folder.path(), &SpaceLogOptions::default()) {
+        match ScanLog::open(folder.path(), &ScanLogOptions::default()) {
             Ok(log) => {
                 assert!(in_world);
                 assert_eq!(*log.pose(2), Pose::IDENTITY);
@@ -319,17 +318,17 @@ fn what_is_no_cloud_is_not_taken_for_one() {
     let kind = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
-        SpaceLogKind::recognise(&path)
+        ScanLogKind::recognise(&path)
     };
     let mesh = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nelement face 1\nproperty list int int vertex_index\n\
                  end_header\n";
     assert_eq!(kind("a.ply", mesh), None);
-    assert_eq!(kind("b.ply", &[&mesh[..60], b"\nend_header\n"].concat()), Some(SpaceLogKind::Clouds));
+    assert_eq!(kind("b.ply", &[&mesh[..60], b"\nend_header\n"].concat()), Some(ScanLogKind::Clouds));
     assert_eq!(kind("noise.bin", &[0xfe; 160]), None);
-    assert_eq!(kind("scan.bin", &1f32.to_le_bytes().repeat(8)), Some(SpaceLogKind::Clouds));
+    assert_eq!(kind("scan.bin", &1f32.to_le_bytes().repeat(8)), Some(ScanLogKind::Clouds));
     assert_eq!(kind("notes.txt", b"Dear diary,\n1 2 3\n"), None);
-    assert_eq!(kind("scan.txt", b"1 2 3\n4 5 6\n"), Some(SpaceLogKind::Clouds));
-    assert_eq!(kind("scene.conf", b"bmesh a.ply 0 0 0 0 0 0 1\n"), Some(SpaceLogKind::Stanford));
+    assert_eq!(kind("scan.txt", b"1 2 3\n4 5 6\n"), Some(ScanLogKind::Clouds));
+    assert_eq!(kind("scene.conf", b"bmesh a.ply 0 0 0 0 0 0 1\n"), Some(ScanLogKind::Stanford));
     assert_eq!(kind("nginx.conf", b"server {\n}\n"), None);
 }
 
@@ -341,7 +340,7 @@ fn broken_files_of_a_log_make_nothing_panic() {
     let good = b"camera 0 0 0 0 0 0 1\nbmesh a.ply 1 0 0 0 0 0.6 0.8\n";
     for bytes in bad_bytes(good, 5, 600) {
         fs::write(&conf, bytes).unwrap();
-        if let Ok(log) = SpaceLog::open(&conf, &SpaceLogOptions::default()) {
+        if let Ok(log) = ScanLog::open(&conf, &ScanLogOptions::default()) {
             let _ = log.frame(0);
         }
     }
@@ -353,7 +352,7 @@ fn broken_files_of_a_log_make_nothing_panic() {
     fs::write(&conf, [&good[..], b"bmesh b.ply 0 0 0 0 0 0 1\n"].concat()).unwrap();
     assert_eq!((open(&conf).len(), open(&conf).stats().missing_files), (1, 1));
     fs::remove_file(folder.path().join("a.ply")).unwrap();
-    let error = SpaceLog::open(&conf, &SpaceLogOptions::default()).unwrap_err().to_string();
+    let error = ScanLog::open(&conf, &ScanLogOptions::default()).unwrap_err().to_string();
     assert!(error.contains("a.conf: the number of scans is 0"), "{error}");
 }
 
@@ -361,7 +360,7 @@ fn broken_files_of_a_log_make_nothing_panic() {
 fn scans_of_the_real_hall_agree_in_the_world() {
     let Some(path) = real_data("lidar3d_balm_hall") else { return };
     let log = open(&path);
-    assert_eq!((log.kind(), log.len(), log.stats().poses_without_scan), (SpaceLogKind::Clouds, 48, 48));
+    assert_eq!((log.kind(), log.len(), log.stats().poses_without_scan), (ScanLogKind::Clouds, 48, 48));
     let (first, last) = log.time_span().unwrap();
     assert!((first - 1_630_577_758.569).abs() < 1e-3 && (last - first - 47.0).abs() < 0.1, "{first} {last}");
     assert!((log.path_length() - 31.2).abs() < 0.1 && log.stats().refused_poses.is_empty());
@@ -369,8 +368,8 @@ fn scans_of_the_real_hall_agree_in_the_world() {
     let right = median_distance(&world(&log, 20), &world(&log, 21), 200);
     assert!(right < 0.07, "{right}");
     let turned =
-        SpaceLogOptions { pose_convention: Some(PoseConvention::SensorFromWorld), ..Default::default() };
-    let log = SpaceLog::open(&path, &turned).unwrap();
+        ScanLogOptions { pose_convention: Some(PoseConvention::SensorFromWorld), ..Default::default() };
+    let log = ScanLog::open(&path, &turned).unwrap();
     let wrong = median_distance(&world(&log, 20), &world(&log, 21), 200);
     assert!(wrong > 3.0 * right, "{wrong} against {right}");
 }
@@ -379,7 +378,7 @@ fn scans_of_the_real_hall_agree_in_the_world() {
 fn the_simulated_scans_are_in_the_world_already() {
     let Some(path) = real_data("lidar3d_la3dm_sim_structured") else { return };
     let log = open(&path);
-    assert_eq!((log.kind(), log.len()), (SpaceLogKind::Clouds, 12));
+    assert_eq!((log.kind(), log.len()), (ScanLogKind::Clouds, 12));
     let origins: Vec<[f64; 3]> = (0..12).map(|i| log.sensor_position(i)).collect();
     assert_eq!((origins[0], *log.pose(0)), ([0.999982, 1.00002, 0.0997627], Pose::IDENTITY));
     for i in 0..12 {
@@ -390,10 +389,10 @@ fn the_simulated_scans_are_in_the_world_already() {
         );
     }
     let applied =
-        SpaceLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
-    let posed = SpaceLog::open(&path, &applied).unwrap();
+        ScanLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
+    let posed = ScanLog::open(&path, &applied).unwrap();
     // Three scans are from each of four places.
-    let disagreement = |log: &SpaceLog| {
+    let disagreement = |log: &ScanLog| {
         let place = |i: usize| if i < 6 { i / 3 } else { 2 + (i - 6) / 3 };
         let all = |wanted: usize| (0..12).filter(move |i| place(*i) == wanted).flat_map(|i| world(log, i));
         let from: Vec<_> = all(0).collect();
@@ -408,7 +407,7 @@ fn the_simulated_scans_are_in_the_world_already() {
 fn the_range_scans_of_the_bunny_lie_on_its_mesh() {
     let Some(path) = real_data("rangescan_stanford_bunny") else { return };
     let log = open(&path);
-    assert_eq!((log.kind(), log.len()), (SpaceLogKind::Stanford, 10));
+    assert_eq!((log.kind(), log.len()), (ScanLogKind::Stanford, 10));
     let mesh = crate::read_ply_mesh(path.join("reconstruction/bun_zipper.ply")).unwrap();
     let (mut all, mut off, mut covered) = (Vec::new(), Vec::new(), 0);
     for i in 0..10 {
@@ -456,12 +455,12 @@ fn the_range_scans_of_the_bunny_lie_on_its_mesh() {
 fn the_scan_graph_of_octomap() {
     let Some(path) = real_data("maps_octomap/spherical_scan.graph") else { return };
     let log = open(&path);
-    assert_eq!((log.kind(), log.len()), (SpaceLogKind::ScanGraph, 1));
+    assert_eq!((log.kind(), log.len()), (ScanLogKind::ScanGraph, 1));
     assert_eq!(log.sensor_position(0), [1.0, 0.0, -0.5]);
     for p in world(&log, 0) {
         assert!((distance(p, [1.0, 0.0, -0.5]) - 4.01).abs() < 1e-3);
     }
     let Some(path) = real_data("maps_octomap/scan.dat.bz2") else { return };
     let log = open(&path);
-    assert_eq!((log.kind(), points(&log, 0).points.len()), (SpaceLogKind::Clouds, 88_206));
+    assert_eq!((log.kind(), points(&log, 0).points.len()), (ScanLogKind::Clouds, 88_206));
 }

@@ -12,7 +12,7 @@ use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
 use super::color::{color_size, read_color};
 use super::depth_png::{depth_image_size, read_depth};
 use super::parts::FrameSource;
-use super::{Camera, SpaceLogOptions, SpaceLogStats, UnreadColors};
+use super::{Camera, ScanLogOptions, ScanLogStats, UnreadColors};
 use crate::IoError;
 
 /// A depth image that was found.
@@ -43,8 +43,8 @@ impl DepthFrames {
         mut frames: Vec<DepthFrame>,
         camera: &Camera,
         units_per_metre: f64,
-        options: &SpaceLogOptions,
-        stats: &mut SpaceLogStats,
+        options: &ScanLogOptions,
+        stats: &mut ScanLogStats,
     ) -> Result<Self, IoError> {
         let units_per_metre = options.depth_scale.unwrap_or(units_per_metre);
         if let Some(first) = frames.first() {

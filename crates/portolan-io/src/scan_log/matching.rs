@@ -5,7 +5,7 @@ use std::path::Path;
 use portolan::geom::Pose;
 
 use super::parts::ScanId;
-use super::stats::SpaceLogStats;
+use super::stats::ScanLogStats;
 use crate::IoError;
 use crate::poses3::{TimedPoses, TrackPose};
 
@@ -33,7 +33,7 @@ pub(super) fn match_poses(
     track: &[TrackPose],
     tolerance: f64,
     path: &Path,
-    stats: &mut SpaceLogStats,
+    stats: &mut ScanLogStats,
 ) -> Result<Vec<Match>, IoError> {
     if let (Some(times), Some(timed)) = (times_of(scans), TimedPoses::new(track)) {
         return by_time(&times, &timed, tolerance, path, stats);
@@ -88,7 +88,7 @@ fn by_time(
     poses: &TimedPoses,
     tolerance: f64,
     path: &Path,
-    stats: &mut SpaceLogStats,
+    stats: &mut ScanLogStats,
 ) -> Result<Vec<Match>, IoError> {
     let matches: Vec<Match> = times
         .iter()
@@ -154,8 +154,8 @@ mod tests {
     }
 
     /// The x of each scan's pose, and the counts.
-    fn found(scans: &[ScanId], track: &[TrackPose]) -> Result<(Vec<Option<f64>>, SpaceLogStats), IoError> {
-        let mut stats = SpaceLogStats::default();
+    fn found(scans: &[ScanId], track: &[TrackPose]) -> Result<(Vec<Option<f64>>, ScanLogStats), IoError> {
+        let mut stats = ScanLogStats::default();
         let matches = match_poses(scans, track, 0.02, "p".as_ref(), &mut stats)?;
         let x = |m: &Match| match m {
             Match::Posed(pose, _) => Some(pose.translation[0]),

@@ -9,7 +9,7 @@ use portolan::scan::Frame;
 
 use super::matching::{Match, match_poses};
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
-use super::{Camera, RefusedPose, SpaceLogKind, SpaceLogOptions, SpaceLogStats, UnreadColors};
+use super::{Camera, RefusedPose, ScanLogKind, ScanLogOptions, ScanLogStats, UnreadColors};
 use crate::IoError;
 use crate::poses3::{MENDED_FROM, PoseConvention, RawPose, TrackPose, read_poses_3d};
 
@@ -23,29 +23,29 @@ struct Entry {
 
 /// Scans of space with their poses. Scans are read by index when they are asked for, from any thread; only the poses are in
 /// memory.
-pub struct SpaceLog {
+pub struct ScanLog {
     path: PathBuf,
-    kind: SpaceLogKind,
+    kind: ScanLogKind,
     name: String,
     source: Box<dyn FrameSource>,
     entries: Vec<Entry>,
     camera: Option<Camera>,
-    stats: SpaceLogStats,
+    stats: ScanLogStats,
 }
 
-impl SpaceLog {
+impl ScanLog {
     /// Opens a log: finds its scans, reads its poses, matches them.
     ///
     /// # Errors
     /// [`IoError::Layout`] where the kind is not recognised, files are missing or do not fit together, or no scan has a
     /// usable pose; the errors of reading what holds the poses and the camera.
-    pub fn open(path: &Path, options: &SpaceLogOptions) -> Result<Self, IoError> {
+    pub fn open(path: &Path, options: &ScanLogOptions) -> Result<Self, IoError> {
         // The system's own words for a path that is not there.
         std::fs::metadata(path).map_err(|e| IoError::os(path, "open it", e))?;
-        let kind = options.format.or_else(|| SpaceLogKind::recognise(path)).ok_or_else(|| {
+        let kind = options.format.or_else(|| ScanLogKind::recognise(path)).ok_or_else(|| {
             let advice = format!(
                 "known are {}; force one with --format",
-                SpaceLogKind::ALL.map(SpaceLogKind::word).join(", ")
+                ScanLogKind::ALL.map(ScanLogKind::word).join(", ")
             );
             IoError::layout(path, "the kind of log", "not recognised", advice)
         })?;
@@ -55,9 +55,9 @@ impl SpaceLog {
 
     fn assemble(
         path: &Path,
-        kind: SpaceLogKind,
+        kind: ScanLogKind,
         parts: Parts,
-        options: &SpaceLogOptions,
+        options: &ScanLogOptions,
     ) -> Result<Self, IoError> {
         let Parts { name, source, scans, poses, convention, posed_from_sensor, camera, mut stats } = parts;
         if scans.is_empty() {
@@ -96,7 +96,7 @@ impl SpaceLog {
         Ok(Self { path: path.into(), kind, name, source, entries, camera, stats })
     }
 
-    /// Only every `n`-th scan of it, from the first; 0 counts as 1. [`SpaceLog::stats`] stays about all of it.
+    /// Only every `n`-th scan of it, from the first; 0 counts as 1. [`ScanLog::stats`] stays about all of it.
     pub fn every(mut self, n: usize) -> Self {
         self.entries = self.entries.into_iter().step_by(n.max(1)).collect();
         self
@@ -107,8 +107,8 @@ impl SpaceLog {
         &self.path
     }
 
-    /// The kind of log; in words: [`SpaceLogKind::label`].
-    pub fn kind(&self) -> SpaceLogKind {
+    /// The kind of log; in words: [`ScanLogKind::label`].
+    pub fn kind(&self) -> ScanLogKind {
         self.kind
     }
 
@@ -144,7 +144,7 @@ impl SpaceLog {
     ///
     /// # Errors
     /// [`IoError`] where its file cannot be read or is damaged. A colour picture beside a depth image is no reason: the frame
-    /// is without colours then, and [`SpaceLog::unread_colors`] says so.
+    /// is without colours then, and [`ScanLog::unread_colors`] says so.
     pub fn frame(&self, i: usize) -> Result<Frame, IoError> {
         self.source.frame(self.entries[i].place)
     }
@@ -156,7 +156,7 @@ impl SpaceLog {
     }
 
     /// What was found, and what was left out.
-    pub fn stats(&self) -> &SpaceLogStats {
+    pub fn stats(&self) -> &ScanLogStats {
         &self.stats
     }
 
@@ -185,9 +185,9 @@ impl SpaceLog {
     }
 }
 
-impl fmt::Debug for SpaceLog {
+impl fmt::Debug for ScanLog {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SpaceLog")
+        f.debug_struct("ScanLog")
             .field("path", &self.path)
             .field("kind", &self.kind)
             .field("scans", &self.len())
@@ -199,7 +199,7 @@ impl fmt::Debug for SpaceLog {
 struct Resolver<'a> {
     convention: PoseConvention,
     posed_from_sensor: Option<Pose<3>>,
-    stats: &'a mut SpaceLogStats,
+    stats: &'a mut ScanLogStats,
 }
 
 impl Resolver<'_> {

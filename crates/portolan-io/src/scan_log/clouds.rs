@@ -15,7 +15,7 @@ use super::agreement::{Placed, disagreement};
 use super::cloud_frames::{CloudFrames, Rays};
 use super::files::{has_extension, has_name, name_of, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{SpaceLogOptions, SpaceLogStats};
+use super::{ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::pcd::read_viewpoint;
 use crate::points::{PointFormat, Viewpoint, read_points_as};
@@ -86,7 +86,7 @@ fn folder_of(path: &Path, endings: &[(&'static str, PointFormat)]) -> Option<Pat
     FOLDERS.iter().map(|name| path.join(name)).find(|folder| has_clouds(folder))
 }
 
-pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
     if path.is_file() {
         return open_file(path, options);
     }
@@ -125,12 +125,12 @@ fn parts(path: &Path, source: CloudFrames, scans: Vec<ScanId>, poses: LayoutPose
         posed_from_sensor: source.files_from_frames(),
         source: Box::new(source),
         camera: None,
-        stats: SpaceLogStats::default(),
+        stats: ScanLogStats::default(),
     }
 }
 
 /// A single cloud: at the pose of `--poses`, else where it is, seen from `--origin`, the viewpoint or zero.
-fn open_file(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+fn open_file(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
     let format = path.file_name().and_then(|n| ending_of(n.to_str()?)).map(|(_, format)| format);
     let files = vec![path.to_owned()];
     let (poses, rays) = match format {
@@ -207,7 +207,7 @@ fn pose_file(path: &Path, folder: &Path) -> Result<Option<PathBuf>, IoError> {
 }
 
 /// Rays from the zero of the sensor's frame, or from where the caller says.
-fn from_zero(files: &[PathBuf], options: &SpaceLogOptions) -> Rays {
+fn from_zero(files: &[PathBuf], options: &ScanLogOptions) -> Rays {
     Rays::From(vec![options.origin.unwrap_or([0.0; 3]); files.len()])
 }
 
@@ -221,7 +221,7 @@ fn in_place(files: &[PathBuf]) -> LayoutPoses {
 fn viewpoints(
     files: &[PathBuf],
     format: PointFormat,
-    options: &SpaceLogOptions,
+    options: &ScanLogOptions,
 ) -> Result<(LayoutPoses, Rays), IoError> {
     let missing = || {
         let endings = POSE_ENDINGS.join(", ");

@@ -2,7 +2,7 @@
 //!
 //! `depth.txt` and `rgb.txt` list `time file`, `groundtruth.txt` has the poses of the depth camera at its own times, far
 //! denser. Each depth image takes the colour picture that is nearest in time, and the pose at its time, interpolated between
-//! the two beside it; both within [`SpaceLogOptions::time_tolerance`]. Depth is in units of 1/5000 m.
+//! the two beside it; both within [`ScanLogOptions::time_tolerance`]. Depth is in units of 1/5000 m.
 //!
 //! The camera is in no file of TUM's: it is published for the three sensors, and the folder's name tells which. ETH3D puts
 //! it in `calibration.txt`. The lens distortion of TUM's sensors is not modelled.
@@ -14,7 +14,7 @@ use super::files::name_of;
 use super::intrinsics::find_camera;
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{SpaceLogOptions, SpaceLogStats};
+use super::{ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::bytes::{Lines, open as open_input, parse_f64};
 use crate::error::shown;
@@ -33,8 +33,8 @@ pub(super) fn is_it(path: &Path) -> bool {
     path.join(DEPTH).is_file() && (path.join(POSES).is_file() || path.join("depth").is_dir())
 }
 
-pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
-    let mut stats = SpaceLogStats::default();
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+    let mut stats = ScanLogStats::default();
     let mut depths = read_list(&path.join(DEPTH))?;
     let listed = depths.len();
     depths.retain(|(_, file)| file.is_file());
@@ -127,8 +127,8 @@ fn read_list(path: &Path) -> Result<Vec<(f64, PathBuf)>, IoError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::*;
-    use crate::space_log::{CameraFrom, SpaceLog, SpaceLogKind};
+    use crate::scan_log::testing::*;
+    use crate::scan_log::{CameraFrom, ScanLog, ScanLogKind};
     use crate::testing::bad_bytes;
 
     const START: f64 = 1_305_031_453.25;
@@ -161,8 +161,8 @@ mod tests {
     #[test]
     fn pictures_take_the_pose_and_the_color_of_their_time() {
         let folder = folder_of(5);
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-        assert_eq!((log.kind(), log.len()), (SpaceLogKind::TumRgbd, 5));
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
+        assert_eq!((log.kind(), log.len()), (ScanLogKind::TumRgbd, 5));
         assert_eq!(log.time_span(), Some((START, START + 1.0)));
         assert!(matches!(&log.camera().unwrap().from, CameraFrom::File(f) if f.ends_with("calibration.txt")));
         for i in 0..5 {
@@ -196,7 +196,7 @@ mod tests {
             keep.collect::<Vec<_>>().join("\n")
                 + &format!("\n{last} 0 0 0 0 0 0 0\n{after} 0 0 0 nan 0 0 1\n")
         });
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
         assert_eq!(log.len(), 2);
         assert_is_picture(&log, 0, 2);
         assert_is_picture(&log, 1, 3);
@@ -205,14 +205,14 @@ mod tests {
         assert_eq!((stats.poses, stats.refused_poses.len(), stats.scans_without_color), (10, 2, 1));
         assert!(image(&log, 0).colors.is_empty() && image(&log, 1).colors.len() == 48);
         // A wider tolerance finds the late poses.
-        let options = SpaceLogOptions { time_tolerance: 0.05, ..SpaceLogOptions::default() };
-        assert_eq!(SpaceLog::open(folder.path(), &options).unwrap().stats().unmatched_times, 1);
+        let options = ScanLogOptions { time_tolerance: 0.05, ..ScanLogOptions::default() };
+        assert_eq!(ScanLog::open(folder.path(), &options).unwrap().stats().unmatched_times, 1);
     }
 
     #[test]
     fn other_clocks_and_unknown_cameras_are_errors() {
         let folder = folder_of(3);
-        let open = |path: &Path| SpaceLog::open(path, &SpaceLogOptions::default());
+        let open = |path: &Path| ScanLog::open(path, &ScanLogOptions::default());
         let truth = folder.path().join("groundtruth.txt");
         let text = std::fs::read_to_string(&truth).unwrap();
         std::fs::write(&truth, text.replace("130503", "140503")).unwrap();

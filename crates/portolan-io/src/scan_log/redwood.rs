@@ -14,7 +14,7 @@ use super::files::{has_extension, has_name, name_of, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
-use super::{SpaceLogOptions, SpaceLogStats};
+use super::{ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::poses3::{PoseConvention, read_poses_3d};
 
@@ -43,12 +43,12 @@ pub(super) fn is_it(path: &Path) -> bool {
     path.join(DEPTH).is_dir() && has_name(&path.join(DEPTH), is_png) && has_poses()
 }
 
-pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
     let folder = path.join(DEPTH);
     let names = names_in(&folder, is_png)?;
     let camera = find_camera(path, &CAMERA_FILES, Some(("Open3D's PrimeSense", CAMERA)), options)?;
     let colors = colors_of(path, &names, options)?;
-    let mut stats = SpaceLogStats::default();
+    let mut stats = ScanLogStats::default();
     let frames = names.iter().zip(colors).map(|(name, color)| DepthFrame {
         depth: folder.join(name),
         color,
@@ -87,7 +87,7 @@ fn number_and_time(name: &str) -> (Option<u64>, Option<f64>) {
     }
 }
 
-fn poses_of(path: &Path, names: &[String], options: &SpaceLogOptions) -> Result<LayoutPoses, IoError> {
+fn poses_of(path: &Path, names: &[String], options: &ScanLogOptions) -> Result<LayoutPoses, IoError> {
     let missing = || Ok(LayoutPoses::Missing(format!("{POSES}, one other .log, or a folder {POSE_FOLDER}")));
     if options.poses.is_some() {
         return missing();
@@ -114,7 +114,7 @@ fn poses_of(path: &Path, names: &[String], options: &SpaceLogOptions) -> Result<
 fn colors_of(
     path: &Path,
     depths: &[String],
-    options: &SpaceLogOptions,
+    options: &ScanLogOptions,
 ) -> Result<Vec<Option<PathBuf>>, IoError> {
     let none = vec![None; depths.len()];
     let folder = COLOR_FOLDERS.iter().map(|name| path.join(name)).find(|folder| folder.is_dir());
@@ -140,8 +140,8 @@ fn colors_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::*;
-    use crate::space_log::{CameraFrom, SpaceLog, SpaceLogKind};
+    use crate::scan_log::testing::*;
+    use crate::scan_log::{CameraFrom, ScanLog, ScanLogKind};
 
     fn trajectory(poses: impl Iterator<Item = usize>) -> String {
         poses.map(|i| format!("{i} {i} {}\n{}", i + 1, matrix_text(&camera_pose(i)))).collect()
@@ -167,8 +167,8 @@ mod tests {
         write(&file("odometry.log"), trajectory(0..11));
         // The index line says where a pose belongs, and two are missing.
         write(&file("trajectory.log"), trajectory((0..11).rev().filter(|i| *i != 4 && *i != 7)));
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-        assert_eq!((log.kind(), log.len(), log.time(0)), (SpaceLogKind::Redwood, 9, None));
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
+        assert_eq!((log.kind(), log.len(), log.time(0)), (ScanLogKind::Redwood, 9, None));
         assert!(matches!(log.camera().unwrap().from, CameraFrom::File(_)));
         assert_eq!((log.stats().scans_without_pose, log.stats().poses_without_scan), (2, 0));
         for (k, i) in [0, 1, 2, 3, 5, 6, 8, 9, 10].into_iter().enumerate() {
@@ -191,7 +191,7 @@ mod tests {
         }
         write(&file("camera.json"), json());
         write(&file("scene.log"), trajectory(0..4));
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
         assert_eq!(log.len(), 4);
         assert!((log.time(3).unwrap() - 0.099).abs() < 1e-12);
         (0..4).for_each(|i| assert_is_picture(&log, i, i));
@@ -212,7 +212,7 @@ mod tests {
         let matrix = format!("{fx} 0 {cx} 0\n0 {fy} {cy} 0\n0 0 1 0\n0 0 0 1\n");
         write(&file("intrinsic/intrinsic_depth.txt"), matrix);
         write(&file("color/0.jpg"), bytes_of(RED_JPEG));
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
         assert_eq!((log.len(), log.stats().refused_poses.len(), log.stats().poses_without_scan), (10, 1, 1));
         assert_is_picture(&log, 9, 10);
         assert!(log.stats().colors_left_out.is_some());
@@ -225,7 +225,7 @@ mod tests {
         write(&folder.path().join("camera.json"), json());
         write(&folder.path().join("a.log"), trajectory(0..1));
         write(&folder.path().join("b.log"), trajectory(0..1));
-        let error = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap_err().to_string();
+        let error = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap_err().to_string();
         assert!(
             error.contains("the pose file is missing; looked for trajectory.log, one other .log"),
             "{error}"

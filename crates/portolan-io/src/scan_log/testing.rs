@@ -7,7 +7,7 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, RangeImage};
 
-use super::SpaceLog;
+use super::ScanLog;
 
 /// z of the wall (metres).
 pub(super) const WALL: f64 = 3.0;
@@ -100,7 +100,7 @@ pub(super) fn write(path: &Path, bytes: impl AsRef<[u8]>) {
 }
 
 /// The depth image of scan `i`.
-pub(super) fn image(log: &SpaceLog, i: usize) -> RangeImage {
+pub(super) fn image(log: &ScanLog, i: usize) -> RangeImage {
     match log.frame(i).unwrap() {
         Frame::Image(image) => image,
         Frame::Points(_) => panic!("a depth camera gives images"),
@@ -108,7 +108,7 @@ pub(super) fn image(log: &SpaceLog, i: usize) -> RangeImage {
 }
 
 /// Scan `k` of the log is picture `i`: its pose is, and its points lie in the wall (to half a unit and a f32's rounding).
-pub(super) fn assert_is_picture(log: &SpaceLog, k: usize, i: usize) {
+pub(super) fn assert_is_picture(log: &ScanLog, k: usize, i: usize) {
     let (pose, expected) = (log.pose(k), camera_pose(i));
     for p in [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]] {
         assert!(distance(pose.transform_point(p), expected.transform_point(p)) < 1e-6, "scan {k}: {pose:?}");

@@ -102,7 +102,7 @@ pub(super) fn size_within_limits(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::{grey_png, png_of};
+    use crate::scan_log::testing::{grey_png, png_of};
     use crate::testing::bad_bytes;
 
     fn read(bytes: &[u8]) -> Result<Depth, IoError> {

@@ -34,7 +34,7 @@ pub struct UnreadColors {
 /// Counts of a log of scans of space. Scans that are left out are those without pose, those at an unmatched time and those
 /// whose pose is refused.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct SpaceLogStats {
+pub struct ScanLogStats {
     /// Scans that were found.
     pub scans: u64,
     /// Scans that a list names and whose files are not there; they are not among `scans`.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use super::cloud_frames::{CloudFrames, Rays};
 use super::files::{has_extension, name_of, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{SpaceLogOptions, SpaceLogStats};
+use super::{ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
 use crate::error::shown;
@@ -46,13 +46,13 @@ fn conf_of(path: &Path) -> Option<PathBuf> {
     })
 }
 
-pub(super) fn open(path: &Path, _options: &SpaceLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoError> {
     let Some(conf) = conf_of(path) else {
         return Err(IoError::layout(path, "the .conf file", "missing or not the only one", "name it"));
     };
     let lines = read(&conf)?;
     let folder = conf.parent().unwrap_or(Path::new("."));
-    let mut stats = SpaceLogStats::default();
+    let mut stats = ScanLogStats::default();
     let (mut files, mut scans, mut poses) = (Vec::new(), Vec::new(), Vec::new());
     for Line { file, pose } in lines {
         let file = folder.join(file);

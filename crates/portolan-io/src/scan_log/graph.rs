@@ -10,7 +10,7 @@ use portolan::scan::Frame;
 use super::cloud_frames::{about, file_from_frames};
 use super::files::{has_extension, name_of};
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
-use super::{SpaceLogOptions, SpaceLogStats};
+use super::{ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::poses3::{PoseConvention, RawPose};
 use crate::scan_graph::{ScanGraphNode, read_scan_graph};
@@ -38,7 +38,7 @@ impl FrameSource for GraphFrames {
     }
 }
 
-pub(super) fn open(path: &Path, _options: &SpaceLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoError> {
     let nodes = read_scan_graph(path)?;
     let scan = |node: &ScanGraphNode| ScanId { path: path.into(), number: Some(node.id.into()), time: None };
     let pose = |node: &ScanGraphNode| {
@@ -54,6 +54,6 @@ pub(super) fn open(path: &Path, _options: &SpaceLogOptions) -> Result<Parts, IoE
         convention: PoseConvention::WorldFromSensor,
         posed_from_sensor: file_from_frames(base),
         camera: None,
-        stats: SpaceLogStats::default(),
+        stats: ScanLogStats::default(),
     })
 }

@@ -15,7 +15,7 @@ use portolan::geom::Pose;
 use super::cloud_frames::{CloudFrames, Rays};
 use super::files::{has_extension, has_name, name_of, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{SpaceLogOptions, SpaceLogStats};
+use super::{ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
 use crate::error::shown;
@@ -33,7 +33,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(&path.join("velodyne"), is_scan)
 }
 
-pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
     let folder = path.join("velodyne");
     let names = names_in(&folder, is_scan)?;
     let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
@@ -65,7 +65,7 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
         convention: PoseConvention::WorldFromSensor,
         posed_from_sensor: camera_from_lidar(path, options)?,
         camera: None,
-        stats: SpaceLogStats::default(),
+        stats: ScanLogStats::default(),
     })
 }
 
@@ -80,7 +80,7 @@ fn pose_file(path: &Path) -> Option<PathBuf> {
 }
 
 /// `Tr`; `None` where poses are the lidar's own.
-fn camera_from_lidar(path: &Path, options: &SpaceLogOptions) -> Result<Option<Pose<3>>, IoError> {
+fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pose<3>>, IoError> {
     if options.pose_convention.is_some() || options.poses.is_some() {
         return Ok(None);
     }

@@ -7,7 +7,7 @@ use portolan::geom::Pose;
 use portolan::scan::Frame;
 
 use super::files::names_in;
-use super::{Camera, SpaceLogStats, UnreadColors};
+use super::{Camera, ScanLogStats, UnreadColors};
 use crate::IoError;
 use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
 
@@ -65,7 +65,7 @@ pub(crate) struct Parts {
     /// The camera, if it is one.
     pub(crate) camera: Option<Camera>,
     /// What the format counted by itself.
-    pub(crate) stats: SpaceLogStats,
+    pub(crate) stats: ScanLogStats,
 }
 
 /// The pose in a file of its own; `None` where there is no such file.

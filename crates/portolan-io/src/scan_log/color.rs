@@ -155,7 +155,7 @@ fn read_png(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::{GREY_JPEG, RED_JPEG, bytes_of, png_of};
+    use crate::scan_log::testing::{GREY_JPEG, RED_JPEG, bytes_of, png_of};
     use crate::testing::bad_bytes;
     use png::BitDepth;
 

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use super::parts::Parts;
-use super::{SpaceLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
+use super::{ScanLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
 use crate::IoError;
 
 /// A kind of log of scans of space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum SpaceLogKind {
+pub enum ScanLogKind {
     /// A folder of `frame-NNNNNN.depth.png` with `frame-NNNNNN.pose.txt` (7-Scenes, 3DMatch).
     SevenScenes,
     /// A folder with `depth.txt`, `rgb.txt` and `groundtruth.txt` (TUM RGB-D, ETH3D SLAM).
@@ -34,10 +34,10 @@ struct Format {
     label: &'static str,
     /// Whether a file or folder is of this kind. Reads no more than a few names and bytes.
     is_it: fn(&Path) -> bool,
-    open: fn(&Path, &SpaceLogOptions) -> Result<Parts, IoError>,
+    open: fn(&Path, &ScanLogOptions) -> Result<Parts, IoError>,
 }
 
-impl SpaceLogKind {
+impl ScanLogKind {
     /// All kinds, in the order in which they are tried.
     pub const ALL: [Self; 8] = [
         Self::SevenScenes,
@@ -120,7 +120,7 @@ impl SpaceLogKind {
         Self::ALL.into_iter().find(|kind| (kind.format().is_it)(path))
     }
 
-    pub(super) fn parts(self, path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+    pub(super) fn parts(self, path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
         (self.format().open)(path, options)
     }
 }
@@ -131,22 +131,22 @@ mod tests {
 
     #[test]
     fn every_kind_has_a_word_of_its_own() {
-        for (i, kind) in SpaceLogKind::ALL.into_iter().enumerate() {
-            assert_eq!(SpaceLogKind::from_word(kind.word()), Some(kind));
-            assert!(SpaceLogKind::ALL[..i].iter().all(|other| other.label() != kind.label()));
+        for (i, kind) in ScanLogKind::ALL.into_iter().enumerate() {
+            assert_eq!(ScanLogKind::from_word(kind.word()), Some(kind));
+            assert!(ScanLogKind::ALL[..i].iter().all(|other| other.label() != kind.label()));
         }
-        assert_eq!(SpaceLogKind::from_word("rosbag"), None);
+        assert_eq!(ScanLogKind::from_word("rosbag"), None);
     }
 
     #[test]
     fn other_folders_are_no_logs() {
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(SpaceLogKind::recognise(folder.path()), None);
-        assert_eq!(SpaceLogKind::recognise(&folder.path().join("missing")), None);
+        assert_eq!(ScanLogKind::recognise(folder.path()), None);
+        assert_eq!(ScanLogKind::recognise(&folder.path().join("missing")), None);
         std::fs::create_dir(folder.path().join("depth")).unwrap();
         std::fs::write(folder.path().join("a.log"), "0 0 1\n").unwrap();
-        assert_eq!(SpaceLogKind::recognise(folder.path()), None);
+        assert_eq!(ScanLogKind::recognise(folder.path()), None);
         std::fs::write(folder.path().join("depth/0.png"), "").unwrap();
-        assert_eq!(SpaceLogKind::recognise(folder.path()), Some(SpaceLogKind::Redwood));
+        assert_eq!(ScanLogKind::recognise(folder.path()), Some(ScanLogKind::Redwood));
     }
 }

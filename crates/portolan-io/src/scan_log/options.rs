@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use super::{Intrinsics, SpaceLogKind};
+use super::{Intrinsics, ScanLogKind};
 use crate::poses3::PoseConvention;
 
 /// Settings of reading; the default leaves everything to the files.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpaceLogOptions {
+pub struct ScanLogOptions {
     /// The kind of log; default: recognised.
-    pub format: Option<SpaceLogKind>,
+    pub format: Option<ScanLogKind>,
     /// A pose file instead of what the layout has; its layout is told by the number of columns. Its poses are those of the
     /// sensor itself: where a layout poses another body (KITTI: a camera beside the lidar, with `Tr` between them), that is
     /// not applied to them.
@@ -29,7 +29,7 @@ pub struct SpaceLogOptions {
     pub time_tolerance: f64,
 }
 
-impl Default for SpaceLogOptions {
+impl Default for ScanLogOptions {
     fn default() -> Self {
         Self {
             format: None,

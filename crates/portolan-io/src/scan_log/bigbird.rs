@@ -12,7 +12,7 @@ use super::depth_frames::{DepthFrame, DepthFrames};
 use super::files::{has_name, name_of, names_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{CameraFrom, SpaceLogOptions, SpaceLogStats};
+use super::{CameraFrom, ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::poses3::{PoseConvention, read_poses_3d};
 
@@ -41,7 +41,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(&path.join(FOLDER), |name| angle_and_camera(name).is_some())
 }
 
-pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
     let folder = path.join(FOLDER);
     let mut names = names_in(&folder, |name| angle_and_camera(name).is_some())?;
     names.sort_by_key(|name| {
@@ -49,7 +49,7 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
     });
     let camera = find_camera(path, &["camera-intrinsics.txt"], Some(("BigBIRD", CAMERAS[0])), options)?;
     let one_for_all = !matches!(camera.from, CameraFrom::DataSet(_));
-    let mut stats = SpaceLogStats::default();
+    let mut stats = ScanLogStats::default();
     let mut frames = Vec::with_capacity(names.len());
     for (name, (_, c)) in names.iter().filter_map(|name| Some((name, angle_and_camera(name)?))) {
         let [fx, fy, cx, cy] = CAMERAS[c - 1];
@@ -77,8 +77,8 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::{SIZE, camera_pose, grey_png, image, matrix_text, write};
-    use crate::space_log::{Intrinsics, SpaceLog, SpaceLogKind};
+    use crate::scan_log::testing::{SIZE, camera_pose, grey_png, image, matrix_text, write};
+    use crate::scan_log::{Intrinsics, ScanLog, ScanLogKind};
     use crate::testing::real_data;
 
     #[test]
@@ -96,9 +96,9 @@ mod tests {
         write(&folder.path().join("pose/poses.txt"), poses);
         let pinhole = Pinhole { fx: 10.0, fy: 10.0, cx: 3.5, cy: 2.5 };
         let options =
-            SpaceLogOptions { intrinsics: Some(Intrinsics::Pinhole(pinhole)), ..SpaceLogOptions::default() };
-        let log = SpaceLog::open(folder.path(), &options).unwrap();
-        assert_eq!((log.kind(), log.len()), (SpaceLogKind::BigBird, 4));
+            ScanLogOptions { intrinsics: Some(Intrinsics::Pinhole(pinhole)), ..ScanLogOptions::default() };
+        let log = ScanLog::open(folder.path(), &options).unwrap();
+        assert_eq!((log.kind(), log.len()), (ScanLogKind::BigBird, 4));
         for i in 0..4 {
             assert_eq!(image(&log, i).values[0], 0.1 * (i + 1) as f32);
             let (found, expected) = (log.pose(i), camera_pose(i));
@@ -109,7 +109,7 @@ mod tests {
     }
 
     /// Median distance (metres) of some points of a view to the nearest point of the view beside it.
-    fn disagreement(log: &SpaceLog, a: usize, b: usize) -> f64 {
+    fn disagreement(log: &ScanLog, a: usize, b: usize) -> f64 {
         let world = |i: usize| -> Vec<[f64; 3]> {
             image(log, i).points().map(|(_, p)| log.pose(i).transform_point(p)).collect()
         };
@@ -126,13 +126,13 @@ mod tests {
     #[test]
     fn views_of_the_real_detergent_agree() {
         let Some(path) = real_data("rgbd_bigbird_detergent") else { return };
-        let log = SpaceLog::open(&path, &SpaceLogOptions::default()).unwrap();
+        let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
         assert_eq!((log.len(), log.stats().refused_poses.len()), (40, 0));
-        let options = SpaceLogOptions {
+        let options = ScanLogOptions {
             pose_convention: Some(PoseConvention::WorldFromSensor),
-            ..SpaceLogOptions::default()
+            ..ScanLogOptions::default()
         };
-        let other = SpaceLog::open(&path, &options).unwrap();
+        let other = ScanLog::open(&path, &options).unwrap();
         // Every view is 9 degrees from the next, the last from the first.
         for (a, b) in [(0, 1), (10, 11), (30, 31), (39, 0)] {
             let (right, wrong) = (disagreement(&log, a, b), disagreement(&other, a, b));

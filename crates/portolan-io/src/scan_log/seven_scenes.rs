@@ -10,7 +10,7 @@ use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
 use super::files::{has_name, name_of, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
-use super::{SpaceLogOptions, SpaceLogStats};
+use super::{ScanLogOptions, ScanLogStats};
 use crate::IoError;
 use crate::poses3::PoseConvention;
 
@@ -27,7 +27,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(path, is_depth)
 }
 
-pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
     let names = names_in(path, is_depth)?;
     let files = ["camera-intrinsics.txt", "../camera-intrinsics.txt"];
     let camera = find_camera(path, &files, Some(("7-Scenes", CAMERA)), options)?;
@@ -45,7 +45,7 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
             poses.push(pose_beside(&path.join(format!("{stem}{POSE}")))?);
         }
     }
-    let mut stats = SpaceLogStats::default();
+    let mut stats = ScanLogStats::default();
     if options.poses.is_none() {
         let name_of_scan = |pose: &str| Some(format!("{}{DEPTH}", pose.strip_suffix(POSE)?));
         stats.poses_without_scan = poses_beside_nothing(path, &names, name_of_scan)?;
@@ -66,14 +66,14 @@ pub(super) fn open(path: &Path, options: &SpaceLogOptions) -> Result<Parts, IoEr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space_log::testing::*;
-    use crate::space_log::{SpaceLog, SpaceLogKind};
+    use crate::scan_log::testing::*;
+    use crate::scan_log::{ScanLog, ScanLogKind};
     use crate::testing::{bad_bytes, real_data};
     use portolan::geom::vector::distance;
 
     /// Median distance (metres) along the ray between what two frames say of the same points: pixels of one, moved into the
     /// other and looked up there.
-    fn disagreement(log: &SpaceLog, a: usize, b: usize) -> f64 {
+    fn disagreement(log: &ScanLog, a: usize, b: usize) -> f64 {
         let [one, other] = [a, b].map(|i| image(log, i));
         let portolan::scan::Projection::Pinhole(camera) = other.projection else { panic!() };
         let b_from_a = log.pose(b).inverse() * *log.pose(a);
@@ -114,18 +114,18 @@ mod tests {
         for i in 0..12 {
             write_color(&folder.path().join(format!("frame-{:06}.color.png", 3 * i)), [i as u8, 2, 3]);
         }
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-        assert_eq!((log.kind(), log.len(), log.time_span()), (SpaceLogKind::SevenScenes, 12, None));
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
+        assert_eq!((log.kind(), log.len(), log.time_span()), (ScanLogKind::SevenScenes, 12, None));
         for i in 0..12 {
             assert_is_picture(&log, i, i);
             assert_eq!(image(&log, i).colors, [[i as u8, 2, 3]; 48]);
         }
         assert!((log.path_length() - 11.0 * 0.1f64.hypot(0.25)).abs() < 1e-9);
         assert!((log.extent().extent()[2] - 11.0 * 0.25).abs() < 1e-9);
-        let stats = SpaceLogStats { scans: 12, poses: 12, ..SpaceLogStats::default() };
-        assert_eq!(SpaceLogStats { worst_pose: 0.0, ..log.stats().clone() }, stats);
-        let options = SpaceLogOptions { color: false, ..SpaceLogOptions::default() };
-        assert!(image(&SpaceLog::open(folder.path(), &options).unwrap(), 0).colors.is_empty());
+        let stats = ScanLogStats { scans: 12, poses: 12, ..ScanLogStats::default() };
+        assert_eq!(ScanLogStats { worst_pose: 0.0, ..log.stats().clone() }, stats);
+        let options = ScanLogOptions { color: false, ..ScanLogOptions::default() };
+        assert!(image(&ScanLog::open(folder.path(), &options).unwrap(), 0).colors.is_empty());
     }
 
     #[test]
@@ -142,7 +142,7 @@ mod tests {
         off.rotation[2][2] += 1e-3;
         write(&file("frame-000015.pose.txt"), matrix_text(&off));
         write_color(&file("frame-000000.color.png"), [1, 2, 3]);
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
         assert_eq!(log.len(), 2);
         assert_is_picture(&log, 0, 0);
         assert_is_picture(&log, 1, 5);
@@ -162,7 +162,7 @@ mod tests {
     fn colors_of_another_size_are_left_out_and_said() {
         let folder = folder_of(2);
         write(&folder.path().join("frame-000003.color.jpg"), bytes_of(RED_JPEG));
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
         let why = log.stats().colors_left_out.as_deref().unwrap();
         assert_eq!(why, "they are 8 x 8 while the depth images are 8 x 6");
         assert!(image(&log, 1).colors.is_empty());
@@ -178,7 +178,7 @@ mod tests {
         write(&color(0), "no picture");
         write(&color(2).with_extension("jpg"), bytes_of(RED_JPEG));
         write(&color(3), &whole[..whole.len() - 20]);
-        let open = || SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
+        let open = || ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
         let log = open();
         assert_eq!((&log.stats().colors_left_out, log.unread_colors()), (&None, None));
         // In any order, and again: each picture counts once, the first is that of the log.
@@ -219,12 +219,12 @@ mod tests {
         let poses = folder.path().join("other.txt");
         let open = |text: String, convention| {
             write(&poses, text);
-            let options = SpaceLogOptions {
+            let options = ScanLogOptions {
                 poses: Some(poses.clone()),
                 pose_convention: convention,
-                ..SpaceLogOptions::default()
+                ..ScanLogOptions::default()
             };
-            SpaceLog::open(folder.path(), &options)
+            ScanLog::open(folder.path(), &options)
         };
         // As many as frames: in order. More: by the number of the frame.
         let backwards: String = [0, 1, 2, 3].map(|i| matrix_text(&camera_pose(i).inverse())).concat();
@@ -250,7 +250,7 @@ mod tests {
             let good = std::fs::read(&path).unwrap();
             for bytes in bad_bytes(&good, 7, 60) {
                 std::fs::write(&path, bytes).unwrap();
-                let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default());
+                let log = ScanLog::open(folder.path(), &ScanLogOptions::default());
                 let all =
                     log.and_then(|log| (0..log.len()).map(|i| log.frame(i)).collect::<Result<Vec<_>, _>>());
                 if let Err(e) = all {
@@ -266,14 +266,14 @@ mod tests {
     fn what_is_no_log_is_said() {
         let folder = tempfile::tempdir().unwrap();
         let open = |path: &Path, format| {
-            let options = SpaceLogOptions { format, ..SpaceLogOptions::default() };
-            SpaceLog::open(path, &options).unwrap_err().to_string()
+            let options = ScanLogOptions { format, ..ScanLogOptions::default() };
+            ScanLog::open(path, &options).unwrap_err().to_string()
         };
         let error = open(folder.path(), None);
         assert!(error.contains("the kind of log is not recognised; known are seven-scenes, tum"), "{error}");
         let error = open(&folder.path().join("none"), None);
         assert!(error.contains("none: cannot open it"), "{error}");
-        let error = open(folder.path(), Some(SpaceLogKind::SevenScenes));
+        let error = open(folder.path(), Some(ScanLogKind::SevenScenes));
         assert!(error.contains("the number of scans is 0"), "{error}");
         write_frame(folder.path(), 0, 0);
         write(&folder.path().join("camera-intrinsics.txt"), "10 12 3.5 2.5");
@@ -287,7 +287,7 @@ mod tests {
     fn a_camera_of_other_pictures_is_refused() {
         let folder = folder_of(1);
         std::fs::remove_file(folder.path().join("camera-intrinsics.txt")).unwrap();
-        let error = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap_err().to_string();
+        let error = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap_err().to_string();
         assert!(
             error.contains("the size of the picture is 8 x 6; the camera has its centre at 320"),
             "{error}"
@@ -297,8 +297,8 @@ mod tests {
     #[test]
     fn frames_of_the_real_kitchen_agree_in_the_world() {
         let Some(path) = real_data("rgbd_redkitchen") else { return };
-        let log = SpaceLog::open(&path, &SpaceLogOptions::default()).unwrap();
-        assert_eq!((log.kind(), log.len()), (SpaceLogKind::SevenScenes, 200));
+        let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
+        assert_eq!((log.kind(), log.len()), (ScanLogKind::SevenScenes, 200));
         assert_eq!(log.name(), "rgbd_redkitchen");
         assert!(log.stats().refused_poses.is_empty() && log.stats().mended_poses > 0);
         assert!(log.stats().worst_pose < 1e-3, "{}", log.stats().worst_pose);
@@ -328,11 +328,11 @@ mod tests {
         // Half a pixel at 2 m is 1.7 mm, the depth's own step there 3 mm.
         let right = disagreement(&log, 10, 11);
         assert!(right < 0.006, "{right}");
-        let options = SpaceLogOptions {
+        let options = ScanLogOptions {
             pose_convention: Some(PoseConvention::SensorFromWorld),
-            ..SpaceLogOptions::default()
+            ..ScanLogOptions::default()
         };
-        let wrong = disagreement(&SpaceLog::open(&path, &options).unwrap(), 10, 11);
+        let wrong = disagreement(&ScanLog::open(&path, &options).unwrap(), 10, 11);
         assert!(wrong > 2.0 * right, "{wrong} against {right}");
     }
 }
