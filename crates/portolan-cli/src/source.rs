@@ -79,7 +79,7 @@ impl Source {
             return file.colors_left_out().then(|| colors.into());
         }
         let Self::Server(map) = self else { return None };
-        let cells = map.unknown_grey_taken_for_free;
+        let cells = map.unknown_gray_taken_for_free;
         (cells > 0).then(|| {
             format!(
                 "{cells} cells have the grey of unknown (205 or 206) but count as free, because free_thresh is above \

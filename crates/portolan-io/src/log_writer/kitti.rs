@@ -8,7 +8,7 @@ use portolan::scan::{Frame, Origin};
 use super::{LogWriter, matrix_rows};
 use crate::{IoError, write_atomic};
 
-/// `calib.txt` has the projections of four cameras, which there are not, and `Tr`, which readers need.
+/// `calib.txt` has placeholders for the projections of four cameras, and `Tr`, which readers need.
 pub(super) fn texts(camera_from_lidar: &Pose<3>) -> Vec<(&'static str, String)> {
     let row = matrix_rows(camera_from_lidar).map(|r| r.join(" ")).join(" ");
     let projection = "1 0 0 0 0 1 0 0 0 0 1 0";
@@ -29,11 +29,11 @@ impl LogWriter {
             Frame::Image(image) => image.points().map(|(_, p)| p.map(|v| v as f32)).collect(),
             Frame::Points(scan) if scan.origin == Origin::Common([0.0; 3]) => scan.points.clone(),
             Frame::Points(_) => {
-                let advice = "KITTI's rays begin in the zero of the points; move the points and the pose";
+                let advice = "KITTI's rays begin at the origin of the points; move the points and the pose";
                 return Err(IoError::unwritable(
                     &path,
                     "the origin of rays",
-                    "not the zero of the points",
+                    "not at the origin of the points",
                     advice,
                 ));
             }
@@ -49,7 +49,7 @@ impl LogWriter {
         })?;
         let pose = matrix_rows(world_from_camera).map(|r| r.join(" ")).join(" ");
         self.text("poses.txt").push_str(&(pose + "\n"));
-        // As many digits as tell it apart: of an epoch stamp the seven of KITTI's own files leave minutes.
+        // The shortest digits that give the same double: of an epoch stamp the seven of KITTI's own files leave minutes.
         self.text("times.txt").push_str(&format!("{seconds:e}\n"));
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use portolan::geom::vector::{distance, dot, sub};
 
-/// So many points of a scan look for their neighbours among the others, of each of which so many are looked at.
+/// Points of a scan whose nearest neighbors are searched, and points of each other scan to search among.
 const QUERIES: usize = 64;
 /// See [`QUERIES`].
 const TARGETS: usize = 2000;

@@ -77,7 +77,7 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan_log::testing::{SIZE, camera_pose, grey_png, image, matrix_text, write};
+    use crate::scan_log::testing::{SIZE, camera_pose, gray_png, image, matrix_text, write};
     use crate::scan_log::{Intrinsics, ScanLog, ScanLogKind};
     use crate::testing::real_data;
 
@@ -88,7 +88,7 @@ mod tests {
         let mut poses = String::new();
         for (i, name) in names.iter().enumerate() {
             let path = folder.path().join(format!("masked_depth/{name}.png"));
-            write(&path, grey_png(SIZE, &[1000 * (i as u16 + 1); SIZE[0] * SIZE[1]]));
+            write(&path, gray_png(SIZE, &[1000 * (i as u16 + 1); SIZE[0] * SIZE[1]]));
             let mut pose = camera_pose(i);
             pose.rotation = pose.inverse().rotation;
             poses += &(matrix_text(&pose).replace('\n', " ") + "\n");

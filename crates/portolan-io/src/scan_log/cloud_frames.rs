@@ -29,7 +29,7 @@ pub(super) struct CloudFrames {
 
 impl CloudFrames {
     /// `format`: of all files; `None`: each file's own. The first file with points is looked at where files may hold points
-    /// far from their zero: all frames are about its offset, which [`CloudFrames::files_from_frames`] tells.
+    /// far from their zero: all frames are about its offset, which is [`CloudFrames::files_from_frames`].
     pub(super) fn new(files: Vec<PathBuf>, format: Option<PointFormat>, rays: Rays) -> Result<Self, IoError> {
         // These are never far: they hold nothing but floats.
         let looked_at = if format == Some(PointFormat::KittiBin) { &[][..] } else { &files };
@@ -135,7 +135,7 @@ fn range_scan(cloud: PointCloudFile, path: &Path) -> Result<PointScan, IoError> 
     Ok(scan)
 }
 
-/// How far above the highest point rays begin where there is no image: a hundredth of the scan's size.
+/// How far above the highest point rays begin without an image: a hundredth of the scan's size.
 fn height_above(points: &[[f32; 3]]) -> f32 {
     let extent = |k: usize| {
         let (low, high) = points.iter().fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));

@@ -3,9 +3,9 @@
 //!
 //! Which poses: those of `--poses`, else those of the only file in the folder whose name speaks of poses (`pose`, `traj`,
 //! `groundtruth`, `odom`). Without either, PCD files with viewpoints that differ are taken as **points in the world's frame
-//! seen from the viewpoint**: that is how the Point Cloud Library means it. `--pose-convention world-from-sensor` says that they are in the sensor's frame
+//! seen from the viewpoint**: that is how the Point Cloud Library means it. `--pose-convention world-from-sensor` declares them to be in the sensor's frame
 //! and that the viewpoints are its poses. What is assumed is checked on a few scans: where the other reading
-//! fits at least twice as well, opening fails and says so.
+//! fits at least twice as well, opening fails with that advice.
 
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ const ENDINGS: [(&str, PointFormat); 9] = [
     ("pts", PointFormat::Xyz),
     ("asc", PointFormat::Xyz),
 ];
-/// Endings that many things have: clouds where the caller says so.
+/// Endings of many kinds of files: clouds only where the caller chooses that format.
 const TEXT_ENDINGS: [(&str, PointFormat); 3] =
     [("csv", PointFormat::Xyz), ("txt", PointFormat::Xyz), ("dat", PointFormat::Xyz)];
 /// Folders below that clouds may be in.
@@ -41,7 +41,7 @@ const FOLDERS: [&str; 6] = ["pcd", "scans", "clouds", "lidar", "points", "velody
 /// What a file of poses is called.
 const POSE_WORDS: [&str; 4] = ["pose", "traj", "groundtruth", "odom"];
 const POSE_ENDINGS: [&str; 6] = ["txt", "csv", "tum", "log", "freiburg", "kitti"];
-/// So many scans are looked at to check what viewpoints mean.
+/// How many scans are read to check what viewpoints mean.
 const LOOKED_AT: usize = 12;
 
 pub(super) fn is_it(path: &Path) -> bool {
@@ -206,7 +206,7 @@ fn pose_file(path: &Path, folder: &Path) -> Result<Option<PathBuf>, IoError> {
     Ok(None)
 }
 
-/// Rays from the zero of the sensor's frame, or from where the caller says.
+/// Rays from the zero of the sensor's frame, or from the caller's origin.
 fn from_zero(files: &[PathBuf], options: &ScanLogOptions) -> Rays {
     Rays::From(vec![options.origin.unwrap_or([0.0; 3]); files.len()])
 }
@@ -217,7 +217,7 @@ fn in_place(files: &[PathBuf]) -> LayoutPoses {
     LayoutPoses::PerScan(files.iter().map(|file| Some((file.clone(), unmoved.clone()))).collect())
 }
 
-/// What the viewpoints of PCD files say, in a folder without poses.
+/// The poses that the viewpoints of PCD files give, in a folder without pose files.
 fn viewpoints(
     files: &[PathBuf],
     format: PointFormat,
@@ -267,7 +267,7 @@ fn check_viewpoints(files: &[PathBuf], viewpoints: &[Viewpoint]) -> Result<(), I
         let value = format!(
             "{unmoved:.3} m between scans taken as points of the world's frame, {posed:.3} m with viewpoints as poses"
         );
-        let advice = "say --pose-convention world-from-sensor to apply the viewpoints, or give --poses";
+        let advice = "give --pose-convention world-from-sensor to apply the viewpoints, or --poses";
         let folder = files[0].parent().unwrap_or(Path::new("."));
         return Err(IoError::layout(folder, "the median distance", value, advice));
     }

@@ -1,4 +1,4 @@
-//! Colour pictures beside depth images: JPEG and PNG.
+//! Color pictures beside depth images: JPEG and PNG.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 use super::depth_png::{damaged, read_picture, size_within_limits};
 use crate::IoError;
 
-/// Reads a colour picture, row by row. It must have `size` (columns and rows).
+/// Reads a color picture, row by row. It must have `size` (columns and rows).
 pub(super) fn read_color(path: &Path, size: [usize; 2]) -> Result<Vec<[u8; 3]>, IoError> {
     decode_color(path, &read_picture(path)?, size)
 }
@@ -29,7 +29,7 @@ fn decode_color(path: &Path, bytes: &[u8], size: [usize; 2]) -> Result<Vec<[u8; 
     }
 }
 
-/// Columns and rows of a colour picture; its pixels are not read.
+/// Columns and rows of a color picture; its pixels are not read.
 pub(super) fn color_size(path: &Path) -> Result<[usize; 2], IoError> {
     let bytes = read_picture(path)?;
     match Picture::open(path, &bytes)? {
@@ -44,11 +44,11 @@ enum Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// Reads the head of a picture; its kind is told by its first bytes.
+    /// Reads the head of a picture; its first bytes decide its kind.
     fn open(path: &Path, bytes: &'a [u8]) -> Result<Self, IoError> {
         match bytes {
             [0xff, 0xd8, ..] => {
-                // The decoder paints what is missing grey.
+                // The decoder paints what is missing gray.
                 if !has_end(bytes) {
                     return Err(damaged(path, "it ends early"));
                 }
@@ -69,7 +69,7 @@ impl<'a> Picture<'a> {
             }
             _ => {
                 let value = crate::error::shown(&bytes[..bytes.len().min(8)]);
-                Err(IoError::layout(path, "the start of the colour picture", value, "give JPEG or PNG"))
+                Err(IoError::layout(path, "the format of the color picture", value, "give JPEG or PNG"))
             }
         }
     }
@@ -91,7 +91,7 @@ fn check_size(path: &Path, found: [usize; 2], expected: [usize; 2]) -> Result<()
         return Ok(());
     }
     let advice = format!(
-        "the depth image is {} x {}; register the colours to it, or map with --no-color",
+        "the depth image is {} x {}; register the colors to it, or map with --no-color",
         expected[0], expected[1]
     );
     Err(IoError::layout(path, "the size of the picture", format!("{} x {}", found[0], found[1]), advice))
@@ -99,7 +99,7 @@ fn check_size(path: &Path, found: [usize; 2], expected: [usize; 2]) -> Result<()
 
 fn jpeg_size(path: &Path, decoder: &JpegDecoder<ZCursor<&[u8]>>) -> Result<[usize; 2], IoError> {
     let (w, h) = decoder.dimensions().ok_or_else(|| damaged(path, "it has no size"))?;
-    // How far a JPEG packs has no bound, so its length says nothing about its size.
+    // How far a JPEG packs has no bound, so its length does not limit its size.
     size_within_limits(path, w as u32, h as u32, usize::MAX, 1)
 }
 
@@ -123,7 +123,7 @@ fn read_jpeg(
     let pixels = columns * rows;
     if decoder.output_buffer_size() != Some(3 * pixels) {
         let channels = decoder.output_buffer_size().unwrap_or(0) / pixels;
-        return Err(IoError::layout(path, "the number of channels", channels.to_string(), "give colour"));
+        return Err(IoError::layout(path, "the number of channels", channels.to_string(), "give color"));
     }
     let mut colors = vec![[0; 3]; pixels];
     decoder.decode_into(colors.as_flattened_mut()).map_err(|e| damaged(path, &one_line(&e)))?;
@@ -188,9 +188,9 @@ mod tests {
     fn what_is_no_picture_is_refused() {
         let red = bytes_of(RED_JPEG);
         for (bytes, part) in [
-            (&b"GIF89a"[..], "the start of the colour picture is \"GIF89a\"; give JPEG or PNG"),
+            (&b"GIF89a"[..], "the start of the color picture is \"GIF89a\"; give JPEG or PNG"),
             (&[0xff, 0xd8, 0xff, 0xd9], "the picture is damaged ("),
-            (b"", "the start of the colour picture is missing"),
+            (b"", "the start of the color picture is missing"),
             (&red[..red.len() - 2], "the picture is damaged (it ends early); copy"),
             (&red, "the size of the picture is 8 x 8; the depth image is 4 x 4"),
         ] {

@@ -1,6 +1,6 @@
-//! The scans of a depth camera: a depth image each, perhaps with a colour picture.
+//! The scans of a depth camera: a depth image each, perhaps with a color picture.
 //!
-//! Depth does not depend on colours: where a picture is damaged or has another size, the frame has its depth and no colours,
+//! Depth does not depend on colors: where a picture is damaged or has another size, the frame has its depth and no colors,
 //! and the picture is counted.
 
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use crate::IoError;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct DepthFrame {
     pub(super) depth: PathBuf,
-    /// Its colour picture, of the same pixels.
+    /// Its color picture, of the same pixels.
     pub(super) color: Option<PathBuf>,
     pub(super) pinhole: Pinhole,
 }
@@ -28,17 +28,17 @@ pub(super) struct DepthFrame {
 pub(super) struct DepthFrames {
     frames: Vec<DepthFrame>,
     units_per_metre: f64,
-    /// Why colours of frames that were read could not be, by frame: the same after any order of reading.
+    /// Why colors of frames that were read could not be, by frame: the same after any order of reading.
     unread_colors: Mutex<BTreeMap<usize, String>>,
 }
 
-/// So many colour pictures are tried at the opening of a log.
+/// How many color pictures are read when a log is opened.
 const COLORS_LOOKED_AT: usize = 16;
 
 impl DepthFrames {
     /// `units_per_metre` is the format's, which the caller may overrule. The first pictures are looked at: a camera of
-    /// another size, or depth of another kind, fails here and not in the middle of the log; colours of another size than
-    /// the depth, or of which none of the first can be read, are left out, and said so in `stats`.
+    /// another size, or depth of another kind, fails here and not in the middle of the log; colors of another size than
+    /// the depth, or of which the first cannot be read, are left out, and `stats` has the reason.
     pub(super) fn new(
         mut frames: Vec<DepthFrame>,
         camera: &Camera,
@@ -67,7 +67,7 @@ impl DepthFrames {
     }
 }
 
-/// Why the colours that are there are not used: what the first that can be read tells.
+/// Why existing color pictures are not used, by the first that can be read.
 fn why_no_colors(frames: &[DepthFrame]) -> Result<Option<String>, IoError> {
     let mut why = None;
     let pictures = frames.iter().filter_map(|f| Some((&f.depth, f.color.as_ref()?)));
@@ -79,14 +79,14 @@ fn why_no_colors(frames: &[DepthFrame]) -> Result<Option<String>, IoError> {
                 return Ok(other.then(|| format!("they are {x} x {y} while the depth images are {w} x {h}")));
             }
             Err(error) => {
-                why.get_or_insert_with(|| format!("none of the first can be read: {error}"));
+                why.get_or_insert_with(|| format!("the first of them cannot be read: {error}"));
             }
         }
     }
     Ok(why)
 }
 
-/// The colour picture of a name in a folder, whatever it is packed with.
+/// The color picture of a name in a folder, whatever it is packed with.
 pub(super) fn color_beside(folder: &Path, stem: &str) -> Option<PathBuf> {
     let names = ["jpg", "png", "jpeg"].map(|extension| folder.join(format!("{stem}.{extension}")));
     names.into_iter().find(|path| path.is_file())

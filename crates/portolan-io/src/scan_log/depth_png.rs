@@ -1,4 +1,4 @@
-//! Depth images: PNG pictures of 16-bit grey.
+//! Depth images: PNG pictures of 16-bit gray.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -17,7 +17,7 @@ const MOST_BYTES: u64 = 256 << 20;
 /// Deflate packs at most so many bytes into one.
 const TIGHTEST: u64 = 1032;
 
-/// A depth image in metres; 0 where there is no reading.
+/// A depth image in metres; 0 for pixels without a reading.
 pub(super) struct Depth {
     pub(super) columns: usize,
     pub(super) rows: usize,
@@ -76,7 +76,7 @@ pub(super) fn damaged(path: &Path, why: &str) -> IoError {
 fn depth_size(path: &Path, info: &Info<'_>, file_bytes: usize) -> Result<[usize; 2], IoError> {
     if (info.color_type, info.bit_depth) != (ColorType::Grayscale, BitDepth::Sixteen) {
         let value = format!("{:?} of {} bits", info.color_type, info.bit_depth as u8);
-        return Err(IoError::layout(path, "the depth image", value, "give 16-bit grey"));
+        return Err(IoError::layout(path, "the depth image", value, "give 16-bit gray"));
     }
     size_within_limits(path, info.width, info.height, file_bytes, 2)
 }
@@ -102,7 +102,7 @@ pub(super) fn size_within_limits(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan_log::testing::{grey_png, png_of};
+    use crate::scan_log::testing::{gray_png, png_of};
     use crate::testing::bad_bytes;
 
     fn read(bytes: &[u8]) -> Result<Depth, IoError> {
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn units_become_metres_and_what_is_no_reading_is_zero() {
-        let depth = read(&grey_png([3, 2], &[0, 1, 1500, u16::MAX, 65534, 40_001])).unwrap();
+        let depth = read(&gray_png([3, 2], &[0, 1, 1500, u16::MAX, 65534, 40_001])).unwrap();
         assert_eq!((depth.columns, depth.rows), (3, 2));
         assert_eq!(depth.values, [0.0, 0.001, 1.5, 0.0, 65.534, 40.001]);
     }
@@ -120,14 +120,14 @@ mod tests {
     fn other_pictures_are_refused() {
         let eight = png_of([2, 1], ColorType::Grayscale, BitDepth::Eight, &[1, 2]);
         let colored = png_of([1, 1], ColorType::Rgb, BitDepth::Sixteen, &[1; 6]);
-        let whole = grey_png([9, 9], &[7; 81]);
+        let whole = gray_png([9, 9], &[7; 81]);
         // A size that the bytes cannot hold: 30000 x 30000.
         let mut vast = whole.clone();
         vast[16..24].copy_from_slice(&[0, 0, 0x75, 0x30, 0, 0, 0x75, 0x30]);
         let crc = crc_of_header(&vast);
         vast[29..33].copy_from_slice(&crc);
         for (bytes, part) in [
-            (&eight[..], "d.png: the depth image is Grayscale of 8 bits; give 16-bit grey"),
+            (&eight[..], "d.png: the depth image is Grayscale of 8 bits; give 16-bit gray"),
             (&colored, "the depth image is Rgb of 16 bits"),
             (&vast, "the size of the picture is 30000 x 30000 in"),
             (b"P5", "the picture is damaged"),

@@ -9,7 +9,7 @@ use crate::IoError;
 /// The most files of a folder that are looked at.
 const MOST_FILES: usize = 1 << 21;
 
-/// The names in a folder that `wanted` says yes to, in natural order (`scan2` before `scan10`).
+/// The names in a folder for which `wanted` is true, in natural order (`scan2` before `scan10`).
 ///
 /// # Errors
 /// [`IoError::Os`] where the folder cannot be read, [`IoError::Layout`] for one with millions of files.
@@ -22,7 +22,7 @@ pub(crate) fn names_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<V
             return Err(IoError::layout(folder, "the number of files", value, "split the folder"));
         }
         let entry = entry.map_err(|e| IoError::os(folder, "list it", e))?;
-        // A name that is not Unicode is none of ours.
+        // The names of all formats are Unicode.
         if let Ok(name) = entry.file_name().into_string()
             && wanted(&name)
         {
@@ -33,7 +33,7 @@ pub(crate) fn names_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<V
     Ok(names)
 }
 
-/// Whether a folder has a name that `wanted` says yes to. No for what is no folder.
+/// Whether a folder has a name for which `wanted` is true. `false` for a path that is not a folder.
 pub(crate) fn has_name(folder: &Path, wanted: impl Fn(&str) -> bool) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else { return false };
     entries.take(MOST_FILES).flatten().any(|entry| entry.file_name().to_str().is_some_and(&wanted))

@@ -10,7 +10,7 @@ use super::ScanLogOptions;
 use crate::IoError;
 use crate::bytes::{open, parse_f64};
 
-/// What a caller says about the camera.
+/// The camera that a caller gives.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Intrinsics {
     /// The numbers themselves.
@@ -68,7 +68,7 @@ pub struct Camera {
     pub pinhole: Pinhole,
     /// Where they come from.
     pub from: CameraFrom,
-    /// Columns and rows of the pictures that they are for, if the file says so.
+    /// Columns and rows of the pictures that they are for, if the file has them.
     pub size: Option<[usize; 2]>,
 }
 
@@ -90,7 +90,7 @@ impl Camera {
                 format!("the camera is for {w} x {h}; give the depth camera with --intrinsics")
             }
             (None, _) => format!(
-                "the camera has its centre at {cx}, {cy}; give the camera of the depth images with --intrinsics"
+                "the camera has its center at {cx}, {cy}; give the camera of the depth images with --intrinsics"
             ),
         };
         Err(IoError::layout(picture, "the size of the picture", format!("{} x {}", size[0], size[1]), advice))
@@ -101,7 +101,7 @@ impl Camera {
 /// publish.
 ///
 /// # Errors
-/// [`IoError::Layout`] where there is none of them, and the errors of reading.
+/// [`IoError::Layout`] where the camera is unknown, and the errors of reading.
 pub(super) fn find_camera(
     folder: &Path,
     files: &[&str],
@@ -116,7 +116,7 @@ pub(super) fn find_camera(
     }
     let Some((name, [fx, fy, cx, cy])) = published else {
         let advice = format!("give fx,fy,cx,cy or a file with --intrinsics, or put it at {}", files[0]);
-        return Err(IoError::layout(folder, "the camera", "not known", advice));
+        return Err(IoError::layout(folder, "the camera", "unknown", advice));
     };
     Ok(Camera { pinhole: Pinhole { fx, fy, cx, cy }, from: CameraFrom::DataSet(name), size: None })
 }
@@ -132,7 +132,8 @@ fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
         IoError::layout(path, "the camera matrix", value, advice)
     };
     let (numbers, size) = if text.trim_start().starts_with('{') {
-        let json: Value = serde_json::from_str(&text).map_err(|e| unreadable(&format!("no json ({e})")))?;
+        let json: Value =
+            serde_json::from_str(&text).map_err(|e| unreadable(&format!("not readable as json ({e})")))?;
         of_json(&json).ok_or_else(|| unreadable("not in the json"))?
     } else {
         let lines = text.lines().map(|line| line.split('#').next().unwrap_or(""));
@@ -141,7 +142,7 @@ fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
             words.filter(|w| !w.is_empty()).take(17).map(|w| parse_f64(w.as_bytes())).collect();
         (numbers.ok_or_else(|| unreadable("not all numbers"))?, None)
     };
-    // Skew is what the pinhole camera here does not have.
+    // The pinhole camera here has no skew.
     let ([fx, fy, cx, cy], skew) = match *numbers {
         [fx, fy, cx, cy] => ([fx, fy, cx, cy], 0.0),
         [fx, skew, cx, a, fy, cy, b, c, _] | [fx, skew, cx, _, a, fy, cy, _, b, c, _, _, _, _, _, _]
@@ -150,7 +151,12 @@ fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
             ([fx, fy, cx, cy], skew)
         }
         [fx, 0.0, 0.0, skew, fy, 0.0, cx, cy, _] => ([fx, fy, cx, cy], skew),
-        _ => return Err(unreadable(&format!("{} numbers that are none", numbers.len()))),
+        _ => {
+            return Err(unreadable(&format!(
+                "{} numbers that are not the layout of a camera matrix",
+                numbers.len()
+            )));
+        }
     };
     if skew.abs() > 1e-3 * fx.abs() {
         return Err(IoError::layout(path, "the skew", skew.to_string(), "give a camera without skew"));

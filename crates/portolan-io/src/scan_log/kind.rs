@@ -1,4 +1,4 @@
-//! The kinds of logs: their words, what recognises them, what opens them.
+//! The kinds of logs: their names, and the functions that recognize and open them.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use super::parts::Parts;
 use super::{ScanLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
 use crate::IoError;
 
-/// A kind of log of scans of space.
+/// A kind of log of 3-D scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ScanLogKind {
@@ -28,7 +28,7 @@ pub enum ScanLogKind {
     Clouds,
 }
 
-/// What the crate knows of a kind.
+/// The names and functions of a kind.
 struct Format {
     word: &'static str,
     label: &'static str,
@@ -115,8 +115,8 @@ impl ScanLogKind {
         self.format().label
     }
 
-    /// The kind of a file or folder by its layout, names and first bytes; `None` where it is no such log.
-    pub fn recognise(path: &Path) -> Option<Self> {
+    /// The kind of a file or folder by its layout, names and first bytes; `None` for anything else.
+    pub fn recognize(path: &Path) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| (kind.format().is_it)(path))
     }
 
@@ -141,12 +141,12 @@ mod tests {
     #[test]
     fn other_folders_are_no_logs() {
         let folder = tempfile::tempdir().unwrap();
-        assert_eq!(ScanLogKind::recognise(folder.path()), None);
-        assert_eq!(ScanLogKind::recognise(&folder.path().join("missing")), None);
+        assert_eq!(ScanLogKind::recognize(folder.path()), None);
+        assert_eq!(ScanLogKind::recognize(&folder.path().join("missing")), None);
         std::fs::create_dir(folder.path().join("depth")).unwrap();
         std::fs::write(folder.path().join("a.log"), "0 0 1\n").unwrap();
-        assert_eq!(ScanLogKind::recognise(folder.path()), None);
+        assert_eq!(ScanLogKind::recognize(folder.path()), None);
         std::fs::write(folder.path().join("depth/0.png"), "").unwrap();
-        assert_eq!(ScanLogKind::recognise(folder.path()), Some(ScanLogKind::Redwood));
+        assert_eq!(ScanLogKind::recognize(folder.path()), Some(ScanLogKind::Redwood));
     }
 }

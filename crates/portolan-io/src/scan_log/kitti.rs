@@ -6,7 +6,7 @@
 //! apart, as `poses/00.txt` beside `sequences/00`: they are looked for there too. Times are seconds since the first scan.
 //!
 //! Poses that the caller names (`--poses`) are the lidar's own, as those of SLAM and odometry are, and so are all poses
-//! where the caller says what they mean (`--pose-convention`): then `Tr` is not applied, whether `calib.txt` is there or not.
+//! where the caller gives a convention (`--pose-convention`): then `Tr` is not applied, whether `calib.txt` is there or not.
 
 use std::path::{Path, PathBuf};
 
@@ -87,7 +87,7 @@ fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pos
     let file = path.join("calib.txt");
     if !file.is_file() {
         // A camera does not look where the lidar does.
-        let advice = "put calib.txt (with a line Tr) there, or say --pose-convention world-from-sensor where poses are the lidar's own";
+        let advice = "put calib.txt (with a line Tr) there, or give --pose-convention world-from-sensor where poses are the lidar's own";
         return Err(IoError::layout(path, "calib.txt", "missing", advice));
     }
     read_transform(&file).map(Some)
@@ -115,7 +115,7 @@ fn read_transform(path: &Path) -> Result<Pose<3>, IoError> {
         let resolved = raw.resolve(PoseConvention::WorldFromSensor);
         return resolved.map(|(pose, _)| pose).map_err(|fault| bad(&fault.to_string()));
     }
-    let advice = "write a line Tr: with twelve numbers, or say --pose-convention world-from-sensor where poses are the lidar's own";
+    let advice = "write a line Tr: with twelve numbers, or give --pose-convention world-from-sensor where poses are the lidar's own";
     Err(IoError::text(path, lines.number(), "Tr", "missing", advice))
 }
 
@@ -128,7 +128,13 @@ fn read_times(path: &Path) -> Result<Vec<f64>, IoError> {
         let Some(line) = lines.next_line()? else { break };
         let Some(word) = fields(line).next() else { continue };
         let Some(time) = parse_f64(word).filter(|t| t.is_finite()) else {
-            return Err(IoError::text(path, number, "a time", shown(word), "write seconds, one scan a line"));
+            return Err(IoError::text(
+                path,
+                number,
+                "a time",
+                shown(word),
+                "write seconds, one line per scan",
+            ));
         };
         if times.len() == MOST_TIMES {
             let value = format!("more than {MOST_TIMES}");

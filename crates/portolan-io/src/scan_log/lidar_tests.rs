@@ -154,7 +154,7 @@ fn names_that_are_times_are_matched_by_time() {
     let path = folder.path();
     fs::write(path.join("poses.tum"), &tum).unwrap();
     fs::write(path.join("1700000000500000000.csv"), "x,y,z\n1,2,3\n").unwrap();
-    assert_eq!(ScanLogKind::recognise(path), None);
+    assert_eq!(ScanLogKind::recognize(path), None);
     let log =
         ScanLog::open(path, &ScanLogOptions { format: Some(ScanLogKind::Clouds), ..Default::default() });
     assert!(distance(world(&log.unwrap(), 0)[0], [10.6, 2.0, 3.0]) < 1e-4);
@@ -251,7 +251,7 @@ fn an_empty_first_cloud_and_one_elsewhere_do_not_cost_the_others_digits() {
 }
 
 #[test]
-fn organised_clouds_keep_the_rows_and_columns_of_their_sensor() {
+fn organized_clouds_keep_the_rows_and_columns_of_their_sensor() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.pcd");
     let sensor = [10.0, -3.0, 1.5];
@@ -306,7 +306,7 @@ fn what_viewpoints_mean_is_checked_on_the_points() {
             }
             Err(error) => {
                 let error = error.to_string();
-                assert!(!in_world && error.contains("say --pose-convention world-from-sensor"), "{error}");
+                assert!(!in_world && error.contains("give --pose-convention world-from-sensor"), "{error}");
             }
         }
     }
@@ -318,7 +318,7 @@ fn what_is_no_cloud_is_not_taken_for_one() {
     let kind = |name: &str, bytes: &[u8]| {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
-        ScanLogKind::recognise(&path)
+        ScanLogKind::recognize(&path)
     };
     let mesh = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nelement face 1\nproperty list int int vertex_index\n\
                  end_header\n";

@@ -1,4 +1,4 @@
-//! A log whose poses are known and whose scans are read when they are asked for.
+//! A log with its poses in memory, whose scans are read on request.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ struct Entry {
     time: Option<f64>,
 }
 
-/// Scans of space with their poses. Scans are read by index when they are asked for, from any thread; only the poses are in
+/// A log of 3-D scans with their poses. Scans are read by index on request, from any thread; only the poses are in
 /// memory.
 pub struct ScanLog {
     path: PathBuf,
@@ -37,17 +37,17 @@ impl ScanLog {
     /// Opens a log: finds its scans, reads its poses, matches them.
     ///
     /// # Errors
-    /// [`IoError::Layout`] where the kind is not recognised, files are missing or do not fit together, or no scan has a
+    /// [`IoError::Layout`] where the kind is not recognized, files are missing or do not fit together, or no scan has a
     /// usable pose; the errors of reading what holds the poses and the camera.
     pub fn open(path: &Path, options: &ScanLogOptions) -> Result<Self, IoError> {
-        // The system's own words for a path that is not there.
+        // A missing path gets the system's own error.
         std::fs::metadata(path).map_err(|e| IoError::os(path, "open it", e))?;
-        let kind = options.format.or_else(|| ScanLogKind::recognise(path)).ok_or_else(|| {
+        let kind = options.format.or_else(|| ScanLogKind::recognize(path)).ok_or_else(|| {
             let advice = format!(
-                "known are {}; force one with --format",
+                "the kinds are {}; choose one with --format",
                 ScanLogKind::ALL.map(ScanLogKind::word).join(", ")
             );
-            IoError::layout(path, "the kind of log", "not recognised", advice)
+            IoError::layout(path, "the kind of log", "not recognized", advice)
         })?;
         let parts = kind.parts(path, options)?;
         Self::assemble(path, kind, parts, options)
@@ -89,7 +89,7 @@ impl ScanLog {
             let value = format!("0 of {}", scans.len());
             let advice = match stats.refused_poses.first() {
                 Some(first) => format!("the first refused pose: {first}"),
-                None => "none of them has a pose".into(),
+                None => "give poses with --poses: no scan has one".into(),
             };
             return Err(IoError::layout(path, "the number of scans with a usable pose", value, advice));
         }
@@ -123,33 +123,33 @@ impl ScanLog {
         self.entries.len()
     }
 
-    /// The pose of scan `i`, `world_from_sensor`. Panics where there is no such scan.
+    /// The pose of scan `i`, `world_from_sensor`. Panics for an `i` beyond the last.
     pub fn pose(&self, i: usize) -> &Pose<3> {
         &self.entries[i].world_from_sensor
     }
 
     /// Where the sensor stood in the world when it took scan `i` (metres). Not always the pose's translation: clouds that are
-    /// in the world's frame already have the identity as their pose. Panics where there is no such scan.
+    /// in the world's frame already have the identity as their pose. Panics for an `i` beyond the last.
     pub fn sensor_position(&self, i: usize) -> [f64; 3] {
         let entry = &self.entries[i];
         entry.world_from_sensor.transform_point(self.source.origin(entry.place))
     }
 
-    /// The stamp of scan `i` (seconds of some clock), if there is one. Panics where there is no such scan.
+    /// The stamp of scan `i` (seconds of some clock), if there is one. Panics for an `i` beyond the last.
     pub fn time(&self, i: usize) -> Option<f64> {
         self.entries[i].time
     }
 
-    /// Reads scan `i`. Panics where there is no such scan.
+    /// Reads scan `i`. Panics for an `i` beyond the last.
     ///
     /// # Errors
-    /// [`IoError`] where its file cannot be read or is damaged. A colour picture beside a depth image is no reason: the frame
-    /// is without colours then, and [`ScanLog::unread_colors`] says so.
+    /// [`IoError`] where its file cannot be read or is damaged. A damaged color picture beside a depth image is not an error: the frame
+    /// is without colors then, and [`ScanLog::unread_colors`] counts it.
     pub fn frame(&self, i: usize) -> Result<Frame, IoError> {
         self.source.frame(self.entries[i].place)
     }
 
-    /// The colour pictures that could not be read, among the frames that were read so far: they are found only then, so that
+    /// The color pictures that could not be read, among the frames that were read so far: they are found only then, so that
     /// this is to be asked after the last. `None` where all could.
     pub fn unread_colors(&self) -> Option<UnreadColors> {
         self.source.unread_colors()

@@ -9,7 +9,7 @@ use super::stats::ScanLogStats;
 use crate::IoError;
 use crate::poses3::{TimedPoses, TrackPose};
 
-/// What became of a scan.
+/// The result of matching a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Match {
     /// Its pose, and the pose's own stamp.
@@ -27,7 +27,7 @@ pub(super) enum Match {
 /// 4. by the number in the scan's file name, which is its pose's place in the file, where no number is beyond the poses.
 ///
 /// # Errors
-/// [`IoError::Layout`] where none of these fits, or no time does.
+/// [`IoError::Layout`] where no rule applies, or no time fits.
 pub(super) fn match_poses(
     scans: &[ScanId],
     track: &[TrackPose],
@@ -77,7 +77,7 @@ pub(super) fn nearest_in_time<T>(sorted: &[(f64, T)], time: f64, tolerance: f64)
     (off(&best) <= tolerance).then_some(&best.1)
 }
 
-/// The times of the scans, where all have one and they are not all one (zero, in logs that have none).
+/// The times of the scans, where all have one and they differ (logs without times may have all zero).
 fn times_of(scans: &[ScanId]) -> Option<Vec<f64>> {
     let times: Vec<f64> = scans.iter().map(|s| s.time).collect::<Option<_>>()?;
     (times.len() == 1 || times.iter().any(|t| *t != times[0])).then_some(times)
@@ -170,7 +170,7 @@ mod tests {
             found(&scans(&[0, 2, 5], None), &track(6, Some(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]))).unwrap();
         assert_eq!(x, [Some(0.0), Some(2.0), Some(5.0)]);
         assert_eq!((stats.poses_without_scan, stats.scans_without_pose), (3, 0));
-        // A number beyond the poses, or one twice, says nothing.
+        // Numbers beyond the poses, and repeated ones, are not used.
         assert!(found(&scans(&[0, 2, 6], None), &track(6, None)).is_err());
         assert!(found(&scans(&[0, 2, 2], None), &track(6, None)).is_err());
         // As many: in order, whatever the numbers.

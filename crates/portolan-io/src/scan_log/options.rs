@@ -1,4 +1,4 @@
-//! What a caller may say about a log that its files do not say.
+//! What a caller may specify about a log.
 
 use std::path::PathBuf;
 
@@ -8,22 +8,22 @@ use crate::poses3::PoseConvention;
 /// Settings of reading; the default leaves everything to the files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanLogOptions {
-    /// The kind of log; default: recognised.
+    /// The kind of log; default: recognized.
     pub format: Option<ScanLogKind>,
-    /// A pose file instead of what the layout has; its layout is told by the number of columns. Its poses are those of the
+    /// A pose file instead of what the layout has; the number of columns decides its layout. Its poses are those of the
     /// sensor itself: where a layout poses another body (KITTI: a camera beside the lidar, with `Tr` between them), that is
     /// not applied to them.
     pub poses: Option<PathBuf>,
-    /// What the numbers of the poses mean; default: what the format says, and world from sensor for `poses`.
+    /// What the numbers of the poses mean; default: the format's, and world from sensor for `poses`.
     pub pose_convention: Option<PoseConvention>,
     /// Where rays begin in the frame of a cloud's points (metres), for lidars whose zero is not the sensor and for single clouds
     /// in the world's frame; default: the viewpoint of a PCD file where points are in the world's frame, else zero.
     pub origin: Option<[f64; 3]>,
     /// The camera instead of what the layout has.
     pub intrinsics: Option<Intrinsics>,
-    /// Units of a depth image per metre (1000: millimetres); default: what the format says.
+    /// Units of a depth image per metre (1000: millimetres); default: the format's.
     pub depth_scale: Option<f64>,
-    /// Whether colours are read where there are some. Default: yes.
+    /// Whether colors are read where the log has them. Default: yes.
     pub color: bool,
     /// How far a pose's time may lie from a scan's (seconds). Default 0.02, as in TUM's tools.
     pub time_tolerance: f64,

@@ -21,7 +21,7 @@ pub(crate) trait FrameSource: Send + Sync {
         [0.0; 3]
     }
 
-    /// Colour pictures that could not be read so far.
+    /// Color pictures that could not be read so far.
     fn unread_colors(&self) -> Option<UnreadColors> {
         None
     }
@@ -40,7 +40,7 @@ pub(crate) struct ScanId {
 
 /// Where the poses of a layout are.
 pub(crate) enum LayoutPoses {
-    /// Nowhere: the text says what was looked for. `--poses` must tell.
+    /// Not found: the text lists what was looked for. `--poses` must name them.
     Missing(String),
     /// One per scan, with the file that holds it.
     PerScan(Vec<Option<(PathBuf, RawPose)>>),
@@ -68,7 +68,7 @@ pub(crate) struct Parts {
     pub(crate) stats: ScanLogStats,
 }
 
-/// The pose in a file of its own; `None` where there is no such file.
+/// The pose in a file of its own; `None` where the file is missing.
 pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>, IoError> {
     if !path.exists() {
         return Ok(None);
@@ -82,7 +82,7 @@ pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>, IoE
 }
 
 /// How many files of poses, one each, lie in a folder beside no scan. `name_of_scan` makes the name of a scan of that of a
-/// pose, and tells other files by `None`.
+/// pose, and is `None` for other files.
 pub(super) fn poses_beside_nothing(
     folder: &Path,
     scans: &[String],

@@ -1,11 +1,11 @@
 //! Redwood *(Choi, Zhou, Koltun 2015)* and Open3D, and ScanNet *(Dai et al. 2017)*, which differs in its poses: pictures in
 //! folders.
 //!
-//! `depth/*.png` in millimetres, colours in `color`, `image` or `rgb`. Poses in `trajectory.log` (else in the only other
+//! `depth/*.png` in millimetres, colors in `color`, `image` or `rgb`. Poses in `trajectory.log` (else in the only other
 //! `.log` that is there), or one per picture in `pose/*.txt`. The camera in Open3D's json or in ScanNet's
 //! `intrinsic/intrinsic_depth.txt`, else Open3D's default for this kind of sensor: 525, 525, 319.5, 239.5.
 //!
-//! Redwood names a picture `number-microseconds`. Its colours are numbered by themselves, so that they are matched by time.
+//! Redwood names a picture `number-microseconds`. Its colors are numbered by themselves, so that they are matched by time.
 
 use std::path::{Path, PathBuf};
 
@@ -110,15 +110,15 @@ fn poses_of(path: &Path, names: &[String], options: &ScanLogOptions) -> Result<L
     }
 }
 
-/// The colour pictures: of the same name, else of the nearest time, else in order where there are as many.
+/// The color pictures: of the same name, else of the nearest time, else in order where there are as many.
 fn colors_of(
     path: &Path,
     depths: &[String],
     options: &ScanLogOptions,
 ) -> Result<Vec<Option<PathBuf>>, IoError> {
-    let none = vec![None; depths.len()];
+    let without_colors = vec![None; depths.len()];
     let folder = COLOR_FOLDERS.iter().map(|name| path.join(name)).find(|folder| folder.is_dir());
-    let Some(folder) = folder.filter(|_| options.color) else { return Ok(none) };
+    let Some(folder) = folder.filter(|_| options.color) else { return Ok(without_colors) };
     let stem = |name: &str| name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned();
     let same: Vec<_> = depths.iter().map(|name| color_beside(&folder, &stem(name))).collect();
     let is_picture = |name: &str| ["jpg", "jpeg", "png"].iter().any(|e| has_extension(name, e));
@@ -165,7 +165,7 @@ mod tests {
         }
         write(&file("camera_intrinsic.json"), json());
         write(&file("odometry.log"), trajectory(0..11));
-        // The index line says where a pose belongs, and two are missing.
+        // The index line assigns a pose to its picture, and two are missing.
         write(&file("trajectory.log"), trajectory((0..11).rev().filter(|i| *i != 4 && *i != 7)));
         let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
         assert_eq!((log.kind(), log.len(), log.time(0)), (ScanLogKind::Redwood, 9, None));
@@ -184,7 +184,7 @@ mod tests {
         for i in 0..4 {
             write_depth(&file(&format!("depth/{:07}-{:012}.png", i + 1, 33_000 * i)), i, 1000.0);
         }
-        // Twice as many colours, from 10 ms on.
+        // Twice as many colors, from 10 ms on.
         for i in 0..8 {
             let name = format!("image/{:07}-{:012}.png", i + 1, 10_000 + 16_500 * i);
             write_color(&file(&name), [i as u8, 0, 0]);

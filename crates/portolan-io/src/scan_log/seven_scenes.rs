@@ -71,7 +71,7 @@ mod tests {
     use crate::testing::{bad_bytes, real_data};
     use portolan::geom::vector::distance;
 
-    /// Median distance (metres) along the ray between what two frames say of the same points: pixels of one, moved into the
+    /// Median distance (metres) along the ray between two frames at the same points: pixels of one, moved into the
     /// other and looked up there.
     fn disagreement(log: &ScanLog, a: usize, b: usize) -> f64 {
         let [one, other] = [a, b].map(|i| image(log, i));
@@ -173,7 +173,7 @@ mod tests {
         let folder = folder_of(4);
         let color = |i: usize| folder.path().join(format!("frame-{:06}.color.png", 3 * i));
         [1, 3].into_iter().for_each(|i| write_color(&color(i), [1, 2, 3]));
-        // No picture, one of another size, one cut off; the first that can be read tells the size.
+        // No picture, one of another size, one cut off; the first that can be read decides the size.
         let whole = std::fs::read(color(3)).unwrap();
         write(&color(0), "no picture");
         write(&color(2).with_extension("jpg"), bytes_of(RED_JPEG));
@@ -188,8 +188,7 @@ mod tests {
         }
         let unread = log.unread_colors().unwrap();
         assert_eq!(unread.pictures, 3);
-        let part =
-            "frame-000000.color.png: the start of the colour picture is \"no pictu\"; give JPEG or PNG";
+        let part = "frame-000000.color.png: the start of the color picture is \"no pictu\"; give JPEG or PNG";
         assert!(unread.first.contains(part), "{}", unread.first);
         // The one of another size alone.
         write_color(&color(0), [1, 2, 3]);
@@ -207,7 +206,7 @@ mod tests {
         let log = open();
         let why = log.stats().colors_left_out.as_deref().unwrap();
         assert!(
-            why.starts_with("none of the first can be read: ") && why.contains("frame-000000.color.png"),
+            why.starts_with("the first of them cannot be read: ") && why.contains("frame-000000.color.png"),
             "{why}"
         );
         assert_is_picture(&log, 2, 2);
@@ -270,7 +269,10 @@ mod tests {
             ScanLog::open(path, &options).unwrap_err().to_string()
         };
         let error = open(folder.path(), None);
-        assert!(error.contains("the kind of log is not recognised; known are seven-scenes, tum"), "{error}");
+        assert!(
+            error.contains("the kind of log is not recognized; the kinds are seven-scenes, tum"),
+            "{error}"
+        );
         let error = open(&folder.path().join("none"), None);
         assert!(error.contains("none: cannot open it"), "{error}");
         let error = open(folder.path(), Some(ScanLogKind::SevenScenes));
@@ -289,7 +291,7 @@ mod tests {
         std::fs::remove_file(folder.path().join("camera-intrinsics.txt")).unwrap();
         let error = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap_err().to_string();
         assert!(
-            error.contains("the size of the picture is 8 x 6; the camera has its centre at 320"),
+            error.contains("the size of the picture is 8 x 6; the camera has its center at 320"),
             "{error}"
         );
     }

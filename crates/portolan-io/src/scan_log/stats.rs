@@ -1,4 +1,4 @@
-//! What was found in a log: nothing is dropped in silence.
+//! What was found in a log: all that is dropped is counted.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ impl fmt::Display for RefusedPose {
     }
 }
 
-/// Colour pictures of frames that were read without them, as these could not be read or have another size than the depth.
+/// Color pictures of frames that were read without them, as these could not be read or have another size than the depth.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnreadColors {
     /// How many, each counted once.
@@ -31,7 +31,7 @@ pub struct UnreadColors {
     pub first: String,
 }
 
-/// Counts of a log of scans of space. Scans that are left out are those without pose, those at an unmatched time and those
+/// Counts of a log of 3-D scans. Scans that are left out are those without pose, those at an unmatched time and those
 /// whose pose is refused.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ScanLogStats {
@@ -52,10 +52,10 @@ pub struct ScanLogStats {
     pub mended_poses: u64,
     /// How far off the worst pose that was used is (see [`portolan::geom::Pose::from_matrix`]).
     pub worst_pose: f64,
-    /// Poses that are no poses; their scans are left out.
+    /// Poses that cannot be used; their scans are left out.
     pub refused_poses: Vec<RefusedPose>,
-    /// Scans without a colour picture, in a log where others have one.
+    /// Scans without a color picture, in a log where others have one.
     pub scans_without_color: u64,
-    /// Why the colour pictures of the log are not used, if they are there and are not.
+    /// Why the color pictures of the log are not used; `None`: they are, or the log has no pictures.
     pub colors_left_out: Option<String>,
 }

@@ -18,7 +18,7 @@ pub(super) const SIZE: [usize; 2] = [8, 6];
 /// The camera of the pictures, as `fx fy cx cy`.
 pub(super) const SMALL_CAMERA: [f64; 4] = [10.0, 12.0, 3.5, 2.5];
 
-/// A picture of one colour, `[201, 40, 90]`, 8 x 8 pixels, as JPEG.
+/// A picture of one color, `[201, 40, 90]`, 8 x 8 pixels, as JPEG.
 pub(super) const RED_JPEG: &str = "ffd8ffe000104a46494600010100000100010000ffdb0043000201010101010201010102020202020403020202020504 \
     040304060506060605060606070908060709070606080b08090a0a0a0a0a06080b0c0b0a0c090a0a0affdb0043010202 \
     02020202050303050a0706070a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a0a \
@@ -26,7 +26,7 @@ pub(super) const RED_JPEG: &str = "ffd8ffe000104a46494600010100000100010000ffdb0
     00000000000008ffc40014100100000000000000000000000000000000ffc40015010101000000000000000000000000 \
     00000409ffc40014110100000000000000000000000000000000ffda000c03010002110311003f003b8ea60fffd9";
 
-/// The same in grey 94.
+/// The same in gray 94.
 pub(super) const GREY_JPEG: &str = "ffd8ffe000104a46494600010100000100010000ffdb0043000201010101010201010102020202020403020202020504 \
     040304060506060605060606070908060709070606080b08090a0a0a0a0a06080b0c0b0a0c090a0a0affc0000b080008 \
     000801011100ffc40014000100000000000000000000000000000008ffc4001410010000000000000000000000000000 \
@@ -63,8 +63,8 @@ pub(super) fn matrix_text(pose: &Pose<3>) -> String {
     format!("{}{}{}0 0 0 1\n", row(0), row(1), row(2))
 }
 
-/// A 16-bit grey PNG.
-pub(super) fn grey_png([w, h]: [usize; 2], values: &[u16]) -> Vec<u8> {
+/// A 16-bit gray PNG.
+pub(super) fn gray_png([w, h]: [usize; 2], values: &[u16]) -> Vec<u8> {
     let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
     png_of([w, h], png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)
 }
@@ -84,10 +84,10 @@ pub(super) fn write_depth(path: &Path, i: usize, units_per_metre: f64) {
     let depth = ((WALL - 0.25 * i as f64) * units_per_metre).round() as u16;
     let mut values = vec![depth; SIZE[0] * SIZE[1]];
     (values[0], values[1]) = (0, u16::MAX);
-    write(path, grey_png(SIZE, &values));
+    write(path, gray_png(SIZE, &values));
 }
 
-/// Writes a colour picture of the size of the depth images.
+/// Writes a color picture of the size of the depth images.
 pub(super) fn write_color(path: &Path, rgb: [u8; 3]) {
     let bytes = rgb.repeat(SIZE[0] * SIZE[1]);
     write(path, png_of(SIZE, png::ColorType::Rgb, png::BitDepth::Eight, &bytes));

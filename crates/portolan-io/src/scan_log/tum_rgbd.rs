@@ -1,11 +1,11 @@
 //! TUM RGB-D *(Sturm et al. 2012)*, which ETH3D SLAM follows: pictures with times.
 //!
 //! `depth.txt` and `rgb.txt` list `time file`, `groundtruth.txt` has the poses of the depth camera at its own times, far
-//! denser. Each depth image takes the colour picture that is nearest in time, and the pose at its time, interpolated between
+//! denser. Each depth image takes the color picture that is nearest in time, and the pose at its time, interpolated between
 //! the two beside it; both within [`ScanLogOptions::time_tolerance`]. Depth is in units of 1/5000 m.
 //!
-//! The camera is in no file of TUM's: it is published for the three sensors, and the folder's name tells which. ETH3D puts
-//! it in `calibration.txt`. The lens distortion of TUM's sensors is not modelled.
+//! The camera is in no file of TUM's: it is published for the three sensors, and the folder's name decides which. ETH3D puts
+//! it in `calibration.txt`. The lens distortion of TUM's sensors is not modeled.
 
 use std::path::{Path, PathBuf};
 
@@ -77,7 +77,7 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
     })
 }
 
-/// What TUM publishes for the colour cameras, to which its depth images are registered.
+/// What TUM publishes for the color cameras, to which its depth images are registered.
 fn published_camera(name: &str) -> Option<(&'static str, [f64; 4])> {
     let name = name.to_ascii_lowercase();
     let is = |long: &str, short: &str| name.contains(long) || name.contains(short);
@@ -133,7 +133,7 @@ mod tests {
 
     const START: f64 = 1_305_031_453.25;
 
-    /// Depth at 0, 0.25 s ..., poses 8 ms before and 8 ms after each, colours 5 ms later.
+    /// Depth at 0, 0.25 s ..., poses 8 ms before and 8 ms after each, colors 5 ms later.
     fn folder_of(pictures: usize) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let (mut depths, mut colors, mut poses) =
@@ -180,7 +180,7 @@ mod tests {
             let text = std::fs::read_to_string(&path).unwrap();
             std::fs::write(path, change(&text)).unwrap();
         };
-        // The poses of the first picture come too late, the picture of the second is lost, the colour of the third too, and
+        // The poses of the first picture come too late, the picture of the second is lost, the color of the third too, and
         // the poses of the last are no poses.
         let times = [-0.008, 0.008].map(|d| format!("{:.4}", START + d));
         edit("groundtruth.txt", &|text| {
