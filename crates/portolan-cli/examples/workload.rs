@@ -17,8 +17,7 @@ use portolan::geom::{Lattice, Pose};
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::scan::Frame;
 use portolan::surface::isosurface;
-use portolan::sweep::OccupancySweep;
-use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
+use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use serde_json::{Value, json};
 
 /// What is timed.
@@ -86,8 +85,8 @@ fn main() -> anyhow::Result<()> {
 type Timed = (Vec<f64>, usize, Value);
 
 fn frames(args: &Args, folder: &str) -> anyhow::Result<Vec<(Pose<3>, Frame)>> {
-    let options = SpaceLogOptions { color: false, ..Default::default() };
-    let log = SpaceLog::open(&args.data.join(folder), &options)?;
+    let options = ScanLogOptions { color: false, ..Default::default() };
+    let log = ScanLog::open(&args.data.join(folder), &options)?;
     (0..log.len().min(args.scans)).map(|i| Ok((*log.pose(i), log.frame(i)?))).collect()
 }
 

@@ -2,7 +2,7 @@
 
 use portolan::geom::{Aabb, Grid};
 use portolan::scan::{RefusedBeams, ScanStats};
-use portolan_io::space_log::SpaceLogStats;
+use portolan_io::scan_log::ScanLogStats;
 use portolan_io::{CarmenStats, TimeOrder};
 use serde_json::{Map, Value, json};
 
@@ -79,7 +79,7 @@ pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
 }
 
 /// What else was found in a log of space.
-pub(crate) fn space_log_stats(stats: &SpaceLogStats) -> Value {
+pub(crate) fn space_log_stats(stats: &ScanLogStats) -> Value {
     json!({
         "scans": stats.scans,
         "missing_files": stats.missing_files,

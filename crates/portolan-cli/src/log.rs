@@ -7,7 +7,7 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{FrameFilter, RangeLimits, Scan};
 use portolan_io::poses3::PoseConvention;
-use portolan_io::space_log::{Intrinsics, SpaceLog, SpaceLogKind, SpaceLogOptions};
+use portolan_io::scan_log::{Intrinsics, ScanLog, ScanLogKind, ScanLogOptions};
 use portolan_io::{CarmenLog, FileKind, detect, detect_no_return, read_poses_2d};
 
 use crate::arguments::{length, length_or_zero, point3};
@@ -19,17 +19,15 @@ pub(crate) enum LogFormat {
     /// CARMEN text logs (.log, .clf; plain, gzip, bzip2)
     Carmen,
     /// Scans of space
-    Space(SpaceLogKind),
+    Space(ScanLogKind),
 }
 
 /// The kind of a word of `--format`.
 fn log_format(word: &str) -> Result<LogFormat, String> {
-    match SpaceLogKind::from_word(word) {
+    match ScanLogKind::from_word(word) {
         _ if word == "carmen" => Ok(LogFormat::Carmen),
         Some(kind) => Ok(LogFormat::Space(kind)),
-        None => {
-            Err(format!("must be one of carmen, {}", SpaceLogKind::ALL.map(SpaceLogKind::word).join(", ")))
-        }
+        None => Err(format!("must be one of carmen, {}", ScanLogKind::ALL.map(ScanLogKind::word).join(", "))),
     }
 }
 
@@ -83,7 +81,7 @@ impl LogArgs {
         match self.format {
             Some(LogFormat::Carmen) => Ok(false),
             Some(LogFormat::Space(_)) => Ok(true),
-            None => Ok(matches!(detect(path)?, FileKind::SpaceLog(_))),
+            None => Ok(matches!(detect(path)?, FileKind::ScanLog(_))),
         }
     }
 }
@@ -146,9 +144,9 @@ impl LimitArgs {
 }
 
 /// Opens a log of scans of space.
-pub(crate) fn read_space(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<SpaceLog> {
-    let default = SpaceLogOptions::default();
-    let options = SpaceLogOptions {
+pub(crate) fn read_space(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<ScanLog> {
+    let default = ScanLogOptions::default();
+    let options = ScanLogOptions {
         format: args.format.and_then(|f| if let LogFormat::Space(kind) = f { Some(kind) } else { None }),
         poses: args.poses.clone(),
         pose_convention: args.pose_convention,
@@ -158,7 +156,7 @@ pub(crate) fn read_space(path: &Path, args: &LogArgs, color: bool) -> anyhow::Re
         color,
         time_tolerance: args.time_tolerance.unwrap_or(default.time_tolerance),
     };
-    Ok(SpaceLog::open(path, &options)?)
+    Ok(ScanLog::open(path, &options)?)
 }
 
 /// Reads a planar log.
@@ -192,7 +190,7 @@ pub(crate) fn read(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> {
 pub(crate) fn describe(kind: &FileKind) -> String {
     match kind {
         FileKind::CarmenLog => "a CARMEN log".into(),
-        FileKind::SpaceLog(kind) => kind.label().into(),
+        FileKind::ScanLog(kind) => kind.label().into(),
         FileKind::Mesh(format) => format.label().into(),
         FileKind::Portolan => "a portolan map".into(),
         FileKind::PortolanFolder => "a folder with a portolan map".into(),

@@ -17,7 +17,7 @@ const TITLE: f64 = 40.0;
 const LEGEND: f64 = 46.0;
 
 /// The picture of a map as PNG bytes; `None` where there is no map to show.
-pub(crate) fn of_map(file: &MapFile, derived: &Derived, title: &str) -> Option<Vec<u8>> {
+pub(crate) fn of_map(file: &MapFile<2>, derived: &Derived, title: &str) -> Option<Vec<u8>> {
     let (grid, shown) = shown_part(file)?;
     let [width, height] = shown.extent();
     let r = grid.lattice.resolution;
@@ -52,7 +52,7 @@ pub(crate) fn of_map(file: &MapFile, derived: &Derived, title: &str) -> Option<V
 }
 
 /// The box around all observed cells, a little larger, and the grid that it is cut from.
-fn shown_part(file: &MapFile) -> Option<(Grid<2>, Aabb<2>)> {
+fn shown_part(file: &MapFile<2>) -> Option<(Grid<2>, Aabb<2>)> {
     let grid = match (&file.tsdf, &file.grid) {
         (Some(map), _) => *map.grid(),
         (_, Some(map)) => *map.store().grid(),
@@ -74,7 +74,7 @@ fn shown_part(file: &MapFile) -> Option<(Grid<2>, Aabb<2>)> {
 }
 
 /// The colour of every cell: occupancy in light tones, and over it the signed distance near surfaces.
-fn cell_colors(file: &MapFile, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<Color> {
+fn cell_colors(file: &MapFile<2>, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<Color> {
     let mut colors = vec![color::UNKNOWN; grid.len()];
     if let Some(map) = &file.grid {
         let table: Vec<Color> = (i8::MIN..=i8::MAX)
@@ -127,7 +127,7 @@ fn distance_color(d: f64, truncation: f64) -> Color {
     tone.with_alpha(f64::from(tone.a) / 255.0 * rest)
 }
 
-fn draw_path(canvas: &mut Canvas, view: &View, file: &MapFile, legend: &mut Vec<Entry>) {
+fn draw_path(canvas: &mut Canvas, view: &View, file: &MapFile<2>, legend: &mut Vec<Entry>) {
     if file.poses.len() < 2 {
         return;
     }

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
+use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    AnyMapFile, CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline,
-    SpaceMapFile, detect, read_geojson,
+    CarmenLog, Container, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline, detect,
+    map_dimension, read_geojson,
 };
 
 use crate::log::describe;
@@ -15,9 +15,9 @@ use crate::space::available_memory;
 /// What a file holds.
 pub(crate) enum Source {
     /// `map.portolan` of the plane
-    Map(Box<MapFile>),
+    Map(Box<MapFile<2>>),
     /// `map.portolan` of space
-    SpaceMap(Box<SpaceMapFile>),
+    SpaceMap(Box<MapFile<3>>),
     /// `esdf.bin`
     Esdf(EsdfFile),
     /// A map_server map
@@ -31,14 +31,14 @@ pub(crate) enum Source {
     /// A log
     Log(Box<CarmenLog>),
     /// A log of scans of space
-    SpaceLog(Box<SpaceLog>),
+    ScanLog(Box<ScanLog>),
 }
 
 /// Opens a file or a folder.
 pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
     Ok(match detect(path)? {
-        FileKind::Portolan => of_map(AnyMapFile::read_within(path, readable())?),
-        FileKind::PortolanFolder => of_map(AnyMapFile::read_within(path.join("map.portolan"), readable())?),
+        FileKind::Portolan => of_map(&Container::read(path)?)?,
+        FileKind::PortolanFolder => of_map(&Container::read(path.join("map.portolan"))?)?,
         FileKind::EsdfBin => Source::Esdf(EsdfFile::read(path)?),
         FileKind::MapServerYaml => Source::Server(MapServerMap::read(path)?),
         FileKind::Pgm => match yaml_beside(path) {
@@ -48,19 +48,17 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
         FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
         FileKind::CarmenLog => Source::Log(Box::new(CarmenLog::read(path)?)),
-        FileKind::SpaceLog(_) => {
-            Source::SpaceLog(Box::new(SpaceLog::open(path, &SpaceLogOptions::default())?))
-        }
+        FileKind::ScanLog(_) => Source::ScanLog(Box::new(ScanLog::open(path, &ScanLogOptions::default())?)),
         FileKind::Unknown(what) => bail!("{}: not recognised: {what}", path.display()),
         kind => bail!("{}: is {}, which is not read yet", path.display(), describe(&kind)),
     })
 }
 
-fn of_map(file: AnyMapFile) -> Source {
-    match file {
-        AnyMapFile::Plane(file) => Source::Map(file),
-        AnyMapFile::Space(file) => Source::SpaceMap(file),
-    }
+fn of_map(container: &Container) -> anyhow::Result<Source> {
+    Ok(match map_dimension(container)? {
+        2 => Source::Map(Box::new(MapFile::from_container(container, readable())?)),
+        _ => Source::SpaceMap(Box::new(MapFile::from_container(container, readable())?)),
+    })
 }
 
 /// What a map may take in memory (bytes): what the machine has free, 4 GiB at least.
@@ -81,7 +79,7 @@ impl Source {
             return file.colors_left_out().then(|| colors.into());
         }
         let Self::Server(map) = self else { return None };
-        let cells = map.unknown_grey_taken_for_free;
+        let cells = map.unknown_gray_taken_for_free;
         (cells > 0).then(|| {
             format!(
                 "{cells} cells have the grey of unknown (205 or 206) but count as free, because free_thresh is above \
@@ -102,7 +100,7 @@ impl Source {
             Self::Octomap(file) if file.is_binary() => "an OctoMap tree of free and occupied (.bt)",
             Self::Octomap(_) => "an OctoMap tree of log odds (.ot)",
             Self::Log(_) => "a CARMEN log",
-            Self::SpaceLog(log) => log.kind().label(),
+            Self::ScanLog(log) => log.kind().label(),
         }
     }
 }

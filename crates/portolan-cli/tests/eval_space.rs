@@ -12,7 +12,7 @@ use portolan::geom::{BlockKey, Lattice, Pose};
 use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
 use portolan::store::Bricks;
 use portolan::sweep::WeightModel;
-use portolan_io::{LogLayout, LogWriter, MapHeader, SpaceMapFile, TsdfBricks};
+use portolan_io::{LogLayout, LogWriter, MapFile, MapHeader, TsdfBricks};
 use serde_json::{Map, Value, json as value};
 use support::{arg, fail, json, succeed};
 
@@ -28,9 +28,9 @@ fn write_map(folder: &Path) {
             (0..512).map(|i| (WALL - lattice.center(key.cell(i))[0]).clamp(-0.3, 0.3) as f32).collect();
         store.insert(key, DistanceBrick::from_parts(&distances, &[1.0; 512]).unwrap()).unwrap();
     }
-    let mut file = SpaceMapFile::default();
+    let mut file = MapFile::<3>::default();
     file.header = MapHeader { hold_out: Some(2), ..Default::default() };
-    file.tsdf = Some(TsdfBricks {
+    file.tsdf_bricks = Some(TsdfBricks {
         store,
         truncation: 0.3,
         w_max: 64.0,
@@ -143,7 +143,7 @@ fn what_cannot_be_compared_is_said() {
     let (map, empty) = (folder.path().join("map"), folder.path().join("empty"));
     write_map(&map);
     std::fs::create_dir(&empty).unwrap();
-    SpaceMapFile::default().write(empty.join("map.portolan")).unwrap();
+    MapFile::<3>::default().write(empty.join("map.portolan")).unwrap();
     let far = folder.path().join("far.xyz");
     std::fs::write(&far, "100 100 100\n101 100 100\n").unwrap();
     let error = fail(1, ["eval", arg(&map), "--reference", arg(&far), "--crop"]);

@@ -1,18 +1,18 @@
-//! Rows of answers, as `query` prints them: what a field says of a point, and what it certifies.
+//! Rows of answers, as `query` prints them: the distance that a field has at a point, and its certified bounds.
 
 use std::io::{self, Write};
 
 use portolan::Answer;
 use portolan::field::{ClearanceField, SparseEsdf, UnknownSpace};
 
-/// What a row says about its distance.
+/// The status of a row's distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnswerStatus {
     /// The distance is known.
     Known,
-    /// The map does not know.
+    /// Unobserved: the map has no distance there.
     Unknown,
-    /// At least so far.
+    /// At least as far as the field reaches.
     Saturated,
     /// Outside of the map.
     Outside,
@@ -50,7 +50,7 @@ pub struct AnswerRow<const D: usize> {
 }
 
 impl<const D: usize> AnswerRow<D> {
-    /// A row about a point: its occupancy, and what a field says of its distance, which is in the frame of the point.
+    /// A row about a point: its occupancy, and the distance of a field, in the frame of the point.
     pub fn of(point: [f64; D], occupancy: Option<f64>, distance: Answer<(f64, [f64; D])>) -> Self {
         let mut row = Self {
             point,
@@ -77,8 +77,8 @@ impl<const D: usize> AnswerRow<D> {
         row
     }
 
-    /// Fills in the certified bounds, where the row says a distance at all; `p` is its point in the frame of the field.
-    /// Where `limit` metres are certified, more is not said: the answer is saturated.
+    /// Fills in the certified bounds, where the row has a distance; `p` is its point in the frame of the field.
+    /// A lower bound of `limit` metres or more makes the answer saturated.
     pub fn certify(
         &mut self,
         field: &impl ClearanceField<D>,
@@ -107,7 +107,7 @@ impl<const D: usize> AnswerRow<D> {
     }
 }
 
-/// Cells that a field is maintained beyond what is said of it, so that a saturated answer is a certified one.
+/// A field is computed this many cells farther than it is reported, so that a saturated answer is certified.
 pub const HELD_BACK: f64 = 2.0;
 
 /// Metres up to which a field in bricks certifies: bounds fall short of distances by less than the two cells that are

@@ -5,7 +5,7 @@
 //! | mode | pixel | cell of the `OccupancyGrid` | what is lost |
 //! |---|---|---|---|
 //! | [`MapMode::Trinary`] | 0, 254, 205 | 100, 0, -1 | the decay: lethal and inscribed are occupied, all else is free |
-//! | [`MapMode::Scale`] | shades of grey | 0 to 100 | unknown, for which a grey map has no pixel: refused where there is any |
+//! | [`MapMode::Scale`] | shades of gray | 0 to 100 | unknown cells, which have no gray value: refused |
 //! | [`MapMode::Raw`] | 0 to 100, 255 | the same, -1 | nothing but steps of 2.6 of 252 |
 //!
 //! Percents are those in which Nav2 publishes costmaps ([`Inflation::percent`]). A static layer takes them as costs with
@@ -36,7 +36,7 @@ pub fn write_costmap(
     let unknown = costs.iter().filter(|c| **c == cost::NO_INFORMATION).count();
     if mode == MapMode::Scale && unknown > 0 {
         let value = format!("{unknown} cells");
-        let advice = "a grey image has no pixel for them in mode scale; use raw or trinary";
+        let advice = "mode scale has no gray value for unknown; use raw or trinary";
         return Err(IoError::unwritable(yaml, "unknown space", value, advice));
     }
     let pixel = |c: &u8| match (mode, Inflation::percent(*c)) {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use crate::bytes::open;
 use crate::mesh::{MeshFormat, mesh_format};
-use crate::space_log::SpaceLogKind;
+use crate::scan_log::ScanLogKind;
 use crate::{IoError, container, esdf_bin};
 
-/// So much of a file is looked at (unpacked bytes).
+/// How much of a file is read (unpacked bytes).
 const HEAD: u64 = 64 << 10;
 
 /// What a file or folder is.
@@ -22,7 +22,7 @@ pub enum FileKind {
     PortolanFolder,
     /// A distance field: [`crate::EsdfFile`].
     EsdfBin,
-    /// A grey image: [`crate::Pgm`].
+    /// A gray image: [`crate::Pgm`].
     Pgm,
     /// The yaml file of a map_server map: [`crate::MapServerMap`].
     MapServerYaml,
@@ -34,15 +34,15 @@ pub enum FileKind {
     OctomapBt,
     /// OctoMap's tree of log odds: [`crate::OctomapTree`].
     OctomapOt,
-    /// Scans of space with poses: [`crate::space_log::SpaceLog`].
-    SpaceLog(SpaceLogKind),
+    /// A log of 3-D scans with poses: [`crate::scan_log::ScanLog`].
+    ScanLog(ScanLogKind),
     /// A mesh of triangles: [`crate::mesh_counts`], and [`crate::read_ply_mesh`] for PLY.
     Mesh(MeshFormat),
-    /// None of these; the text says what was seen and what would be known.
+    /// Any other file; the text gives what was found and which formats are read.
     Unknown(String),
 }
 
-/// Tells what a file or folder is.
+/// Finds out what a file or folder is.
 ///
 /// # Errors
 /// [`IoError`] where it cannot be opened or read.
@@ -52,14 +52,14 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
         if path.join("map.portolan").is_file() {
             return Ok(FileKind::PortolanFolder);
         }
-        if let Some(kind) = SpaceLogKind::recognise(path) {
-            return Ok(FileKind::SpaceLog(kind));
+        if let Some(kind) = ScanLogKind::recognize(path) {
+            return Ok(FileKind::ScanLog(kind));
         }
         let what = "a folder without map.portolan and without scans of a known layout; name a file inside it";
         return Ok(FileKind::Unknown(what.into()));
     }
     let head = open(path)?.read_up_to(HEAD)?;
-    let as_log = || SpaceLogKind::recognise(path).map(FileKind::SpaceLog);
+    let as_log = || ScanLogKind::recognize(path).map(FileKind::ScanLog);
     let kind = by_content(path, &head).or_else(as_log).or_else(|| by_name(path, &head));
     Ok(kind.unwrap_or_else(|| unknown(&head)))
 }
@@ -125,7 +125,7 @@ const CARMEN_WORDS: [&str; 12] = [
     "OLDLASER",
 ];
 
-/// For a file whose content says nothing (an empty or broken one): the reader's error tells more.
+/// By the name, for a file whose content has no format (an empty or broken one): the reader's error is more useful.
 fn by_name(path: &Path, head: &[u8]) -> Option<FileKind> {
     let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
     let name = [".gz", ".bz2"].iter().find_map(|e| name.strip_suffix(e)).unwrap_or(&name);
@@ -153,7 +153,7 @@ fn unknown(head: &[u8]) -> FileKind {
         [0x89, b'P', b'N', b'G', ..] => "it is a PNG picture (convert it to PGM)".to_owned(),
         _ => format!("it starts with {}", crate::error::shown(&head[..head.len().min(16)])),
     };
-    let known = "known are CARMEN logs, logs of space (depth images or lidar scans with poses), clouds (PCD, PLY, KITTI .bin, \
+    let known = "known are CARMEN logs, logs of 3-D scans (depth images or lidar scans with poses), clouds (PCD, PLY, KITTI .bin, \
                  xyz), map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON, OctoMap (.bt, .ot, .graph), meshes (PLY, GLB, OBJ)";
     FileKind::Unknown(format!("{seen}; {known}"))
 }
@@ -208,7 +208,7 @@ mod tests {
             ..Default::default()
         };
         for mesh in [mesh, Default::default()] {
-            // Under names that say nothing, and under those of clouds.
+            // Under names without meaning, and under those of clouds.
             for name in ["mesh", "mesh.xyz"] {
                 let path = folder.path().join(name);
                 write_ply_mesh(&path, &mesh).unwrap();
@@ -226,12 +226,12 @@ mod tests {
         let cloud = crate::PointCloudFile { points: vec![[1.0; 3]], ..Default::default() };
         let path = folder.path().join("cloud.ply");
         write_ply_cloud(&path, &cloud).unwrap();
-        assert_eq!(detect(&path).unwrap(), FileKind::SpaceLog(SpaceLogKind::Clouds));
+        assert_eq!(detect(&path).unwrap(), FileKind::ScanLog(ScanLogKind::Clouds));
         // MeshLab's clouds have an element of no faces.
         let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
                     element face 0\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n";
-        assert_eq!(kind_of("a.ply", text.as_bytes()), FileKind::SpaceLog(SpaceLogKind::Clouds));
-        assert_eq!(kind_of("a.xyz", b"1 2 3\n4 5 6\n"), FileKind::SpaceLog(SpaceLogKind::Clouds));
+        assert_eq!(kind_of("a.ply", text.as_bytes()), FileKind::ScanLog(ScanLogKind::Clouds));
+        assert_eq!(kind_of("a.xyz", b"1 2 3\n4 5 6\n"), FileKind::ScanLog(ScanLogKind::Clouds));
         assert!(
             matches!(kind_of("a.txt", b"v for vendetta\n"), FileKind::Unknown(text) if text.contains("meshes (PLY"))
         );
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn real_files_are_recognised() {
+    fn real_files_are_recognized() {
         use FileKind::*;
         for (name, kind) in [
             ("lidar2d_carmen/intel-corrected.log.gz", CarmenLog),
@@ -263,7 +263,7 @@ mod tests {
             ("maps_2d/willow-full.pgm", Pgm),
             ("maps_octomap/geb079.bt", OctomapBt),
             ("rangescan_stanford_bunny/reconstruction/bun_zipper.ply", Mesh(MeshFormat::Ply)),
-            ("rgbd_redkitchen", SpaceLog(SpaceLogKind::SevenScenes)),
+            ("rgbd_redkitchen", ScanLog(ScanLogKind::SevenScenes)),
         ] {
             let Some(path) = real_data(name) else { continue };
             assert_eq!(detect(path).unwrap(), kind);

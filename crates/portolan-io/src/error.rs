@@ -14,7 +14,7 @@ pub enum IoError {
         path: PathBuf,
         /// What was tried: a verb.
         action: &'static str,
-        /// What the system said.
+        /// The system's own error.
         cause: std::io::Error,
     },
     /// A folder stands where a file was expected.
@@ -91,7 +91,7 @@ pub enum IoError {
         /// What to do.
         advice: String,
     },
-    /// What the caller wants to write, or to combine, cannot be held by the format.
+    /// The format cannot hold what the caller wants to write or to combine.
     #[error("{}: {field} is {value}; {advice}", shown_path(path))]
     Unwritable {
         /// The file.

@@ -1,4 +1,4 @@
-//! `esdf.bin`: a signed distance field that numpy reads with three lines.
+//! `esdf.bin`: a signed distance field that three lines of numpy read.
 //!
 //! Little-endian:
 //!
@@ -15,7 +15,7 @@
 //! | then, with bit 0 | u8 x cells | 0 unknown, 1 known, 2 saturated |
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Write};
+use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use portolan::geom::Grid;
@@ -37,16 +37,16 @@ pub struct EsdfBin<const D: usize> {
     pub grid: Grid<D>,
     /// Signed distance of each cell (metres, positive in free space), x fastest; NaN where unknown.
     pub distances: Vec<f32>,
-    /// What each distance is worth: [`EsdfBin::UNKNOWN`], [`EsdfBin::KNOWN`] or [`EsdfBin::SATURATED`].
+    /// Status of each distance: [`EsdfBin::UNKNOWN`], [`EsdfBin::KNOWN`] or [`EsdfBin::SATURATED`].
     pub status: Option<Vec<u8>>,
 }
 
-/// A field whose dimension the file tells.
+/// A field of the dimension that the file has.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EsdfFile {
-    /// A field in the plane.
+    /// A 2-D field.
     Two(EsdfBin<2>),
-    /// A field in space.
+    /// A 3-D field.
     Three(EsdfBin<3>),
 }
 
@@ -83,7 +83,7 @@ pub fn write_esdf<const D: usize>(
     write_atomic(path, |w| write_to(w, grid, distances, status))
 }
 
-/// The same in memory, for who hands files on in another way.
+/// The same as bytes in memory.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`EsdfBin::write`].
@@ -158,23 +158,27 @@ impl EsdfFile {
     /// [`IoError::Binary`] where a field is wrong or the file's length is not what the header announces.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
-        let file = open_file(path)?;
-        let length = file.metadata().map_err(|e| IoError::os(path, "look at it", e))?.len();
-        Self::from_reader(BufReader::<File>::with_capacity(1 << 16, file), length, path)
+        Self::from_reader(BufReader::<File>::with_capacity(1 << 16, open_file(path)?), path)
     }
 
-    /// Reads a file that is in memory, under the name that errors shall give.
+    /// Reads a file in memory; errors name it `name`.
     ///
     /// # Errors
     /// As [`EsdfFile::read`].
     pub fn parse(bytes: &[u8], name: &Path) -> Result<Self, IoError> {
-        Self::from_reader(bytes, bytes.len() as u64, name)
+        Self::from_reader(Cursor::new(bytes), name)
     }
 
-    fn from_reader(mut reader: impl Read, length: u64, path: &Path) -> Result<Self, IoError> {
+    /// Reads a field from any source; errors name it `path`.
+    ///
+    /// # Errors
+    /// As [`EsdfFile::read`], and [`IoError::Os`] where reading fails.
+    pub fn from_reader(mut reader: impl Read + Seek, path: &Path) -> Result<Self, IoError> {
+        let failed = |e| IoError::os(path, "read it", e);
+        let length = reader.seek(SeekFrom::End(0)).map_err(failed)?;
+        reader.rewind().map_err(failed)?;
         let mut header = Vec::new();
-        let read = reader.by_ref().take(HEADER).read_to_end(&mut header);
-        read.map_err(|e| IoError::os(path, "read it", e))?;
+        reader.by_ref().take(HEADER).read_to_end(&mut header).map_err(failed)?;
         let Ok(h) = <[u8; HEADER as usize]>::try_from(&header[..]) else {
             let value = format!("{} bytes", header.len());
             return Err(IoError::binary(
@@ -192,7 +196,7 @@ impl EsdfFile {
         match word(&h, 12) {
             2 => Ok(Self::Two(body(&h, reader, length, path)?)),
             3 => Ok(Self::Three(body(&h, reader, length, path)?)),
-            d => Err(IoError::binary(path, 12, "the dimension", d.to_string(), "2 and 3 are known")),
+            d => Err(IoError::binary(path, 12, "the dimension", d.to_string(), "it must be 2 or 3")),
         }
     }
 }
@@ -216,10 +220,10 @@ fn body<const D: usize>(
     };
     let (version, flags) = (word(h, 8), word(h, 28));
     if version != 1 {
-        return bad(8, "the version", version.to_string(), "this program knows version 1; use a newer one");
+        return bad(8, "the version", version.to_string(), "this program reads version 1; use a newer one");
     }
     if flags > 1 {
-        return bad(28, "the flags", flags.to_string(), "only bit 0 is known; use a newer program");
+        return bad(28, "the flags", flags.to_string(), "this program reads bit 0 only; use a newer one");
     }
     let shape: [u32; 3] = std::array::from_fn(|k| word(h, 16 + 4 * k));
     let cells = shape.iter().try_fold(1u64, |n, &s| n.checked_mul(u64::from(s)));
@@ -252,7 +256,7 @@ fn body<const D: usize>(
     }
     let failed = |e: io::Error| match e.kind() {
         io::ErrorKind::UnexpectedEof => {
-            IoError::binary(path, expected, "the file length", "shrinking", "read it when it is written")
+            IoError::binary(path, expected, "the file length", "changing", "wait until the file is written")
         }
         _ => IoError::os(path, "read it", e),
     };

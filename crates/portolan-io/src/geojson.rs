@@ -1,6 +1,6 @@
 //! Contours as GeoJSON: one `Feature` with a `MultiLineString`.
 //!
-//! Coordinates are metres of the map's own frame, not degrees as RFC 7946 has it; the property `units` says so.
+//! Coordinates are metres of the map's own frame, not degrees as RFC 7946 has it; as the property `units` states.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -27,7 +27,7 @@ pub fn write_geojson(path: impl AsRef<Path>, lines: &[Polyline]) -> Result<(), I
     write_atomic(path, |w| write_to(w, lines))
 }
 
-/// The same in memory, for who hands files on in another way.
+/// The same as bytes in memory.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] for a coordinate that is not finite.
@@ -145,7 +145,7 @@ impl Object<'_> {
                 lines.extend(polygons.into_iter().flatten().map(line));
                 Ok(())
             }
-            other => Err(Error::custom(format!("the type {other} is not known"))),
+            other => Err(Error::custom(format!("the type {other} is not GeoJSON"))),
         }
     }
 }

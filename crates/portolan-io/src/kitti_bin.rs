@@ -1,4 +1,4 @@
-//! Velodyne scans of the KITTI data sets: `x y z reflectance` per point, four little-endian `f32`, nothing else.
+//! Velodyne scans of the KITTI data sets: four little-endian `f32` per point, `x y z reflectance`.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -25,7 +25,7 @@ pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
         let at = (bytes.len() - points.remainder().len()) as u64;
         let value = format!("{} bytes", points.remainder().len());
         let advice =
-            "a scan has 16 bytes per point (x y z reflectance as f32): the file is cut off or no scan";
+            "a scan has 16 bytes per point (x y z reflectance as f32): the file is cut off, or not a scan";
         return Err(IoError::binary(input.path(), at, "the last point", value, advice));
     }
     let mut builder = CloudBuilder::new(false);

@@ -9,9 +9,9 @@
 //! | KITTI velodyne `.bin` | [`read_kitti_bin`] | [`write_kitti_bin`] |
 //! | XYZ, CSV, PTS | [`read_xyz`] | |
 //! | OctoMap scan graph | [`read_scan_graph`] | |
-//! | poses in space (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
-//! | logs of scans of space with poses | [`space_log::SpaceLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
-//! | `map.portolan` | [`AnyMapFile`]: [`MapFile`], [`SpaceMapFile`]; its chunks: [`Container`] | [`MapFile::write`], [`SpaceMapFile::write`], [`ContainerWriter`] |
+//! | 3-D poses (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
+//! | logs of 3-D scans with poses | [`scan_log::ScanLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
+//! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`]; its chunks: [`ContainerWriter`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | costs of Nav2, as a map_server map | | [`write_costmap`] |
@@ -25,10 +25,10 @@
 //! | OBJ meshes | | [`write_obj`] |
 //! | query points, answers (CSV) | [`QueryPoints`] | [`write_answer`] |
 //!
-//! [`detect`] tells what a file is. The formats know plain data (slices and grids), not maps.
+//! [`detect`] finds out what a file is. Readers and writers handle plain data (slices, grids, stores); only
+//! [`MapFile`] holds maps.
 //!
-//! What holds for every reader: bytes are never trusted. A length in a file is checked against the bytes that
-//! are there before memory is taken, packed data is unpacked as a stream up to a limit, lines end after 4 MiB,
+//! No reader trusts its bytes. A length in a file is checked against the bytes that are there before memory is taken, packed data is unpacked as a stream up to a limit, lines end after 4 MiB,
 //! and whatever the bytes are, the result is a value or an [`IoError`] whose one line names file, place, field,
 //! value, and what to do. Every writer goes through [`write_atomic`], so that no half file is left behind.
 
@@ -56,7 +56,7 @@ mod points_csv;
 mod poses;
 pub mod poses3;
 mod scan_graph;
-pub mod space_log;
+pub mod scan_log;
 mod svg;
 #[cfg(test)]
 mod testing;
@@ -79,27 +79,27 @@ pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{
-    AnyMapFile, ColorBricks, MapFile, MapHeader, OccupancyBricks, SpaceMapFile, TsdfBricks, sweep_of,
-    sweep_word, weights_of, weights_word,
+    ColorBricks, MapFile, MapHeader, OccupancyBricks, TsdfBricks, map_dimension, sweep_of, sweep_word,
+    weights_of, weights_word,
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{
-    MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, ply_mesh_to_bytes, write_glb, write_obj,
-    write_ply_mesh,
+    MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, parse_mesh_counts, ply_mesh_to_bytes, write_glb,
+    write_obj, write_ply_mesh,
 };
-pub use numpy::{NpyArray, NpyValues, read_npy, read_npz, write_npy, write_npz};
+pub use numpy::{NpyArray, NpyValues, parse_npy, parse_npz, read_npy, read_npz, write_npy, write_npz};
 pub use octomap::{
     OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree, octomap_bt_to_bytes, write_octomap_bt, write_octomap_ot,
 };
 pub use pcd::{read_pcd, write_pcd};
 pub use pgm::Pgm;
-pub use ply::{PlyMesh, read_ply_cloud, read_ply_mesh, write_ply_cloud};
+pub use ply::{PlyMesh, parse_ply_mesh, read_ply_cloud, read_ply_mesh, write_ply_cloud};
 pub use points::{
     CloudGrid, PointCloudFile, PointFormat, RefusedPoints, Viewpoint, parse_points, point_format, read_points,
 };
 pub use points_csv::QueryPoints;
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};
-pub use scan_graph::{ScanGraphNode, read_scan_graph};
+pub use scan_graph::{ScanGraphNode, parse_scan_graph, read_scan_graph};
 pub use svg::{SvgStyle, write_svg};
 pub use xyz::read_xyz;
 

@@ -1,4 +1,4 @@
-//! ROS map_server maps: a yaml file that names an image, and the image (`P5`/`P2` grey map).
+//! ROS map_server maps: a yaml file that names an image, and the image (`P5`/`P2` gray map).
 //!
 //! A pixel `v` of a map with white `w` has the occupancy `p = (w - v) / w`, or `v / w` with `negate`. Modes:
 //!
@@ -19,14 +19,14 @@ use crate::bytes::{Input, Lines, open, parse_f64};
 use crate::error::shown;
 use crate::{IoError, Pgm, write_atomic};
 
-/// What a map says about a cell.
+/// The state of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MapCell {
-    /// Nothing stands there.
+    /// Free space.
     Free,
-    /// Something stands there.
+    /// An obstacle.
     Occupied,
-    /// Not known, or between the thresholds.
+    /// Unknown, or between the thresholds.
     Unknown,
 }
 
@@ -62,7 +62,7 @@ pub struct MapServerInfo {
 
 impl MapServerInfo {
     /// Settings for an image that has no yaml file: the lower left corner at zero, thresholds 0.65 and 0.15.
-    /// (The usual 0.196 would call the grey 206 free that some tools write for unknown.)
+    /// (The usual 0.196 would call the gray 206 free that some tools write for unknown.)
     pub fn of_image(resolution: f64) -> Self {
         Self {
             image: PathBuf::new(),
@@ -84,7 +84,7 @@ impl MapServerInfo {
     }
 }
 
-/// A map as map_server knows it.
+/// A map of ROS's map_server.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapServerMap {
     /// The cells in the map's own frame, whose axes are the image's, y up.
@@ -95,10 +95,10 @@ pub struct MapServerMap {
     pub cells: Vec<MapCell>,
     /// Occupancy of each cell from 0 to 1; NaN where unknown.
     pub occupancy: Vec<f32>,
-    /// How many cells have the grey 205 or 206 that map_saver and others write for unknown, but count as free
+    /// How many cells have the gray 205 or 206 that map_saver and others write for unknown, but count as free
     /// because the file's `free_thresh` is above 0.196 (Nav2's own `depot.yaml` is such a file). They are
     /// free here as they are for ROS; a careful caller warns.
-    pub unknown_grey_taken_for_free: usize,
+    pub unknown_gray_taken_for_free: usize,
 }
 
 impl MapServerMap {
@@ -120,10 +120,10 @@ impl MapServerMap {
         let table: Vec<_> = (0..=image.max_value).map(|v| cell(v, image.max_value, info)).collect();
         let rows = image.pixels.chunks(image.width.max(1)).rev();
         let (cells, occupancy) = rows.flatten().map(|&v| table[usize::from(v)]).unzip();
-        let grey = image.pixels.iter().filter(|v| image.max_value == 255 && matches!(v, 205 | 206));
+        let gray = image.pixels.iter().filter(|v| image.max_value == 255 && matches!(v, 205 | 206));
         let as_free = |v: &&u16| table[usize::from(**v)].0 == MapCell::Free && info.mode == MapMode::Trinary;
-        let unknown_grey_taken_for_free = grey.filter(as_free).count();
-        Self { grid, yaw, cells, occupancy, unknown_grey_taken_for_free }
+        let unknown_gray_taken_for_free = gray.filter(as_free).count();
+        Self { grid, yaw, cells, occupancy, unknown_gray_taken_for_free }
     }
 
     /// The pose that turns the grid's frame into the world: the identity without yaw.
@@ -167,12 +167,12 @@ fn cell(value: u16, white: u16, info: &MapServerInfo) -> (MapCell, f32) {
 /// [`IoError::Unwritable`] where the lengths differ or the resolution is not positive, else as
 /// [`write_atomic`].
 pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell]) -> Result<(), IoError> {
-    let grey = |c: &MapCell| match c {
+    let gray = |c: &MapCell| match c {
         MapCell::Free => 254,
         MapCell::Unknown => 205,
         MapCell::Occupied => 0,
     };
-    let pixels: Vec<u16> = cells.iter().map(grey).collect();
+    let pixels: Vec<u16> = cells.iter().map(gray).collect();
     write_pair(yaml.as_ref(), grid, &pixels, MapMode::Trinary, 0.65, 0.196)
 }
 
@@ -436,7 +436,7 @@ mod tests {
             }
         }
         if let Some(path) = real_data("maps_2d/depot.yaml") {
-            assert_eq!(MapServerMap::read(path).unwrap().unknown_grey_taken_for_free, 8894);
+            assert_eq!(MapServerMap::read(path).unwrap().unknown_gray_taken_for_free, 8894);
         }
         let Some(path) = real_data("maps_2d/willow-full.pgm") else { return };
         let map = MapServerMap::from_image(&Pgm::read(path).unwrap(), &MapServerInfo::of_image(0.1));

@@ -1,4 +1,4 @@
-//! Netpbm grey maps: `P5` (binary) and `P2` (text), 8 and 16 bits.
+//! Netpbm gray maps: `P5` (binary) and `P2` (text), 8 and 16 bits.
 
 use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::{IoError, write_atomic};
 /// The most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 27;
 
-/// A grey image.
+/// A gray image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pgm {
     /// Pixels per row.
@@ -19,7 +19,7 @@ pub struct Pgm {
     pub height: usize,
     /// The value of white, at least 1.
     pub max_value: u16,
-    /// Grey values, at most `max_value`, row by row; the first row is the **top** of the picture.
+    /// Gray values, at most `max_value`, row by row; the first row is the **top** of the picture.
     pub pixels: Vec<u16>,
 }
 
@@ -32,11 +32,11 @@ impl Pgm {
         Self::parse(open(path)?)
     }
 
-    /// Reads an image; what follows behind its pixels is ignored. Memory grows with the bytes that are there,
+    /// Reads an image; bytes after its pixels are ignored. Memory grows with the bytes that are there,
     /// not with what the header claims.
     ///
     /// # Errors
-    /// [`IoError::Binary`] for a header that is none and for too few pixels.
+    /// [`IoError::Binary`] for a wrong header and for too few pixels.
     pub fn parse(mut input: Input) -> Result<Self, IoError> {
         let mut header = Header { input: &mut input, offset: 0, last: b' ' };
         let magic = [header.byte()?, header.byte()?].map(|b| b.unwrap_or(b' '));
@@ -44,13 +44,13 @@ impl Pgm {
             b"P5" => false,
             b"P2" => true,
             other => {
-                let advice = "give a grey map (P5 or P2)";
+                let advice = "give a gray map (P5 or P2)";
                 return Err(IoError::binary(header.input.path(), 0, "the magic", shown(other), advice));
             }
         };
         let width = header.number("the width", 1..=1 << 30)?;
         let height = header.number("the height", 1..=1 << 30)?;
-        let max_value = header.number("the largest grey value", 1..=65_535)?;
+        let max_value = header.number("the largest gray value", 1..=65_535)?;
         let count = width * height;
         if count > MOST_PIXELS {
             let value = format!("{width} x {height}");
@@ -220,7 +220,7 @@ mod tests {
             (b"P5 1000000000 1000000000 255\n", "the image size is 1000000000 x 1000000000"),
             (b"P5 1152921504606846976 1 255\n", "the width is \"1152921504606846976\""),
             (b"P5 0 1 255\n", "the width is \"0\""),
-            (b"P5 1 1 0\n", "the largest grey value is \"0\""),
+            (b"P5 1 1 0\n", "the largest gray value is \"0\""),
             (b"P6 1 1 255\nabc", "the magic is \"P6\""),
             (b"P5 1 1 7\n\x08", "a pixel is 8; the header announces at most 7"),
             (b"P2 1 1 7\n8", "a pixel is \"8\""),

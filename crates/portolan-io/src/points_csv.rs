@@ -9,7 +9,7 @@ use crate::error::shown;
 /// The most points of a file.
 const MOST_POINTS: usize = 1 << 25;
 
-/// Query points (metres); the file tells whether they lie in the plane or in space.
+/// Query points (metres), 2-D or 3-D as the file has them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum QueryPoints {
     /// `x,y`

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 3 | `x y theta` |
 //! | 4 | `t x y theta` |
-//! | 8 | `t tx ty tz qx qy qz qw` (TUM); must lie in the plane, `tz` is ignored |
+//! | 8 | `t tx ty tz qx qy qz qw` (TUM); must turn about z only, `tz` is ignored |
 //!
 //! Separated by spaces, tabs or commas; `#` starts a comment; a comma at the end of a line is tolerated.
 
@@ -19,7 +19,7 @@ use crate::error::shown;
 /// The most poses of a file.
 const MOST_POSES: usize = 1 << 23;
 
-/// How far a rotation of a planar robot may tilt (sine of the angle).
+/// How far a rotation of a 2-D pose may tilt (sine of the angle).
 const MOST_TILT: f64 = 0.1;
 
 /// A pose of a pose file.
@@ -31,11 +31,11 @@ pub struct TimedPose<const D: usize> {
     pub pose: Pose<D>,
 }
 
-/// Reads the poses of a planar sensor.
+/// Reads 2-D poses.
 ///
 /// # Errors
-/// [`IoError::Text`] for a line that is no pose, for lines with different numbers of columns, for poses that
-/// are not finite or not planar, and for a file without poses.
+/// [`IoError::Text`] for a line that is not a pose, for lines with different numbers of columns, for poses that
+/// are not finite or not 2-D, and for a file without poses.
 pub fn read_poses_2d(path: impl AsRef<Path>) -> Result<Vec<TimedPose<2>>, IoError> {
     parse_poses_2d(open(path)?)
 }
@@ -65,7 +65,7 @@ pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>, IoError> {
             [x, y, theta] => TimedPose { time: None, pose: Pose::<2>::new(x, y, theta) },
             [t, x, y, theta] => TimedPose { time: Some(t), pose: Pose::<2>::new(x, y, theta) },
             [t, x, y, _, qx, qy, qz, qw] => {
-                let pose = planar(x, y, [qx, qy, qz, qw]).map_err(|advice| {
+                let pose = pose_2d(x, y, [qx, qy, qz, qw]).map_err(|advice| {
                     IoError::text(&path, number, "the quaternion", format!("{qx} {qy} {qz} {qw}"), advice)
                 })?;
                 TimedPose { time: Some(t), pose }
@@ -103,12 +103,12 @@ fn numbers(line: &[u8], number: u64, path: &Path) -> Result<([f64; 9], usize), I
     Ok((values, count))
 }
 
-fn planar(x: f64, y: f64, xyzw: [f64; 4]) -> Result<Pose<2>, &'static str> {
+fn pose_2d(x: f64, y: f64, xyzw: [f64; 4]) -> Result<Pose<2>, &'static str> {
     let pose = Pose::<3>::from_quaternion([x, y, 0.0], xyzw).ok_or("write a quaternion that is not zero")?;
     let r = pose.rotation;
     let tilt = r[2][0].hypot(r[2][1]);
     if tilt > MOST_TILT || r[2][2] < 0.0 {
-        return Err("a planar log needs poses that turn about z only");
+        return Err("a 2-D log needs poses that turn about z only");
     }
     let theta = (r[1][0] - r[0][1]).atan2(r[0][0] + r[1][1]);
     Ok(Pose::<2>::new(x, y, theta))

@@ -1,7 +1,7 @@
 //! OctoMap's scan graphs (`.graph`): scans in the sensor's frame, each with its pose.
 //!
 //! Little-endian: u32 nodes; of each node: u32 points, each `[u32 3, f64 x, y, z]`; pose `[u32 3, f64 x, y, z]`
-//! `[u32 4, f64 w, x, y, z]`; u32 id. Behind the nodes u32 edges, which say how scans were matched; they are passed over.
+//! `[u32 4, f64 w, x, y, z]`; u32 id. After the nodes u32 edges, which record how scans were matched; they are passed over.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::points::{CloudBuilder, PointCloudFile, most_bytes};
 /// One scan of a graph.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanGraphNode {
-    /// The number that edges call it by.
+    /// Its number in the edges.
     pub id: u32,
     /// Where the sensor stood.
     pub world_from_sensor: Pose<3>,
@@ -28,10 +28,14 @@ pub struct ScanGraphNode {
 /// [`IoError::Binary`] for a file that is cut off, for lengths that are not those of points and poses, and for a pose that
 /// is not finite.
 pub fn read_scan_graph(path: impl AsRef<Path>) -> Result<Vec<ScanGraphNode>, IoError> {
-    parse(open(path)?)
+    parse_scan_graph(open(path)?)
 }
 
-pub(crate) fn parse(mut input: Input) -> Result<Vec<ScanGraphNode>, IoError> {
+/// [`read_scan_graph`] from any input.
+///
+/// # Errors
+/// As [`read_scan_graph`].
+pub fn parse_scan_graph(mut input: Input) -> Result<Vec<ScanGraphNode>, IoError> {
     let bytes = input.read_all(most_bytes(&input))?;
     let mut reader = Reader { bytes: &bytes, at: 0, path: input.path() };
     let count = reader.u32("the number of scans")?;
@@ -77,7 +81,7 @@ impl Reader<'_> {
         let length = self.u32(field)?;
         if length as usize != N {
             let value = format!("{length} numbers");
-            let advice = format!("{N} are expected: this is no scan graph, or it is damaged");
+            let advice = format!("{N} are expected: the file is not a scan graph, or damaged");
             return Err(IoError::binary(self.path, start, field, value, advice));
         }
         let bytes = self.take(8 * N, field)?;
@@ -106,7 +110,7 @@ mod tests {
     use crate::testing::{bad_bytes, real_data};
 
     fn read(bytes: Vec<u8>) -> Result<Vec<ScanGraphNode>, IoError> {
-        parse(Input::from_reader(std::io::Cursor::new(bytes), "a.graph".as_ref())?)
+        parse_scan_graph(Input::from_reader(std::io::Cursor::new(bytes), "a.graph".as_ref())?)
     }
 
     fn one_scan() -> Vec<u8> {

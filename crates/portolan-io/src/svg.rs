@@ -12,7 +12,7 @@ use crate::{IoError, Polyline, write_atomic};
 /// How a contour is drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SvgStyle {
-    /// Any colour that SVG knows.
+    /// Any color of SVG.
     pub stroke: String,
     /// Width of the line on the screen (pixels).
     pub stroke_width_px: f64,
@@ -34,7 +34,7 @@ const FAR: f64 = 10_000.0;
 
 /// Writes polylines (metres, y up).
 ///
-/// The coordinates of the paths are the world's; where they lie further than 10 km from its zero they are
+/// The coordinates of the paths are the world's; where they lie farther than 10 km from its zero they are
 /// relative to the point in the attribute `data-origin`.
 ///
 /// # Errors

@@ -76,7 +76,7 @@ pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
 /// A Python with a package.
 pub(crate) struct Python(PathBuf);
 
-/// The Python of `PORTOLAN_PYTHON`, else `python3`, if it has the package. Without it a loud line says so and the
+/// The Python of `PORTOLAN_PYTHON`, else `python3`, if it has the package. Without it a loud line is printed and the
 /// test is skipped.
 pub(crate) fn python(package: &str) -> Option<Python> {
     let named = std::env::var_os("PORTOLAN_PYTHON").map(PathBuf::from);

@@ -8,7 +8,7 @@
 //! | 7 | `x y z intensity r g b` (PTS) |
 //!
 //! A first line of names (`x,y,z,intensity,r,g,b,nx,ny,nz,ring,time`, in any order; columns of other names are passed over)
-//! says it better. `#` and `//` start comments; a first line that is one whole number is a count, and is not trusted.
+//! overrules this. `#` and `//` start comments; a first line that is one whole number is a count, and is not trusted.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ const MOST_POINTS: usize = 1 << 30;
 /// Reads a text file of points (metres), plain or packed by gzip or bzip2. Memory grows with the points, not with the text.
 ///
 /// # Errors
-/// [`IoError::Text`] for a line that is no point, for lines with different numbers of columns, and for a file without
+/// [`IoError::Text`] for a line that is not a point, for lines with different numbers of columns, and for a file without
 /// points. `nan` is a number: such points are refused and counted.
 pub fn read_xyz(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
     parse(open(path)?)

@@ -22,7 +22,7 @@ use portolan_io::{OctomapTree, read_pcd};
 const RESOLUTION: f64 = 0.1;
 const MAX_RANGE: f64 = 8.0;
 
-/// The folder; `None` where the data are not there, said past the test harness's capture.
+/// The folder; `None` where the data are not there, noted past the test harness's capture.
 fn folder() -> Option<PathBuf> {
     let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
     let root = std::env::var_os("PORTOLAN_DATA").map_or_else(beside, PathBuf::from);
@@ -98,7 +98,7 @@ fn octomaps_own_map_comes_out() {
     assert_eq!((leaves, rows.len(), cells), (138_477, 138_477, 197_291));
     let mut worst = 0f64;
     for (center, p) in rows {
-        // A leaf of an even number of cells has its centre between cells.
+        // A leaf of an even number of cells has its center between cells.
         let cell = tree.lattice().cell_of(center.map(|v| v + 0.01 * RESOLUTION)).unwrap();
         let leaf = tree.leaves_in(cell, cell.map(|v| v + 1)).next().unwrap();
         let whole = tree.lattice().aabb(leaf.cell, leaf.cell.map(|v| v + (1 << leaf.height)));

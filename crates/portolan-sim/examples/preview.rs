@@ -8,7 +8,7 @@ use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, Projection, RangeImage};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan_draw::{MeshView, Preview, Sensor, preview};
-use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
+use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_sim::space::{BuildingConfig, DepthCamera, SpaceSensor, building};
 use std::path::Path;
 use std::time::Instant;
@@ -21,7 +21,7 @@ fn scans(log: &str, every: usize) -> Result<Scans, Error> {
         "lidar" => return Ok(building(&BuildingConfig::default()).scans),
         "camera" => SpaceSensor::Camera(DepthCamera::default()),
         path => {
-            let log = SpaceLog::open(Path::new(path), &SpaceLogOptions::default())?;
+            let log = ScanLog::open(Path::new(path), &ScanLogOptions::default())?;
             let scan = |i: usize| Ok((*log.pose(i), log.frame(i)?));
             return (0..log.len()).step_by(every).map(scan).collect();
         }

@@ -6,7 +6,7 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, RangeImage};
 use portolan_io::poses3::{PoseConvention, PoseLayout, read_poses_3d};
-use portolan_io::space_log::{SpaceLog, SpaceLogKind, SpaceLogOptions};
+use portolan_io::scan_log::{ScanLog, ScanLogKind, ScanLogOptions};
 use portolan_io::{LogLayout, LogWriter};
 use portolan_sim::space::{BuildingConfig, BuildingLog, DepthCamera, SpaceLidar, SpaceSensor, building};
 use std::path::Path;
@@ -41,8 +41,8 @@ fn assert_same_image(wrote: &RangeImage, read: &RangeImage, unit: f64) {
     assert_eq!(wrote.projection, read.projection);
 }
 
-fn assert_same_images(log: &BuildingLog, folder: &Path, kind: SpaceLogKind, unit: f64) {
-    let read = SpaceLog::open(folder, &SpaceLogOptions::default()).unwrap();
+fn assert_same_images(log: &BuildingLog, folder: &Path, kind: ScanLogKind, unit: f64) {
+    let read = ScanLog::open(folder, &ScanLogOptions::default()).unwrap();
     assert_eq!((read.kind(), read.len()), (kind, log.scans.len()));
     for (i, (pose, frame)) in log.scans.iter().enumerate() {
         assert_same_pose(pose, read.pose(i), 1e-8);
@@ -58,7 +58,7 @@ fn seven_scenes_come_back() {
     let folder = tempfile::tempdir().unwrap();
     let log = log(SpaceSensor::Camera(DepthCamera::default()));
     write(&log, folder.path(), LogLayout::SevenScenes);
-    assert_same_images(&log, folder.path(), SpaceLogKind::SevenScenes, 1e-3);
+    assert_same_images(&log, folder.path(), ScanLogKind::SevenScenes, 1e-3);
 }
 
 /// KITTI's numbers as numpy would read them.
@@ -85,8 +85,8 @@ fn kitti_holds_points_and_poses_of_the_camera() {
         let (world_from_camera, _) = poses.poses[i].resolve(PoseConvention::WorldFromSensor).unwrap();
         assert_same_pose(pose, &(world_from_camera * camera_from_lidar), 1e-10);
     }
-    let read = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-    assert_eq!((read.kind(), read.len()), (SpaceLogKind::Kitti, log.scans.len()));
+    let read = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
+    assert_eq!((read.kind(), read.len()), (ScanLogKind::Kitti, log.scans.len()));
     for (i, (pose, frame)) in log.scans.iter().enumerate() {
         assert_same_pose(pose, read.pose(i), 1e-9);
         assert!((read.time(i).unwrap() - log.times[i]).abs() < 1e-6);
@@ -108,7 +108,7 @@ fn tum_has_a_trajectory_and_lists() {
     let folder = tempfile::tempdir().unwrap();
     let log = log(SpaceSensor::Camera(DepthCamera::default()));
     write(&log, folder.path(), LogLayout::TumRgbd);
-    assert_same_images(&log, folder.path(), SpaceLogKind::TumRgbd, 1.0 / 5000.0);
+    assert_same_images(&log, folder.path(), ScanLogKind::TumRgbd, 1.0 / 5000.0);
     let track = read_poses_3d(folder.path().join("groundtruth.txt")).unwrap();
     assert_eq!(track.layout, PoseLayout::Tum);
     for (raw, (pose, _)) in track.poses.iter().zip(&log.scans) {

@@ -154,7 +154,7 @@ fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
         Source::SpaceMap(_) => {
             ".ply, .glb, .obj, .bt, .ot, .bin (esdf), .npz, .npy, with --z .yaml, or .portolan, as far as its maps go"
         }
-        Source::Log(_) | Source::SpaceLog(_) => "nothing here: `portolan map` makes maps of logs",
+        Source::Log(_) | Source::ScanLog(_) => "nothing here: `portolan map` makes maps of logs",
     };
     let (input, out) = (args.input.display(), args.out.display());
     anyhow::anyhow!("{input}: {} cannot become {out}; it can become {possible}", source.describe())
@@ -169,7 +169,7 @@ fn yaml(out: &Path) -> PathBuf {
     }
 }
 
-fn convert_map(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<bool> {
+fn convert_map(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match (target, &file.tsdf) {
         (Target::Portolan, _) => file.write(&args.out)?,
         (Target::MapServer, _) => {
@@ -324,7 +324,7 @@ fn contour_of(esdf: &Esdf<2>) -> anyhow::Result<Contour> {
 }
 
 /// The cells as an occupancy grid whose cells are as sure as they can be.
-fn as_map_file(map: &MapServerMap, args: &Args) -> anyhow::Result<MapFile> {
+fn as_map_file(map: &MapServerMap, args: &Args) -> anyhow::Result<MapFile<2>> {
     let model = OccupancyModel::default();
     let mut grid = OccupancyGrid::covering(map.grid, model)?;
     let (free, occupied) = (grid.rule().min, grid.rule().max);
@@ -337,7 +337,7 @@ fn as_map_file(map: &MapServerMap, args: &Args) -> anyhow::Result<MapFile> {
         grid = OccupancyGrid::from_store(store, model)?;
     }
     let name = args.input.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut file = MapFile::default();
+    let mut file = MapFile::<2>::default();
     file.header = MapHeader { logs: vec![name], ..MapHeader::default() };
     file.grid = Some(grid);
     Ok(file)

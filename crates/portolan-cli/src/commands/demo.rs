@@ -226,7 +226,7 @@ fn fused(
     grid: &Grid<2>,
     scans: &[(Pose<2>, Scan<2>)],
     output: Output,
-) -> anyhow::Result<(MapFile, FusionReport, BTreeMap<&'static str, usize>)> {
+) -> anyhow::Result<(MapFile<2>, FusionReport, BTreeMap<&'static str, usize>)> {
     let mut maps = settings.empty_maps(grid)?;
     let progress = Progress::new(scans.len() * maps.count(), "fusing", output);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -234,13 +234,13 @@ fn fused(
     let bytes = maps.bytes();
     let Maps { grid, tree, tsdf } = maps;
     let poses = scans.iter().map(|(pose, _)| *pose).collect();
-    let mut file = MapFile::default();
+    let mut file = MapFile::<2>::default();
     (file.grid, file.tree, file.tsdf, file.poses) = (grid, tree, tsdf, poses);
     Ok((file, fusion, bytes))
 }
 
 /// Writes into the file's header what it is made of.
-fn describe(file: &mut MapFile, settings: &Settings, config: &LapConfig, stats: &ScanStats) {
+fn describe(file: &mut MapFile<2>, settings: &Settings, config: &LapConfig, stats: &ScanStats) {
     file.header.logs.push(format!("simulated Apartment, seed {:#x}", config.seed));
     file.header.scans = stats.scans;
     file.header.settings = settings.to_json();

@@ -77,7 +77,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// Evaluates a map of the plane.
-fn plane(args: &Args, file: &MapFile) -> anyhow::Result<()> {
+fn plane(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     let Some(tsdf) = &file.tsdf else {
         bail!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display());
     };
@@ -106,7 +106,7 @@ fn plane(args: &Args, file: &MapFile) -> anyhow::Result<()> {
 }
 
 /// Predicts the ranges of scans by casting rays through the map.
-fn predict(args: &Args, file: &MapFile, path: &Path) -> anyhow::Result<Value> {
+fn predict(args: &Args, file: &MapFile<2>, path: &Path) -> anyhow::Result<Value> {
     let Some(tsdf) = &file.tsdf else { bail!("{}: the map has no tsdf", args.map.display()) };
     let log = log::read(path, &args.source)?;
     let saved = |key: &str| file.header.settings.get(key).and_then(Value::as_f64);

@@ -88,11 +88,11 @@ fn about(source: &Source) -> Value {
         Source::Octomap(file) => of_octomap(file),
         Source::Log(log) => of_log(log),
         Source::SpaceMap(file) => space::of_map(file),
-        Source::SpaceLog(log) => space::of_log(log),
+        Source::ScanLog(log) => space::of_log(log),
     }
 }
 
-fn of_map(file: &MapFile) -> Value {
+fn of_map(file: &MapFile<2>) -> Value {
     let header = &file.header;
     let mut maps = json!({});
     if let Some(map) = &file.grid {

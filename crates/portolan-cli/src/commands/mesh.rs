@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use portolan::surface::{Ambiguity, ContourSettings, MeshSettings, marching_cubes, marching_squares};
-use portolan_io::{MapFile, SpaceMapFile};
+use portolan_io::MapFile;
 use serde_json::json;
 
 use crate::arguments::weight_or_zero;
@@ -52,7 +52,7 @@ fn no_tsdf(args: &Args) -> anyhow::Error {
     anyhow!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display())
 }
 
-fn contour(args: &Args, file: &MapFile) -> anyhow::Result<()> {
+fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let ambiguity = if args.fixed_table { Ambiguity::FixedTable } else { Ambiguity::Decide };
     let min_weight = args.min_weight.unwrap_or(ContourSettings::of(tsdf).min_weight);
@@ -77,14 +77,14 @@ fn contour(args: &Args, file: &MapFile) -> anyhow::Result<()> {
     )
 }
 
-fn mesh(args: &Args, file: &SpaceMapFile) -> anyhow::Result<()> {
+fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
     if args.fixed_table {
         return Err(bad_call("--fixed-table is for contours; the map is of space"));
     }
-    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
     let usual = mesh_settings(tsdf.weights);
     let settings = MeshSettings { min_weight: args.min_weight.unwrap_or(usual.min_weight), ..usual };
-    let mesh = marching_cubes(&tsdf.store, file.colors.as_ref().map(|c| &c.store), &settings);
+    let mesh = marching_cubes(&tsdf.store, file.color_bricks.as_ref().map(|c| &c.store), &settings);
     if !write_mesh(&args.out, &mesh)? {
         return Err(bad_call(format!("{}: give OUT the name .ply, .glb or .obj", args.out.display())));
     }

@@ -12,7 +12,7 @@ use portolan::store::Store;
 use portolan::sweep::OccupancySweep;
 use portolan_io::{
     AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
-    SpaceMapFile, certified_reach, write_answer, write_answer_header,
+    certified_reach, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
@@ -183,7 +183,7 @@ impl Fields {
     }
 }
 
-fn of_map(file: MapFile, args: &Args) -> Field<2> {
+fn of_map(file: MapFile<2>, args: &Args) -> Field<2> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
         let pessimistic = args.unknown == Some(UnknownArg::Pessimistic);
         let field = plane_esdf(t, args.esdf.unwrap_or_default(), pessimistic);
@@ -215,10 +215,10 @@ fn of_map(file: MapFile, args: &Args) -> Field<2> {
     Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY }
 }
 
-fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
+fn of_space_map(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     let saved = file.header.settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
     let max_distance = args.max_distance.or(saved).unwrap_or(1.0);
-    let field = file.tsdf.as_ref().map(|map| {
+    let field = file.tsdf_bricks.as_ref().map(|map| {
         let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
         how.method = args.esdf.unwrap_or_default().method();
         how.unknown = args.unknown == Some(UnknownArg::Pessimistic);
@@ -229,7 +229,7 @@ fn of_space_map(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
     });
     let (distance, clearance) =
         field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
-    let occupancy: Occupancy<3> = match (file.occupancy, file.tsdf) {
+    let occupancy: Occupancy<3> = match (file.occupancy_bricks, file.tsdf_bricks) {
         (Some(map), _) => {
             let map = Occupancy::from_store(map.store, map.model, OccupancySweep::Auto)?;
             Box::new(move |p| map.probability(p))

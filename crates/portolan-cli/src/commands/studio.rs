@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use portolan::map::{Tsdf3, TsdfConfig};
-use portolan_io::{AnyMapFile, FileKind, detect};
+use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan_io::{Container, FileKind, MapFile, detect, map_dimension};
 use portolan_studio::engine::{Limits, Logs, PlaneLog, SpaceSource, check};
 use portolan_studio::server::{Server, Settings};
 use serde_json::json;
@@ -97,12 +97,14 @@ impl Args {
         }
         let shown = path.display();
         let file = if path.is_dir() { path.join("map.portolan") } else { path.into() };
-        let AnyMapFile::Space(file) = AnyMapFile::read_within(file, self.memory)? else {
+        let container = Container::read(file)?;
+        if map_dimension(&container)? != 3 {
             bail!(
                 "{shown}: a map of the plane; give the log that it was made of, and the studio makes it again"
             );
-        };
-        let Some(held) = file.tsdf else {
+        }
+        let file = MapFile::<3>::from_container(&container, self.memory)?;
+        let Some(held) = file.tsdf_bricks else {
             bail!("{shown}: the map holds no distances, and so no surface; make it with --maps tsdf");
         };
         let config = TsdfConfig {
@@ -112,7 +114,7 @@ impl Args {
             weights: held.weights,
             ..TsdfConfig::default()
         };
-        let tsdf = Tsdf3::from_stores(held.store, file.colors.map(|c| c.store), config)?;
+        let tsdf = SparseTsdf::from_stores(held.store, file.color_bricks.map(|c| c.store), config)?;
         let space = SpaceSource::Map { name: name(path), tsdf: Box::new(tsdf) };
         Ok(Logs { space, ..Logs::default() })
     }

@@ -37,7 +37,7 @@ pub(crate) struct Derived {
 
 impl Derived {
     /// Contour and distance field, as far as they are wanted and there is something to derive them from.
-    pub(crate) fn of(file: &MapFile, settings: &Settings) -> Self {
+    pub(crate) fn of(file: &MapFile<2>, settings: &Settings) -> Self {
         let mut derived = Self::default();
         let Some(tsdf) = &file.tsdf else { return derived };
         if settings.wants(MapKind::Contour) {
@@ -69,7 +69,7 @@ impl Derived {
 
 /// Everything that is written.
 pub(crate) struct Artefacts<'a> {
-    pub(crate) file: &'a MapFile,
+    pub(crate) file: &'a MapFile<2>,
     pub(crate) derived: &'a Derived,
     /// What the picture's title says.
     pub(crate) title: String,
@@ -162,7 +162,7 @@ pub(crate) fn seen_by_tree(map: &Quadtree) -> Option<Grid<2>> {
     (low[0] < high[0]).then(|| Grid::new(lattice.corner(low), lattice.resolution, shape))
 }
 
-pub(crate) fn cells_for_map_server(file: &MapFile) -> Option<(Grid<2>, Vec<MapCell>)> {
+pub(crate) fn cells_for_map_server(file: &MapFile<2>) -> Option<(Grid<2>, Vec<MapCell>)> {
     let decide = |p: Option<f64>| match p {
         Some(p) if p > OCCUPIED => MapCell::Occupied,
         Some(p) if p < FREE => MapCell::Free,

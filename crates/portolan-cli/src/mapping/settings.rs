@@ -116,7 +116,7 @@ impl Settings {
     }
 
     /// Refuses to go on with a map that was made with other settings.
-    pub(crate) fn check_agree(&self, file: &MapFile, name: &str) -> anyhow::Result<()> {
+    pub(crate) fn check_agree(&self, file: &MapFile<2>, name: &str) -> anyhow::Result<()> {
         let (ours, theirs) = (self.to_json(), &file.header.settings);
         const SHAPING: [&str; 10] = [
             "resolution",

@@ -18,7 +18,7 @@ pub(crate) struct Summary<'a> {
     pub(crate) grid: Grid<2>,
     pub(crate) held_out: usize,
     pub(crate) fusion: &'a FusionReport,
-    pub(crate) file: &'a MapFile,
+    pub(crate) file: &'a MapFile<2>,
     pub(crate) derived: &'a Derived,
     pub(crate) bytes: BTreeMap<&'static str, usize>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,

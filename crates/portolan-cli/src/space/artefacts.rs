@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use portolan::cell::LogOddsRule;
 use portolan::geom::Aabb;
-use portolan_io::{IoError, SpaceMapFile, write_atomic, write_esdf, write_octomap_bt, write_octomap_ot};
+use portolan_io::{IoError, MapFile, write_atomic, write_esdf, write_octomap_bt, write_octomap_ot};
 
 use crate::stale::remove_stale;
 
@@ -16,7 +16,7 @@ use super::{Derived, preview};
 
 /// Everything that is written.
 pub(crate) struct Artefacts<'a> {
-    pub(crate) file: &'a SpaceMapFile,
+    pub(crate) file: &'a MapFile<3>,
     pub(crate) derived: &'a Derived,
     /// The box of the distance field that is asked for.
     pub(crate) dense: Option<Aabb<3>>,
@@ -66,7 +66,9 @@ impl Artefacts<'_> {
     }
 
     fn write_octree(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
-        let (Some(tree), Some(map)) = (&self.derived.tree, &self.file.occupancy) else { return Ok(()) };
+        let (Some(tree), Some(map)) = (&self.derived.tree, &self.file.occupancy_bricks) else {
+            return Ok(());
+        };
         let rule = LogOddsRule::<i8>::new(&map.model)?;
         let bt = write_octomap_bt(folder.join("octree.bt"), tree);
         let ot = write_octomap_ot(folder.join("octree.ot"), tree, rule.quantum);

@@ -8,7 +8,7 @@ use portolan::field::{SparseEsdf, SparseEsdfSettings};
 use portolan::store::{Store, Tree};
 use portolan::surface::{Mesh, MeshSettings, marching_cubes};
 use portolan::sweep::WeightModel;
-use portolan_io::SpaceMapFile;
+use portolan_io::MapFile;
 
 use super::Settings;
 use crate::arguments::shown_bytes;
@@ -27,9 +27,9 @@ pub(crate) struct Derived {
 
 impl Derived {
     /// `memory`: what maps and fields may take together (bytes).
-    pub(crate) fn of(file: &SpaceMapFile, settings: &Settings, memory: usize) -> Self {
+    pub(crate) fn of(file: &MapFile<3>, settings: &Settings, memory: usize) -> Self {
         let mut derived = Self::default();
-        if let Some(map) = &file.occupancy {
+        if let Some(map) = &file.occupancy_bricks {
             let start = Instant::now();
             derived.tree = Tree::from_bricks(&map.store);
             if derived.tree.is_none() {
@@ -37,17 +37,17 @@ impl Derived {
             }
             derived.seconds.insert("octree", start.elapsed().as_secs_f64());
         }
-        let Some(tsdf) = &file.tsdf else { return derived };
+        let Some(tsdf) = &file.tsdf_bricks else { return derived };
         if settings.wants(MapKind::Mesh) {
             let start = Instant::now();
-            let colors = file.colors.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
+            let colors = file.color_bricks.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
             derived.mesh = Some(marching_cubes(&tsdf.store, colors, &mesh_settings(settings.weights)));
             derived.seconds.insert("mesh", start.elapsed().as_secs_f64());
         }
         if settings.wants(MapKind::Esdf) {
             let start = Instant::now();
-            let held =
-                tsdf.store.memory_bytes() + file.occupancy.as_ref().map_or(0, |o| o.store.memory_bytes());
+            let held = tsdf.store.memory_bytes()
+                + file.occupancy_bricks.as_ref().map_or(0, |o| o.store.memory_bytes());
             // The field, and as much again while it is made.
             let needed = 2 * tsdf.store.len() * 512 * size_of::<f32>();
             if held.saturating_add(needed) > memory {

@@ -8,7 +8,7 @@ use portolan::geom::Pose;
 use portolan::map::MapError;
 use portolan::scan::{BeamCounts, Frame, FrameFilter, ScanStats};
 use portolan_io::IoError;
-use portolan_io::space_log::SpaceLog;
+use portolan_io::scan_log::ScanLog;
 
 use super::SpaceMaps;
 use crate::progress::Progress;
@@ -54,7 +54,7 @@ type Read = (usize, Result<(Frame, BeamCounts), IoError>);
 /// on the number of threads.
 pub(crate) fn fuse(
     maps: &mut SpaceMaps,
-    log: &SpaceLog,
+    log: &ScanLog,
     indices: &[usize],
     filter: &FrameFilter,
     (memory, threads): (usize, usize),
@@ -83,7 +83,7 @@ pub(crate) fn fuse(
 
 fn fuse_all(
     maps: &mut SpaceMaps,
-    log: &SpaceLog,
+    log: &ScanLog,
     frames: impl Iterator<Item = Read>,
     memory: usize,
     report: &mut Fusion,

@@ -8,7 +8,7 @@ use portolan::geom::{Aabb, Pose};
 use portolan::map::{MapError, Occupancy, Tsdf3};
 use portolan::scan::{Frame, ScanStats};
 use portolan::store::Store;
-use portolan_io::{ColorBricks, OccupancyBricks, SpaceMapFile, TsdfBricks};
+use portolan_io::{ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
 use serde_json::Map;
 
 use super::{Fusion, Settings};
@@ -74,12 +74,8 @@ impl SpaceMaps {
     }
 
     /// The maps of a file, to go on with; they are taken out of it.
-    pub(crate) fn take_from(
-        file: &mut SpaceMapFile,
-        settings: &Settings,
-        name: &str,
-    ) -> anyhow::Result<Self> {
-        let missing = match (&file.occupancy, &file.tsdf) {
+    pub(crate) fn take_from(file: &mut MapFile<3>, settings: &Settings, name: &str) -> anyhow::Result<Self> {
+        let missing = match (&file.occupancy_bricks, &file.tsdf_bricks) {
             (None, _) if settings.wants(MapKind::Tree) => Some("tree"),
             (_, None) if settings.wants(MapKind::Tsdf) => Some("tsdf"),
             _ => None,
@@ -89,27 +85,29 @@ impl SpaceMaps {
                 "{name}: the {missing} is missing in the map; leave it out of --maps, or write to another folder"
             );
         }
-        let occupancy =
-            file.occupancy.take().map(|o| Occupancy::from_store(o.store, o.model, settings.sweep));
-        let tsdf = file.tsdf.take().map(|t| {
+        let occupancy = file
+            .occupancy_bricks
+            .take()
+            .map(|o| SparseOccupancy::from_store(o.store, o.model, settings.sweep));
+        let tsdf = file.tsdf_bricks.take().map(|t| {
             let config = settings.tsdf_config(t.store.lattice().origin);
-            Tsdf3::from_stores(t.store, file.colors.take().map(|c| c.store), config)
+            SparseTsdf::from_stores(t.store, file.color_bricks.take().map(|c| c.store), config)
         });
         Ok(Self { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()? })
     }
 
     /// Puts the maps into a file.
-    pub(crate) fn store_into(self, file: &mut SpaceMapFile) {
-        file.occupancy = self.occupancy.map(|map| {
+    pub(crate) fn store_into(self, file: &mut MapFile<3>) {
+        file.occupancy_bricks = self.occupancy.map(|map| {
             let model = *map.model();
             OccupancyBricks { store: map.into_store(), model, more: Map::new() }
         });
         if let Some(map) = self.tsdf {
             let config = *map.config();
             let (store, colors) = map.into_stores();
-            file.colors =
+            file.color_bricks =
                 colors.map(|store| ColorBricks { store, w_max: config.color_w_max, more: Map::new() });
-            file.tsdf = Some(TsdfBricks {
+            file.tsdf_bricks = Some(TsdfBricks {
                 store,
                 truncation: config.truncation,
                 w_max: config.w_max,

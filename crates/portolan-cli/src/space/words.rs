@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::geom::Aabb;
-use portolan_io::SpaceMapFile;
-use portolan_io::space_log::{SpaceLog, SpaceLogStats};
+use portolan_io::MapFile;
+use portolan_io::scan_log::{ScanLog, ScanLogStats};
 use serde_json::{Value, json};
 
 use super::{Derived, Fusion, Settings, brick_extent};
@@ -14,11 +14,11 @@ use crate::json;
 
 /// Everything that a run found out.
 pub(crate) struct Summary<'a> {
-    pub(crate) log: &'a SpaceLog,
+    pub(crate) log: &'a ScanLog,
     pub(crate) settings: &'a Settings,
     pub(crate) held_out: usize,
     pub(crate) fusion: &'a Fusion,
-    pub(crate) file: &'a SpaceMapFile,
+    pub(crate) file: &'a MapFile<3>,
     pub(crate) derived: &'a Derived,
     /// What was not written, and why.
     pub(crate) notes: Vec<String>,
@@ -72,10 +72,10 @@ impl Summary<'_> {
     /// Box of what was seen: of the bricks that hold it.
     fn extent(&self) -> Aabb<3> {
         let mut extent = Aabb::EMPTY;
-        if let Some(map) = &self.file.occupancy {
+        if let Some(map) = &self.file.occupancy_bricks {
             extent = extent.union(brick_extent(&map.store));
         }
-        if let Some(map) = &self.file.tsdf {
+        if let Some(map) = &self.file.tsdf_bricks {
             extent = extent.union(brick_extent(&map.store));
         }
         extent
@@ -181,7 +181,7 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     text
 }
 
-fn log_warnings(stats: &SpaceLogStats) -> Vec<String> {
+fn log_warnings(stats: &ScanLogStats) -> Vec<String> {
     let mut warnings = Vec::new();
     let mut say = |n: u64, what: &str| {
         if n > 0 {

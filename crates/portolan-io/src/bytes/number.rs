@@ -8,7 +8,7 @@ pub(crate) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
 const POWERS_OF_TEN: [f64; 19] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18];
 
-/// The number that a word spells, `nan` and `inf` included; `None` where it spells none. The result is the
+/// The number that a word spells, `nan` and `inf` included; `None` for any other word. The result is the
 /// double nearest to the decimal, as with [`str::parse`].
 ///
 /// Plain decimals whose digits fit 53 bits take one division of two exact doubles, which rounds correctly

@@ -1,4 +1,4 @@
-//! Opening a file whatever it is packed with.
+//! Opening plain and compressed files alike.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use crate::IoError;
 
-/// So many bytes come with the first [`BufRead::fill_buf`] of any input, where it has them: enough to tell its format.
+/// So many bytes come with the first [`BufRead::fill_buf`] of any input, where it has them: enough to find its format.
 const HEAD: u64 = 64;
 
-/// How a file is packed, told by its first bytes.
+/// How a file is compressed, by its first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compression {
     /// Not packed.
@@ -21,7 +21,7 @@ pub enum Compression {
 }
 
 impl Compression {
-    /// The packing that starts with these bytes; three are enough to tell.
+    /// The packing that starts with these bytes; three are enough.
     pub fn of(head: &[u8]) -> Self {
         match head {
             [0x1f, 0x8b, ..] => Self::Gzip,
@@ -124,7 +124,7 @@ impl BufRead for Input {
     }
 }
 
-/// Opens a plain, gzip or bzip2 file; which of them is told by the first bytes, not by the name.
+/// Opens a plain, gzip or bzip2 file; the first bytes decide which, not the name.
 ///
 /// # Errors
 /// [`IoError::IsFolder`] for a folder, [`IoError::Os`] where the file cannot be opened or read.
@@ -136,7 +136,7 @@ pub fn open(path: impl AsRef<Path>) -> Result<Input, IoError> {
 /// Opens a file as it is.
 pub(crate) fn open_file(path: &Path) -> Result<File, IoError> {
     let file = File::open(path).map_err(|e| IoError::os(path, "open it", e))?;
-    let about = file.metadata().map_err(|e| IoError::os(path, "look at it", e))?;
+    let about = file.metadata().map_err(|e| IoError::os(path, "read its metadata", e))?;
     if about.is_dir() {
         return Err(IoError::IsFolder { path: path.into() });
     }
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn packing_is_told_by_content_and_members_are_joined() {
+    fn packing_is_found_by_content_and_members_are_joined() {
         let text: Vec<u8> = (0..100_000u32).flat_map(|i| i.to_le_bytes()).collect();
         assert_eq!(unpack(text.clone()).unwrap(), text);
         assert_eq!(unpack([gz(&text), gz(b"tail")].concat()).unwrap(), [&text[..], b"tail"].concat());

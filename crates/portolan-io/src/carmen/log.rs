@@ -104,7 +104,7 @@ impl CarmenLog {
         self.entries.len()
     }
 
-    /// Scan `i` in the order of the file. Panics where there is none.
+    /// Scan `i` in the order of the file. Panics for an `i` beyond the last.
     pub fn raw(&self, i: usize) -> CarmenScan<'_> {
         let entry = &self.entries[i];
         let fan = &self.fans[entry.fan as usize];

@@ -29,7 +29,7 @@ impl FanShape {
     }
 }
 
-/// What a scan line says besides the readings.
+/// The other values of a scan line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ScanHead {
     pub(super) fan: FanShape,
@@ -88,7 +88,7 @@ fn robot_laser<'a>(
     words.number("remission_mode")?;
     let beams = words.beams()?;
     let fan = FanShape { start, step, beams };
-    // A single beam needs no resolution; more than a turn (and some rounding) is no planar fan.
+    // A single beam needs no resolution; more than a turn (and some rounding) is not a 2-D fan.
     let turns = step * (beams - 1) as f64 / TAU;
     if !(start.abs() <= 2.0 * TAU && step.is_finite() && (beams == 1 || (step > 0.0 && turns <= 1.01))) {
         let text =

@@ -27,7 +27,7 @@ const FEWEST: usize = 10;
 /// of readings.
 pub fn detect_no_return(log: &CarmenLog) -> Option<f64> {
     let tail = Tail::of(log);
-    // What most readings are is not what the sensor says when there is nothing.
+    // A reading that most beams have is a surface, not a missing echo.
     let pile = tail.pile().filter(|&from| readings(log).filter(|(r, _)| *r >= from).count() <= tail.all / 2);
     let declared = log.stats().declared_max_range.map(|max| 0.9985 * max).filter(|&from| {
         let beyond = readings(log).filter(|(r, _)| *r >= from).count();

@@ -1,4 +1,4 @@
-//! What was found in a log: nothing is dropped in silence.
+//! What was found in a log: all that is dropped is counted.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -30,11 +30,11 @@ pub enum ScanFault {
     TooFewNumbers,
     /// More words follow than the message has, so that the announced number of beams is wrong.
     TooManyNumbers,
-    /// A word that should be a number is none.
+    /// A word that should be a number cannot be read as one.
     NotANumber,
     /// No beams.
     ZeroBeams,
-    /// More beams than any planar laser has.
+    /// More beams than any 2-D laser has.
     TooManyBeams,
     /// A pose that is NaN or infinite.
     PoseNotFinite,
@@ -118,7 +118,7 @@ pub struct CarmenStats {
     pub refused: RefusedScans,
     /// Lines that carry no scan, by first word; comments under `#`, rare words together under `(other)`.
     pub other_messages: BTreeMap<String, u64>,
-    /// The smallest maximum range that the scans declare (metres); `FLASER` declares none.
+    /// The smallest maximum range that the scans declare (metres); `None` for `FLASER` scans, which declare nothing.
     pub declared_max_range: Option<f64>,
     /// Whether the stamps ascend.
     pub times: TimeOrder,

@@ -11,7 +11,7 @@ use crate::IoError;
 use crate::bytes::open_file;
 use crate::error::shown;
 
-/// What the index says about a chunk.
+/// A chunk as the index lists it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chunk {
     /// Kind of content.
@@ -26,7 +26,7 @@ pub struct Chunk {
     crc: u32,
 }
 
-/// A container whose index was checked; chunks are checked and unpacked when they are asked for.
+/// A container whose index was checked; each chunk is checked and unpacked on request.
 #[derive(Clone, Debug)]
 pub struct Container {
     path: PathBuf,
@@ -38,20 +38,27 @@ impl Container {
     /// Reads a file into memory, packed as it is.
     ///
     /// # Errors
-    /// As [`Container::parse`].
+    /// As [`Container::from_reader`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
-        let mut bytes = Vec::new();
-        // A file of another kind may be huge: the header is looked at first.
-        let mut file = open_file(path)?;
-        let failed = |e| IoError::os(path, "read it", e);
-        file.by_ref().take(HEADER as u64).read_to_end(&mut bytes).map_err(failed)?;
-        Header::of(&bytes, path)?;
-        file.read_to_end(&mut bytes).map_err(failed)?;
-        Self::parse(bytes, path)
+        Self::from_reader(open_file(path)?, path)
     }
 
-    /// Reads a container that is in memory, under the name that errors shall give.
+    /// Reads a source into memory, packed as it is; errors name it `name`.
+    ///
+    /// # Errors
+    /// [`IoError::Os`] where reading fails, and as [`Container::parse`].
+    pub fn from_reader(mut reader: impl Read, name: &Path) -> Result<Self, IoError> {
+        let failed = |e| IoError::os(name, "read it", e);
+        let mut bytes = Vec::new();
+        // Sources of another kind may be huge: the header is checked first.
+        reader.by_ref().take(HEADER as u64).read_to_end(&mut bytes).map_err(failed)?;
+        Header::of(&bytes, name)?;
+        reader.read_to_end(&mut bytes).map_err(failed)?;
+        Self::parse(bytes, name)
+    }
+
+    /// Reads a container in memory; errors name it `name`.
     ///
     /// # Errors
     /// [`IoError::Binary`] where header or index are damaged or claim what cannot be.
@@ -76,12 +83,17 @@ impl Container {
         Ok(Self { path: name.into(), bytes, chunks })
     }
 
+    /// The file, or the name that was given for it.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The chunks in the order of the file.
     pub fn chunks(&self) -> &[Chunk] {
         &self.chunks
     }
 
-    /// The content of the chunk with this tag and name; `None` where there is none.
+    /// The content of the chunk with this tag and name; `None` where the file has no such chunk.
     ///
     /// # Errors
     /// As [`Container::unpack`].
@@ -95,7 +107,7 @@ impl Container {
         self.chunks.iter().filter(move |c| c.tag == tag)
     }
 
-    /// The content of one of [`Container::chunks`]. Memory grows as it is unpacked, and no further than the
+    /// The content of one of [`Container::chunks`]. Memory grows as it is unpacked, and no farther than the
     /// index announces.
     ///
     /// # Errors
@@ -128,11 +140,11 @@ impl Container {
         self.bytes.get(chunk.position..end).unwrap_or(&[])
     }
 
-    /// A writer that holds the chunks that `keep` wants, packed as they are: for programs that replace some
+    /// A writer that holds the chunks for which `keep` is true, packed as they are: for programs that replace some
     /// chunks and keep the rest, known or not.
     ///
     /// # Errors
-    /// None in practice: what was read can be written.
+    /// [`IoError::Unwritable`] in principle only: what was read can be written.
     pub fn writer(&self, mut keep: impl FnMut(&Chunk) -> bool) -> Result<ContainerWriter, IoError> {
         let mut writer = ContainerWriter::new();
         for chunk in self.chunks.iter().filter(|c| keep(c)) {
@@ -171,7 +183,7 @@ impl Header {
                 8,
                 "the version",
                 version.to_string(),
-                "this program knows version 1; use a newer one",
+                "this program reads version 1; use a newer one",
             );
         }
         if crc32c::crc32c(&bytes[..28]) != u32_at(bytes, 28) {
@@ -203,7 +215,7 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
                 0,
                 "the index",
                 format!("{} entries", chunks.len()),
-                "the header announces more of them",
+                "the header announces more: the file is cut off",
             );
         };
         let Some(tag) = tag_of(std::array::from_fn(|k| entry[k])) else {
@@ -211,10 +223,20 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
         };
         let [place, stored_length, length] = [8, 16, 24].map(|k| u64_at(entry, k));
         if place != position as u64 {
-            return bad(8, "a chunk position", place.to_string(), "chunks must follow each other");
+            return bad(
+                8,
+                "a chunk position",
+                place.to_string(),
+                "chunks must follow each other without gaps: the file is damaged",
+            );
         }
         if stored_length > (index - position) as u64 {
-            return bad(16, "a stored length", stored_length.to_string(), "it reaches behind the chunks");
+            return bad(
+                16,
+                "a stored length",
+                stored_length.to_string(),
+                "it reaches beyond the chunks: the file is damaged",
+            );
         }
         if length > LONGEST_CHUNK {
             return bad(24, "a chunk length", length.to_string(), "chunks have at most 2^30 bytes");
@@ -226,7 +248,12 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
             return bad(36, "a chunk name", format!("{name_length} bytes"), "use at most 255 bytes of UTF-8");
         };
         if !names.insert((tag.clone(), name)) {
-            return bad(0, "a chunk name", format!("{tag} {}", shown(name.as_bytes())), "it is there twice");
+            return bad(
+                0,
+                "a chunk name",
+                format!("{tag} {}", shown(name.as_bytes())),
+                "it is there twice: write the file again",
+            );
         }
         let crc = u32_at(entry, 32);
         chunks.push(Chunk { tag, name: name.to_owned(), length, stored_length, position, crc });

@@ -8,7 +8,7 @@ use portolan::scan::{Frame, Origin};
 use super::{LogWriter, matrix_rows};
 use crate::{IoError, write_atomic};
 
-/// `calib.txt` has the projections of four cameras, which there are not, and `Tr`, which readers need.
+/// `calib.txt` has placeholders for the projections of four cameras, and `Tr`, which readers need.
 pub(super) fn texts(camera_from_lidar: &Pose<3>) -> Vec<(&'static str, String)> {
     let row = matrix_rows(camera_from_lidar).map(|r| r.join(" ")).join(" ");
     let projection = "1 0 0 0 0 1 0 0 0 0 1 0";
@@ -29,11 +29,11 @@ impl LogWriter {
             Frame::Image(image) => image.points().map(|(_, p)| p.map(|v| v as f32)).collect(),
             Frame::Points(scan) if scan.origin == Origin::Common([0.0; 3]) => scan.points.clone(),
             Frame::Points(_) => {
-                let advice = "KITTI's rays begin in the zero of the points; move the points and the pose";
+                let advice = "KITTI's rays begin at the origin of the points; move the points and the pose";
                 return Err(IoError::unwritable(
                     &path,
                     "the origin of rays",
-                    "not the zero of the points",
+                    "not at the origin of the points",
                     advice,
                 ));
             }
@@ -49,7 +49,7 @@ impl LogWriter {
         })?;
         let pose = matrix_rows(world_from_camera).map(|r| r.join(" ")).join(" ");
         self.text("poses.txt").push_str(&(pose + "\n"));
-        // As many digits as tell it apart: of an epoch stamp the seven of KITTI's own files leave minutes.
+        // The shortest digits that give the same double: of an epoch stamp the seven of KITTI's own files leave minutes.
         self.text("times.txt").push_str(&format!("{seconds:e}\n"));
         Ok(())
     }
@@ -59,7 +59,7 @@ impl LogWriter {
 mod tests {
     use super::super::{LogLayout, LogWriter};
     use super::*;
-    use crate::space_log::{SpaceLog, SpaceLogKind, SpaceLogOptions};
+    use crate::scan_log::{ScanLog, ScanLogKind, ScanLogOptions};
     use portolan::scan::{PointScan, RefusedBeams};
 
     #[test]
@@ -81,8 +81,8 @@ mod tests {
         let pose = Pose::from_quaternion([1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8]).unwrap();
         times.iter().for_each(|t| writer.push(&pose, *t, &frame).unwrap());
         assert_eq!(writer.finish().unwrap(), 4);
-        let log = SpaceLog::open(folder.path(), &SpaceLogOptions::default()).unwrap();
-        assert_eq!(log.kind(), SpaceLogKind::Kitti);
+        let log = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
+        assert_eq!(log.kind(), ScanLogKind::Kitti);
         assert_eq!([0, 1, 2, 3].map(|i| log.time(i).unwrap()), times);
     }
 }

@@ -1,4 +1,4 @@
-//! Logs of scans of space, written in the layouts of well-known data sets: what a simulator saw, for any reader.
+//! Logs of 3-D scans, written in the layouts of well-known data sets, so that other programs read simulated scans.
 //!
 //! | layout | holds | files |
 //! |---|---|---|
@@ -23,13 +23,13 @@ use crate::{IoError, write_atomic};
 #[non_exhaustive]
 pub enum LogLayout {
     /// KITTI odometry. Poses are those of the camera, so that `world_from_lidar = world_from_camera * camera_from_lidar`;
-    /// the second factor is written as `Tr`. Rays that met nothing cannot be told.
+    /// the second factor is written as `Tr`. Rays without a return cannot be stored.
     Kitti {
-        /// The identity, if there is no camera.
+        /// The identity for a lidar without a camera.
         camera_from_lidar: Pose<3>,
     },
     /// TUM RGB-D. TUM's own logs have no place for the numbers of the camera; they are written as `calibration.txt`
-    /// (`fx fy cx cy`), as ETH3D does it, where [`SpaceLog`](crate::space_log::SpaceLog) finds them.
+    /// (`fx fy cx cy`), as ETH3D does it, where [`ScanLog`](crate::scan_log::ScanLog) finds them.
     TumRgbd,
     /// 7-Scenes, with the numbers of the camera beside the frames.
     SevenScenes,

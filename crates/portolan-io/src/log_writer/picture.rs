@@ -1,4 +1,4 @@
-//! Depth and colour as PNG, and rotations as quaternions.
+//! Depth and color as PNG, and rotations as quaternions.
 
 use std::io::Write;
 use std::path::Path;
@@ -9,7 +9,7 @@ use portolan::scan::RangeImage;
 
 use crate::{IoError, write_atomic};
 
-/// A 16-bit grey picture of so many units per metre; 0 where there is no surface, or none that 16 bits could hold.
+/// A 16-bit gray picture of so many units per metre; 0 for pixels without a surface, and for values beyond 16 bits.
 pub(super) fn depth_png(path: &Path, image: &RangeImage, units_per_metre: f64) -> Result<(), IoError> {
     let units = |v: &f32| {
         let units = (f64::from(*v) * units_per_metre).round();

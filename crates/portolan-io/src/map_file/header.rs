@@ -1,25 +1,24 @@
-//! The header: what the maps are, and what the writer says about them.
+//! The header: what the writer noted, and one entry per map.
 
-use portolan::cell::OccupancyModel;
-use portolan::geom::Grid;
-use portolan::map::BeamSweep;
-use portolan::sweep::WeightModel;
+use portolan::geom::{Grid, Lattice};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-/// What the writer of a map says about it, in its own words: nothing here is needed to read the maps.
+use super::kind::Kind;
+
+/// What the writer of a file noted about its maps; none of it is needed to read them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MapHeader {
-    /// Names of the logs that were fused, in order.
+    /// Names of the fused logs, in order.
     #[serde(default)]
     pub logs: Vec<String>,
-    /// Scans that were fused.
+    /// Number of fused scans.
     #[serde(default)]
     pub scans: u64,
-    /// Every so many-th scan was left out of fusion, for evaluation.
+    /// Every n-th scan was kept out of fusion, for evaluation; `None`: all were fused.
     #[serde(default)]
     pub hold_out: Option<u64>,
-    /// Only every so many-th scan of the log was looked at.
+    /// Only every n-th scan of the log was used; `None`: all.
     #[serde(default)]
     pub every: Option<u64>,
     /// How the maps were made.
@@ -33,105 +32,57 @@ pub struct MapHeader {
     pub more: Map<String, Value>,
 }
 
-/// Place and shape of a dense map.
+/// A map as the header describes it.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Entry {
+    kind: String,
+    cell: String,
+    pub(super) chunk: String,
+    #[serde(flatten)]
+    pub(super) place: Place,
+    /// Settings of the kind, with those that this version does not know.
+    #[serde(flatten)]
+    pub(super) settings: Map<String, Value>,
+}
+
+/// Where the cells of a map are.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Place {
-    pub(super) origin: [f64; 2],
+    /// World position of the lower corner of cell 0 (metres).
+    pub(super) origin: Vec<f64>,
+    /// Edge of a cell (metres).
     pub(super) resolution: f64,
-    pub(super) shape: [u64; 2],
+    /// Cells along each axis, of a dense map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) shape: Option<Vec<u64>>,
+    /// Levels below the root, of a tree.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) depth: Option<u32>,
 }
 
-#[derive(Serialize, Deserialize)]
-pub(super) struct Model {
-    p_hit: f64,
-    p_miss: f64,
-    p_min: f64,
-    p_max: f64,
-    p_prior: f64,
-    wall_depth: Option<f64>,
-}
-
-/// The maps that this program knows, as the header describes them.
-#[derive(Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
-pub(super) enum Entry {
-    OccupancyGrid {
-        cell: String,
-        chunk: String,
-        #[serde(flatten)]
+impl Entry {
+    pub(super) fn new<const D: usize>(
+        kind: Kind,
         place: Place,
-        model: Model,
-    },
-    Quadtree {
-        cell: String,
-        chunk: String,
-        origin: [f64; 2],
-        resolution: f64,
-        depth: u32,
-        model: Model,
-    },
-    Tsdf {
-        cell: String,
-        chunk: String,
-        #[serde(flatten)]
-        place: Place,
-        truncation: f64,
-        /// `null`: never forget.
-        w_max: Option<f32>,
-        carve_weight: f32,
-        sweep: String,
-        weights: String,
-    },
+        settings: &impl Serialize,
+    ) -> serde_json::Result<Self> {
+        Ok(Self {
+            kind: kind.word::<D>().into(),
+            cell: kind.cell().into(),
+            chunk: kind.chunk().into(),
+            place,
+            settings: serde_json::from_value(serde_json::to_value(settings)?)?,
+        })
+    }
 }
-
-pub(super) const LOG_ODDS: &str = "log-odds-i8";
-pub(super) const SIGNED_DISTANCE: &str = "signed-distance-f32";
 
 impl Place {
-    pub(super) fn of(grid: &Grid<2>) -> Self {
-        let Grid { lattice, shape } = grid;
-        Self { origin: lattice.origin, resolution: lattice.resolution, shape: shape.map(|s| s as u64) }
-    }
-}
-
-impl Model {
-    pub(super) fn of(model: &OccupancyModel) -> Self {
-        let OccupancyModel { p_hit, p_miss, p_min, p_max, p_prior, wall_depth } = *model;
-        Self { p_hit, p_miss, p_min, p_max, p_prior, wall_depth }
+    pub(super) fn of_lattice<const D: usize>(lattice: &Lattice<D>) -> Self {
+        Self { origin: lattice.origin.to_vec(), resolution: lattice.resolution, shape: None, depth: None }
     }
 
-    pub(super) fn model(&self) -> OccupancyModel {
-        let Self { p_hit, p_miss, p_min, p_max, p_prior, wall_depth } = *self;
-        OccupancyModel { p_hit, p_miss, p_min, p_max, p_prior, wall_depth }
+    pub(super) fn of_grid<const D: usize>(grid: &Grid<D>) -> Self {
+        let shape = grid.shape.iter().map(|&cells| cells as u64).collect();
+        Self { shape: Some(shape), ..Self::of_lattice(&grid.lattice) }
     }
-}
-
-/// The word for a sweep in files and on the command line.
-pub fn sweep_word(sweep: BeamSweep) -> &'static str {
-    match sweep {
-        BeamSweep::CellCentre => "cell-centre",
-        BeamSweep::March => "march",
-    }
-}
-
-/// The sweep of a word.
-pub fn sweep_of(word: &str) -> Option<BeamSweep> {
-    [BeamSweep::CellCentre, BeamSweep::March].into_iter().find(|&s| sweep_word(s) == word)
-}
-
-/// The word for a weight model in files and on the command line.
-pub fn weights_word(weights: WeightModel) -> &'static str {
-    match weights {
-        WeightModel::Constant => "constant",
-        WeightModel::InverseSquare => "range",
-        WeightModel::CosIncidence => "incidence",
-        WeightModel::InverseSquareCosIncidence => "range-incidence",
-    }
-}
-
-/// The weight model of a word.
-pub fn weights_of(word: &str) -> Option<WeightModel> {
-    use WeightModel::*;
-    let all = [Constant, InverseSquare, CosIncidence, InverseSquareCosIncidence];
-    all.into_iter().find(|&w| weights_word(w) == word)
 }

@@ -1,21 +1,23 @@
-//! What reading a `map.portolan` is made of, whatever the dimension.
+//! The steps of reading a `map.portolan`: header, chunks, memory, poses.
 
 use std::collections::HashMap;
+use std::fmt::Display;
 use std::path::Path;
 
 use portolan::geom::{Lattice, Pose};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
+use super::header::Place;
 use super::{MapHeader, UnknownChunk, VERSION, part_name};
 use crate::error::shown;
 use crate::{Container, IoError};
 
 /// The longest header (bytes of JSON).
 const LONGEST_HEADER: u64 = 64 << 20;
-/// Memory that reading allows for the planes of all maps where nothing else is said (bytes).
+/// Memory that the planes of all maps may take by default (bytes).
 pub(super) const MEMORY: u64 = 4 << 30;
-/// What the advice is wherever the file contradicts itself.
+/// The advice where a file contradicts itself.
 pub(super) const AGAIN: &str = "write the file again";
 
 /// The state of reading a file.
@@ -28,23 +30,14 @@ pub(super) struct Reading<'a> {
     used: Vec<bool>,
     /// Where each chunk stands, by tag and name.
     places: HashMap<(&'a str, &'a str), usize>,
-    /// The header's fields, but for what is read already.
+    /// The fields of the header that were not read yet.
     fields: Map<String, Value>,
-}
-
-/// The dimension that the header of a file announces.
-///
-/// # Errors
-/// [`IoError::Binary`] where there is no header that can be read.
-pub(super) fn dimension(container: &Container, path: &Path) -> Result<u64, IoError> {
-    let reading = Reading::new(container, path, MEMORY)?;
-    reading.dimension().ok_or_else(|| reading.bad_dimension("a whole number, 2 or 3"))
 }
 
 impl<'a> Reading<'a> {
     /// Reads the header; `memory` is what all content may take (bytes).
-    pub(super) fn new(container: &'a Container, path: &'a Path, memory: u64) -> Result<Self, IoError> {
-        let chunks = container.chunks();
+    pub(super) fn new(container: &'a Container, memory: u64) -> Result<Self, IoError> {
+        let (path, chunks) = (container.path(), container.chunks());
         let places = chunks.iter().enumerate().map(|(i, c)| ((c.tag.as_str(), c.name.as_str()), i)).collect();
         let used = vec![false; chunks.len()];
         let mut reading = Self { container, path, memory, used, places, fields: Map::new() };
@@ -52,13 +45,24 @@ impl<'a> Reading<'a> {
         Ok(reading)
     }
 
-    /// The entries of the maps of a file of this dimension.
-    pub(super) fn maps(&mut self, dimension: u64) -> Result<Vec<Value>, IoError> {
-        if self.dimension() != Some(dimension) {
-            return Err(self.bad_dimension(match dimension {
-                2 => "a map of the plane (2) is asked for",
-                _ => "a map of space (3) is asked for",
-            }));
+    /// The dimension that the header announces.
+    pub(super) fn dimension(&self) -> Result<usize, IoError> {
+        match self.fields.get("dimension").and_then(Value::as_u64) {
+            Some(2) => Ok(2),
+            Some(3) => Ok(3),
+            _ => {
+                let value = self.fields.get("dimension").map_or("missing".into(), Value::to_string);
+                Err(self.bad("the dimension", value, "it must be 2 or 3"))
+            }
+        }
+    }
+
+    /// The entries of the maps of a file that must have this dimension.
+    pub(super) fn maps(&mut self, dimension: usize) -> Result<Vec<Value>, IoError> {
+        let found = self.dimension()?;
+        if found != dimension {
+            let advice = format!("give a {dimension}-D map");
+            return Err(self.bad("the dimension", found.to_string(), &advice));
         }
         match self.fields.remove("maps") {
             Some(Value::Array(maps)) => Ok(maps),
@@ -66,7 +70,7 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// What the writer said, and the chunks that nobody asked for.
+    /// What the writer noted, and the chunks that were not read.
     pub(super) fn finish(mut self) -> Result<(MapHeader, Vec<UnknownChunk>), IoError> {
         let mut unknown = Vec::new();
         for (i, chunk) in self.container.chunks().iter().enumerate() {
@@ -82,44 +86,36 @@ impl<'a> Reading<'a> {
         Ok((header, unknown))
     }
 
-    fn dimension(&self) -> Option<u64> {
-        self.fields.get("dimension").and_then(Value::as_u64)
-    }
-
-    fn bad_dimension(&self, advice: &str) -> IoError {
-        let value = self.fields.get("dimension").map_or("missing".into(), Value::to_string);
-        self.bad("the dimension", value, advice)
-    }
-
     /// An error about the header, which is the first chunk.
     pub(super) fn bad(&self, field: impl Into<String>, value: impl Into<String>, advice: &str) -> IoError {
         IoError::binary(self.path, 32, field, value, advice)
     }
 
-    /// A map's entry in the header, typed.
-    pub(super) fn entry<T: DeserializeOwned>(&self, kind: &str, entry: Value) -> Result<T, IoError> {
-        serde_json::from_value(entry)
-            .map_err(|e| self.bad(format!("map {kind}"), shown(e.to_string().as_bytes()), AGAIN))
+    /// A part of a map's entry in the header, typed.
+    pub(super) fn typed<T: DeserializeOwned>(&self, map: &str, part: Value) -> Result<T, IoError> {
+        serde_json::from_value(part)
+            .map_err(|e| self.bad(format!("map {map}"), shown(e.to_string().as_bytes()), AGAIN))
     }
 
-    /// The map, or that it is not possible.
-    pub(super) fn made<T, E: std::fmt::Display>(&self, kind: &str, map: Result<T, E>) -> Result<T, IoError> {
-        map.map_err(|e| self.bad(format!("map {kind}"), format!("not possible ({e})"), AGAIN))
+    /// The result, or the error that the map is not possible.
+    pub(super) fn possible<T, E: Display>(&self, map: &str, result: Result<T, E>) -> Result<T, IoError> {
+        result.map_err(|e| self.bad(format!("map {map}"), format!("not possible ({e})"), AGAIN))
     }
 
-    /// A lattice whose cell indices are whole numbers.
-    pub(super) fn lattice<const D: usize>(
-        &self,
-        origin: [f64; D],
-        resolution: f64,
-    ) -> Result<Lattice<D>, IoError> {
+    /// The lattice of a map, whose cell indices must be exact.
+    pub(super) fn lattice<const D: usize>(&self, map: &str, place: &Place) -> Result<Lattice<D>, IoError> {
         const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
-        // A resolution that is none is refused, with its own words, by the map.
-        if !(resolution > 0.0) || origin.iter().all(|v| (v / resolution).abs() < LARGEST_INDEX) {
-            return Ok(Lattice::new(origin, resolution));
+        let r = place.resolution;
+        if !(r > 0.0 && r.is_finite()) {
+            return self.possible(map, Err(format!("resolution is {r}: give metres, above zero")));
         }
-        let advice = "a map lies within 2^45 cells of zero";
-        Err(self.bad("the origin", format!("{origin:?} at {resolution} m"), advice))
+        match <[f64; D]>::try_from(&*place.origin) {
+            Ok(origin) if origin.iter().all(|v| (v / r).abs() < LARGEST_INDEX) => Ok(Lattice::new(origin, r)),
+            _ => {
+                let advice = format!("give {D} numbers within 2^45 cells of zero");
+                Err(self.bad("the origin", format!("{:?} at {r} m", place.origin), &advice))
+            }
+        }
     }
 
     /// Takes `bytes` of the allowed memory.
@@ -155,11 +151,11 @@ impl<'a> Reading<'a> {
         let header: Value = serde_json::from_slice(&bytes)
             .map_err(|e| self.bad("the header", shown(e.to_string().as_bytes()), AGAIN))?;
         let Value::Object(header) = header else {
-            return Err(self.bad("the header", "no object", AGAIN));
+            return Err(self.bad("the header", "not a JSON object", AGAIN));
         };
         if header.get("version").and_then(Value::as_u64) != Some(VERSION) {
             let value = header.get("version").map_or("missing".into(), Value::to_string);
-            let advice = "this program knows 1; use a newer one";
+            let advice = "this program reads version 1; use a newer one";
             return Err(self.bad("the version of the header", value, advice));
         }
         Ok(header)
@@ -201,7 +197,7 @@ impl<'a> Reading<'a> {
         Ok(plane)
     }
 
-    /// The poses of the sensor; none where there is no such chunk.
+    /// The poses of the sensor; empty where the file has no such chunk.
     pub(super) fn poses<const D: usize>(&mut self) -> Result<Vec<Pose<D>>, IoError> {
         if self.parts("POSES", "sensor").is_empty() {
             return Ok(Vec::new());
@@ -225,8 +221,4 @@ impl<'a> Reading<'a> {
             None => Ok(poses),
         }
     }
-}
-
-pub(super) fn floats(bytes: &[u8]) -> Vec<f32> {
-    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }

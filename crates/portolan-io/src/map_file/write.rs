@@ -1,14 +1,25 @@
-//! Writing a `map.portolan` of the plane.
+//! Writing a `map.portolan`.
 
 use std::path::Path;
 
-use super::header::{Entry, LOG_ODDS, Model, Place, SIGNED_DISTANCE};
-use super::writing::{begin, finish, floats_to_bytes, write_plane};
-use super::{MapFile, sweep_word, weights_word};
+use portolan::cell::{LogOdds8, LogOddsValue, Planes};
+use portolan::geom::Pose;
+use portolan::store::{Store, Tree};
+use serde_json::{Value, json};
+
+use super::bricks::{write_bricks, write_keys};
+use super::header::{Entry, Place};
+use super::kind::Kind;
+use super::maps::{saved_grid, saved_occupancy_bricks, saved_tree, saved_tsdf, saved_tsdf_bricks};
+use super::settings::ColorSettings;
+use super::{MapFile, VERSION, part_name};
 use crate::{ContainerWriter, IoError};
 
-impl MapFile {
-    /// Writes the file. The same maps make the same bytes.
+/// A dense plane is cut into chunks of this many bytes.
+const CHUNK: usize = 1 << 30;
+
+impl<const D: usize> MapFile<D> {
+    /// Writes the file. The same maps make the same bytes, in whatever order their bricks came to be.
     ///
     /// # Errors
     /// As [`crate::write_atomic`].
@@ -25,61 +36,127 @@ impl MapFile {
     }
 
     fn writer(&self) -> Result<ContainerWriter, IoError> {
-        let mut writer = begin(&self.header, 2, self.entries(), &self.unknown_maps)?;
-        if let Some(grid) = &self.grid {
-            let plane: Vec<u8> = grid.store().planes().iter().map(|v| v.0 as u8).collect();
-            write_plane(&mut writer, "GRID", "occupancy", &plane)?;
+        let mut writer = ContainerWriter::new();
+        let header = self.header_text().map_err(|e| {
+            let advice = "give finite numbers";
+            IoError::unwritable("map.portolan".as_ref(), "the header", e.to_string(), advice)
+        })?;
+        writer.chunk("HEAD", "", header.as_bytes())?;
+        self.write_dense(&mut writer)?;
+        self.write_bricks(&mut writer)?;
+        if !self.poses.is_empty() {
+            write_plane(&mut writer, "POSES", "sensor", &pose_bytes(&self.poses))?;
         }
-        if let Some(tree) = &self.tree {
-            let records = tree.store().records();
-            let mut content = vec![records.root_value.0 as u8];
-            content.extend(&records.masks);
-            content.extend(records.values.iter().map(|v| v.0 as u8));
-            write_plane(&mut writer, "TREE", "occupancy", &content)?;
-        }
-        if let Some(tsdf) = &self.tsdf {
-            let planes = tsdf.store().planes();
-            write_plane(&mut writer, "TSDF", "distance", &floats_to_bytes(planes.distances()))?;
-            write_plane(&mut writer, "TSDF", "weight", &floats_to_bytes(planes.weights()))?;
-        }
-        finish(&mut writer, &self.poses, &self.unknown_chunks)?;
+        self.unknown_chunks.iter().try_for_each(|c| writer.chunk(&c.tag, &c.name, &c.content))?;
         Ok(writer)
     }
 
-    fn entries(&self) -> Vec<Entry> {
-        let mut entries = Vec::new();
-        if let Some(grid) = &self.grid {
-            entries.push(Entry::OccupancyGrid {
-                cell: LOG_ODDS.into(),
-                chunk: "GRID".into(),
-                place: Place::of(grid.store().grid()),
-                model: Model::of(grid.model()),
-            });
+    fn header_text(&self) -> serde_json::Result<String> {
+        let mut maps = Vec::new();
+        for entry in self.entries()? {
+            maps.push(serde_json::to_value(entry)?);
         }
-        if let Some(tree) = &self.tree {
-            let root = tree.store().grid();
-            entries.push(Entry::Quadtree {
-                cell: LOG_ODDS.into(),
-                chunk: "TREE".into(),
-                origin: root.lattice.origin,
-                resolution: root.lattice.resolution,
-                depth: tree.store().depth(),
-                model: Model::of(tree.model()),
-            });
-        }
-        if let Some(tsdf) = &self.tsdf {
-            let config = tsdf.config();
-            entries.push(Entry::Tsdf {
-                cell: SIGNED_DISTANCE.into(),
-                chunk: "TSDF".into(),
-                place: Place::of(tsdf.grid()),
-                truncation: config.truncation,
-                w_max: config.w_max.is_finite().then_some(config.w_max),
-                carve_weight: config.carve_weight,
-                sweep: sweep_word(config.beams).into(),
-                weights: weights_word(config.weights).into(),
-            });
-        }
-        entries
+        maps.extend(self.unknown_maps.iter().cloned());
+        let mut header = serde_json::to_value(&self.header)?;
+        header["version"] = json!(VERSION);
+        header["dimension"] = json!(D);
+        header["maps"] = Value::Array(maps);
+        serde_json::to_string(&header)
     }
+
+    fn entries(&self) -> serde_json::Result<Vec<Entry>> {
+        let mut entries = Vec::new();
+        if let Some(map) = self.grid.as_ref().map(saved_grid) {
+            entries.push(Entry::new::<D>(Kind::Grid, Place::of_grid(map.store.grid()), &map.settings)?);
+        }
+        if let Some(map) = self.tree.as_ref().map(saved_tree) {
+            let place = Place { depth: Some(map.store.depth()), ..Place::of_lattice(map.store.lattice()) };
+            entries.push(Entry::new::<D>(Kind::Tree, place, &map.settings)?);
+        }
+        if let Some(map) = self.tsdf.as_ref().map(saved_tsdf) {
+            entries.push(Entry::new::<D>(Kind::Tsdf, Place::of_grid(map.store.grid()), &map.settings)?);
+        }
+        if let Some(map) = self.occupancy_bricks.as_ref().map(saved_occupancy_bricks) {
+            let place = Place::of_lattice(map.store.lattice());
+            entries.push(Entry::new::<D>(Kind::OccupancyBricks, place, &map.settings)?);
+        }
+        if let Some(map) = self.tsdf_bricks.as_ref().map(saved_tsdf_bricks) {
+            let place = Place::of_lattice(map.store.lattice());
+            entries.push(Entry::new::<D>(Kind::TsdfBricks, place, &map.settings)?);
+        }
+        if let Some(map) = &self.color_bricks {
+            let settings = ColorSettings { w_max: map.w_max, more: map.more.clone() };
+            let place = Place::of_lattice(map.store.lattice());
+            entries.push(Entry::new::<D>(Kind::ColorBricks, place, &settings)?);
+        }
+        Ok(entries)
+    }
+
+    fn write_dense(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
+        if let Some(map) = self.grid.as_ref().map(saved_grid) {
+            let plane: Vec<u8> = map.store.planes().iter().map(|v| v.0 as u8).collect();
+            write_plane(writer, Kind::Grid.chunk(), "occupancy", &plane)?;
+        }
+        if let Some(map) = self.tree.as_ref().map(saved_tree) {
+            write_plane(writer, Kind::Tree.chunk(), "occupancy", &tree_bytes(map.store))?;
+        }
+        if let Some(map) = self.tsdf.as_ref().map(saved_tsdf) {
+            let planes = map.store.planes();
+            for (name, plane) in [("distance", planes.distances()), ("weight", planes.weights())] {
+                let mut bytes = Vec::new();
+                put_floats(plane, &mut bytes);
+                write_plane(writer, Kind::Tsdf.chunk(), name, &bytes)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_bricks(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
+        if let Some(map) = &self.occupancy_bricks {
+            let tag = Kind::OccupancyBricks.chunk();
+            write_keys(writer, tag, &map.store)?;
+            write_bricks(writer, tag, "occupancy", &map.store, |brick, bytes| {
+                let cell = |i| brick.get(i).unwrap_or(LogOdds8::UNOBSERVED).0 as u8;
+                bytes.extend((0..brick.len()).map(cell));
+            })?;
+        }
+        if let Some(map) = &self.tsdf_bricks {
+            let tag = Kind::TsdfBricks.chunk();
+            write_keys(writer, tag, &map.store)?;
+            write_bricks(writer, tag, "distance", &map.store, |b, bytes| put_floats(b.distances(), bytes))?;
+            write_bricks(writer, tag, "weight", &map.store, |b, bytes| put_floats(b.weights(), bytes))?;
+        }
+        if let Some(map) = &self.color_bricks {
+            let tag = Kind::ColorBricks.chunk();
+            write_keys(writer, tag, &map.store)?;
+            write_bricks(writer, tag, "color", &map.store, |brick, bytes| {
+                bytes.extend(brick.words().as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+            })?;
+        }
+        Ok(())
+    }
+}
+
+fn tree_bytes<const D: usize>(tree: &Tree<LogOdds8, D>) -> Vec<u8> {
+    let records = tree.records();
+    let mut bytes = vec![records.root_value.0 as u8];
+    bytes.extend(&records.masks);
+    bytes.extend(records.values.iter().map(|v| v.0 as u8));
+    bytes
+}
+
+fn pose_bytes<const D: usize>(poses: &[Pose<D>]) -> Vec<u8> {
+    let numbers = poses.iter().flat_map(|p| p.rotation.as_flattened().iter().chain(&p.translation));
+    numbers.flat_map(|v| v.to_le_bytes()).collect()
+}
+
+fn put_floats(values: &[f32], bytes: &mut Vec<u8>) {
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+}
+
+fn write_plane(writer: &mut ContainerWriter, tag: &str, name: &str, bytes: &[u8]) -> Result<(), IoError> {
+    if bytes.is_empty() {
+        return writer.chunk(tag, name, bytes);
+    }
+    bytes.chunks(CHUNK).enumerate().try_for_each(|(i, part)| writer.chunk(tag, &part_name(name, i), part))
 }

@@ -1,11 +1,11 @@
-//! What a mesh file is and how much it holds, by its first bytes.
+//! The format of a mesh file and its counts, by its first bytes.
 
 use std::path::Path;
 
-use crate::bytes::{fields, open, parse_f64};
+use crate::bytes::{Input, fields, open, parse_f64};
 use crate::{IoError, ply};
 
-/// So much of a file is looked at (unpacked bytes).
+/// How much of a file is read (unpacked bytes).
 const HEAD: u64 = 64 << 10;
 
 /// The formats of meshes.
@@ -31,28 +31,35 @@ impl MeshFormat {
     }
 }
 
-/// What the header of a mesh promises.
+/// The counts in the header of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshCounts {
     /// Vertices.
     pub vertices: u64,
     /// Faces: triangles in what portolan writes, any polygons in files of others. `None` for triangle strips, whose number
-    /// says nothing.
+    /// differs from that of the triangles.
     pub faces: Option<u64>,
 }
 
-/// How many vertices and faces a mesh has, as its header says; nothing behind that is read. `None` for what is no PLY mesh:
+/// How many vertices and faces a mesh has, by its header alone. `None` for files that are not PLY meshes:
 /// OBJ has no header, and that of GLB is not read.
 ///
 /// # Errors
 /// [`IoError`] where the file cannot be opened or read.
 pub fn mesh_counts(path: impl AsRef<Path>) -> Result<Option<MeshCounts>, IoError> {
-    let path = path.as_ref();
-    let head = open(path)?.read_up_to(HEAD)?;
-    Ok(ply::mesh_counts(&head, path).map(|(vertices, faces)| MeshCounts { vertices, faces }))
+    parse_mesh_counts(&mut open(path)?)
 }
 
-/// The format of a mesh by its first bytes; `None` for what is none.
+/// [`mesh_counts`] from any input, of which it reads at most 64 KiB.
+///
+/// # Errors
+/// [`IoError`] where the input cannot be read.
+pub fn parse_mesh_counts(input: &mut Input) -> Result<Option<MeshCounts>, IoError> {
+    let head = input.read_up_to(HEAD)?;
+    Ok(ply::mesh_counts(&head, input.path()).map(|(vertices, faces)| MeshCounts { vertices, faces }))
+}
+
+/// The format of a mesh by its first bytes; `None` for other files.
 pub(crate) fn mesh_format(path: &Path, head: &[u8]) -> Option<MeshFormat> {
     if head.starts_with(b"glTF") {
         return Some(MeshFormat::Glb);

@@ -20,12 +20,12 @@ const ELEMENTS: u32 = 34963;
 /// Writes a mesh as GLB: one node, one mesh, `POSITION` (with its bounds), `NORMAL` and `COLOR_0` where the mesh has
 /// them, indices as u32.
 ///
-/// Positions are relative to the mesh's origin, as glTF knows only f32. The origin is the node's translation, which
+/// Positions are relative to the mesh's origin, as glTF has only f32. The origin is the node's translation, which
 /// viewers round to f32 too: at UTM coordinates the mesh as a whole is placed to half a metre, its shape stays exact. The
 /// exact origin stands in the node's `extras.origin`. glTF has y up: the node's rotation, -90 degrees about x, turns
 /// the map's z up.
 ///
-/// A mesh without triangles is a scene of nothing; its vertices, which no viewer would show, are not written.
+/// A mesh without triangles becomes an empty scene; its vertices, which no viewer would show, are not written.
 ///
 /// # Errors
 /// As [`write_ply_mesh`](super::write_ply_mesh), and where the file would be longer than the 4 GiB that the format holds.
@@ -35,7 +35,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
     write_atomic(path, |w| write_to(w, mesh, &layout, &text, total))
 }
 
-/// The same in memory, for who hands files on in another way.
+/// The same as bytes in memory.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_glb`].
@@ -76,7 +76,7 @@ impl Layout {
     fn of(mesh: &Mesh) -> Self {
         let normals = 12 * mesh.vertices.len() as u64;
         let colors = normals + 12 * mesh.normals.len() as u64;
-        // Colours have a fourth byte: elements must start at multiples of four.
+        // Colors have a fourth byte: elements must start at multiples of four.
         let indices = colors + 4 * mesh.colors.len() as u64;
         Self { normals, colors, indices, end: indices + 12 * mesh.triangles.len() as u64 }
     }
@@ -168,7 +168,7 @@ fn write_to(w: &mut impl Write, mesh: &Mesh, layout: &Layout, text: &[u8], total
     Ok(())
 }
 
-/// Colours of cameras are sRGB, vertex colours of glTF are linear.
+/// Colors of cameras are sRGB, vertex colors of glTF are linear.
 fn linear(byte: u8) -> u8 {
     let v = f32::from(byte) / 255.0;
     let linear = if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };

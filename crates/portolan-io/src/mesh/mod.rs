@@ -1,4 +1,4 @@
-//! Triangle meshes, written, and told from other files.
+//! Triangle meshes: writers, and the recognition of their files.
 
 mod format;
 mod glb;
@@ -6,7 +6,7 @@ mod obj;
 mod ply;
 
 pub(crate) use format::mesh_format;
-pub use format::{MeshCounts, MeshFormat, mesh_counts};
+pub use format::{MeshCounts, MeshFormat, mesh_counts, parse_mesh_counts};
 pub use glb::{glb_to_bytes, write_glb};
 pub use obj::write_obj;
 pub use ply::{ply_mesh_to_bytes, write_ply_mesh};
@@ -26,18 +26,18 @@ fn check(path: &Path, mesh: &Mesh) -> Result<(), IoError> {
         return refuse(
             "the number of normals",
             mesh.normals.len().to_string(),
-            "give one per vertex, or none",
+            "give one per vertex, or an empty list",
         );
     }
     if !mesh.colors.is_empty() && mesh.colors.len() != vertices {
         return refuse(
-            "the number of colours",
+            "the number of colors",
             mesh.colors.len().to_string(),
-            "give one per vertex, or none",
+            "give one per vertex, or an empty list",
         );
     }
     if let Some(t) = mesh.triangles.iter().find(|t| t.iter().any(|&v| v as usize >= vertices)) {
-        return refuse("a triangle", format!("{t:?}"), "name vertices that the mesh has");
+        return refuse("a triangle", format!("{t:?}"), "use indices of existing vertices");
     }
     let finite = |v: &&[f32; 3]| !v.iter().all(|c| c.is_finite());
     if let Some(v) = mesh.vertices.iter().chain(&mesh.normals).find(finite) {

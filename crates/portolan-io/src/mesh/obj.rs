@@ -8,10 +8,10 @@ use portolan::surface::Mesh;
 use super::check;
 use crate::{IoError, write_atomic};
 
-/// Writes a mesh as OBJ text: `v x y z`, with `r g b` in `[0, 1]` after it where the mesh has colours (which most
+/// Writes a mesh as OBJ text: `v x y z`, with `r g b` in `[0, 1]` after it where the mesh has colors (which most
 /// readers understand), `vn` where it has normals, `f` counted from 1.
 ///
-/// Coordinates are the world's (metres), with as many digits as tell them apart.
+/// Coordinates are the world's (metres), with as many digits as an f32 needs.
 ///
 /// # Errors
 /// As [`write_ply_mesh`](super::write_ply_mesh).

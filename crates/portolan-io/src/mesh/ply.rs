@@ -26,7 +26,7 @@ pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError
     write_atomic(path, |w| write_to(w, mesh))
 }
 
-/// The same in memory, for who hands files on in another way.
+/// The same as bytes in memory.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_ply_mesh`].

@@ -5,5 +5,5 @@ mod npy;
 mod npz;
 
 pub use array::{NpyArray, NpyValues};
-pub use npy::{read_npy, write_npy};
-pub use npz::{read_npz, write_npz};
+pub use npy::{parse_npy, read_npy, write_npy};
+pub use npz::{parse_npz, read_npz, write_npz};

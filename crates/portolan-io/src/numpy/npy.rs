@@ -25,10 +25,10 @@ pub fn write_npy(path: impl AsRef<Path>, array: &NpyArray) -> Result<(), IoError
 /// Reads one array of a type that [`NpyValues`] has, little-endian.
 ///
 /// # Errors
-/// [`IoError::Binary`] for what is not such an array or shorter or longer than its header says.
+/// [`IoError::Binary`] where it is not such an array, or shorter or longer than its header announces.
 pub fn read_npy(path: impl AsRef<Path>) -> Result<NpyArray, IoError> {
     let path = path.as_ref();
-    read(open(path)?, path)
+    parse_npy(open(path)?, path)
 }
 
 pub(super) fn check(path: &Path, array: &NpyArray) -> Result<(), IoError> {
@@ -81,8 +81,11 @@ fn in_chunks<T: Copy, const N: usize>(
     Ok(())
 }
 
-/// Reads an array from a stream that ends with it; offsets are of that stream.
-pub(super) fn read(mut from: impl Read, path: &Path) -> Result<NpyArray, IoError> {
+/// [`read_npy`] from a stream that ends with the array; errors name it `path`.
+///
+/// # Errors
+/// As [`read_npy`].
+pub fn parse_npy(mut from: impl Read, path: &Path) -> Result<NpyArray, IoError> {
     let mut at = 0;
     let bad =
         |at: u64, field: &str, value: String, advice: &str| IoError::binary(path, at, field, value, advice);
@@ -92,7 +95,7 @@ pub(super) fn read(mut from: impl Read, path: &Path) -> Result<NpyArray, IoError
         read.map_err(|e| IoError::os(path, "read it", e))?;
         if bytes.len() as u64 != count {
             let value = format!("{} bytes", bytes.len());
-            return Err(bad(at, field, value, &format!("{count} are announced: the file is cut off")));
+            return Err(bad(at, field, value, &format!("the header announces {count}: the file is cut off")));
         }
         at += count;
         Ok(bytes)
@@ -107,7 +110,7 @@ pub(super) fn read(mut from: impl Read, path: &Path) -> Result<NpyArray, IoError
             let b = take(4, "the header")?;
             u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         }
-        v => return Err(bad(6, "the version", v.to_string(), "1, 2 and 3 are known")),
+        v => return Err(bad(6, "the version", v.to_string(), "it must be 1, 2 or 3")),
     };
     if length > LONGEST_HEADER {
         return Err(bad(8, "the header length", length.to_string(), "give an array of numbers"));
@@ -196,7 +199,7 @@ mod tests {
             NpyArray::c([0, 7], NpyValues::F64(vec![])),
         ] {
             let bytes = bytes_of(&array);
-            assert_eq!(read(&bytes[..], "a.npy".as_ref()).unwrap(), array);
+            assert_eq!(parse_npy(&bytes[..], "a.npy".as_ref()).unwrap(), array);
             let values = bytes.iter().position(|b| *b == b'\n').unwrap() + 1;
             assert_eq!(values % 64, 0);
         }
@@ -224,7 +227,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         let good = bytes_of(&NpyArray::vector(&[1.0, 2.0]));
-        let error = |bytes: &[u8]| read(bytes, "a.npy".as_ref()).unwrap_err().to_string();
+        let error = |bytes: &[u8]| parse_npy(bytes, "a.npy".as_ref()).unwrap_err().to_string();
         assert!(error(&good[..good.len() - 1]).contains("the array is 15 bytes; 16 are announced"));
         assert!(error(&[&good[..], b"x"].concat()).contains("the file length is longer"));
         assert!(error(b"PK\x03\x04abcd").contains("the magic"));
@@ -249,7 +252,7 @@ mod tests {
     fn no_bytes_make_it_panic() {
         let good = bytes_of(&NpyArray::fortran([2, 2], NpyValues::F32(vec![1.0; 4])));
         for bytes in bad_bytes(&good, 21, 3000) {
-            let _ = read(&bytes[..], "a.npy".as_ref());
+            let _ = parse_npy(&bytes[..], "a.npy".as_ref());
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::error::shown;
 const LOCAL: &[u8; 4] = b"PK\x03\x04";
 const CENTRAL: &[u8; 4] = b"PK\x01\x02";
 const END: &[u8; 4] = b"PK\x05\x06";
-/// The first day that zip knows, 1 January 1980: the bytes shall not depend on the clock.
+/// The earliest date of zip, 1 January 1980: the bytes must not depend on the clock.
 const DAY: [u8; 4] = [0, 0, 0x21, 0];
 /// The most arrays of an archive.
 const MOST_ARRAYS: usize = 1000;
@@ -37,7 +37,11 @@ pub fn write_npz(path: impl AsRef<Path>, arrays: &[(&str, &NpyArray)]) -> Result
         npy::check(path, array)?;
         let plain = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
         if !plain || name.len() > 100 || arrays[..k].iter().any(|(other, _)| other == name) {
-            return refuse("the name of an array", shown(name.as_bytes()), "give each a word of its own");
+            return refuse(
+                "the name of an array",
+                shown(name.as_bytes()),
+                "give each a unique name in ASCII",
+            );
         }
         let mut sum = Summed::default();
         npy::write(&mut sum, array).map_err(|e| IoError::os(path, "write it", e))?;
@@ -112,10 +116,10 @@ impl Write for Summed {
 /// Reads all arrays with their names, in the order of the archive.
 ///
 /// # Errors
-/// [`IoError::Binary`] where it is no zip archive of arrays of numbers, or is cut off or damaged.
+/// [`IoError::Binary`] where the file is not a zip archive of arrays of numbers, is cut off, or damaged.
 pub fn read_npz(path: impl AsRef<Path>) -> Result<Vec<(String, NpyArray)>, IoError> {
     let path = path.as_ref();
-    parse(BufReader::new(open_file(path)?), path)
+    parse_npz(BufReader::new(open_file(path)?), path)
 }
 
 fn word(bytes: &[u8], at: usize) -> u64 {
@@ -126,7 +130,11 @@ fn short(bytes: &[u8], at: usize) -> usize {
     usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]))
 }
 
-fn parse(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String, NpyArray)>, IoError> {
+/// [`read_npz`] from any source; errors name it `path`.
+///
+/// # Errors
+/// As [`read_npz`].
+pub fn parse_npz(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String, NpyArray)>, IoError> {
     let failed = |e| IoError::os(path, "read it", e);
     let bad = |at: u64, field: &str, value: String| {
         let advice = "give a .npz as numpy.savez writes it; this one is cut off, damaged or of another kind";
@@ -140,7 +148,7 @@ fn parse(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String, NpyArra
         }
         file.seek(SeekFrom::Start(at)).map_err(failed)?;
         file.by_ref().take(count).read_to_end(&mut bytes).map_err(failed)?;
-        if bytes.len() as u64 == count { Ok(bytes) } else { Err(bad(at, "the length", "shrinking".into())) }
+        if bytes.len() as u64 == count { Ok(bytes) } else { Err(bad(at, "the length", "changing".into())) }
     };
     // The end record is the last that starts with its mark; a comment may follow.
     let tail_at = length.saturating_sub(22 + (1 << 16));
@@ -178,7 +186,7 @@ fn parse(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String, NpyArra
         let data = match method {
             0 => data,
             8 => {
-                // One byte more than announced tells a lie without unpacking all of it.
+                // One byte more than announced is enough to refuse it, without unpacking the rest.
                 let mut out = Vec::new();
                 let read = DeflateDecoder::new(&data[..]).take(unpacked + 1).read_to_end(&mut out);
                 read.map_err(|_| bad(data_at, "the packed data", shown(name.as_bytes())))?;
@@ -191,7 +199,7 @@ fn parse(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String, NpyArra
         if data.len() as u64 != unpacked || u64::from(sum.sum()) != crc {
             return Err(bad(data_at, "the check sum of an array", shown(name.as_bytes())));
         }
-        let array = npy::read(&data[..], path)?;
+        let array = npy::parse_npy(&data[..], path)?;
         arrays.push((name.strip_suffix(".npy").unwrap_or(&name).to_owned(), array));
     }
     Ok(arrays)
@@ -272,7 +280,7 @@ mod tests {
         }
         let folder = tempfile::tempdir().unwrap();
         let good = written(&folder.path().join("a.npz"));
-        let error = |bytes: &[u8]| parse(Cursor::new(bytes), "a.npz".as_ref()).unwrap_err().to_string();
+        let error = |bytes: &[u8]| parse_npz(Cursor::new(bytes), "a.npz".as_ref()).unwrap_err().to_string();
         assert!(error(b"").contains("the end record"));
         assert!(error(&good[..good.len() - 30]).contains("the end record"));
         let mut damaged = good.clone();
@@ -286,7 +294,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let good = written(&folder.path().join("a.npz"));
         for bytes in bad_bytes(&good, 22, 3000) {
-            let _ = parse(Cursor::new(bytes), "a.npz".as_ref());
+            let _ = parse_npz(Cursor::new(bytes), "a.npz".as_ref());
         }
     }
 }

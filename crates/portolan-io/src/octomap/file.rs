@@ -10,12 +10,12 @@ use super::stored::Stored;
 use super::{read, write};
 use crate::{Compression, IoError};
 
-/// An OctoMap file: the tree of log odds and what else the file says.
+/// An OctoMap file: the tree of log odds, and the rest of the file.
 ///
 /// The tree is the smallest that has the file's cells: where eight equal leaves stand side by side in the file, they
 /// are one here. Which they were, and values of inner nodes that are not the largest of their children's (trees
 /// written after `lazy_eval` have them), is kept beside the tree: written again in the format that it was read from, the
-/// file has the same bytes. (Except a `ColorOcTree` in an `.ot`: its colours are passed over.)
+/// file has the same bytes. (Except a `ColorOcTree` in an `.ot`: its colors are passed over.)
 #[derive(Clone, Debug)]
 pub struct OctomapTree {
     pub(super) tree: Tree<LogOdds32, 3>,
@@ -27,13 +27,13 @@ pub struct OctomapTree {
 }
 
 impl OctomapTree {
-    /// Reads a `.bt` or `.ot`; the first line tells which. Packed with gzip or bzip2 it is read, too.
+    /// Reads a `.bt` or `.ot`; the first line decides which. gzip and bzip2 files are read, too.
     ///
-    /// A `.bt` may have any class name. In an `.ot` the name tells the layout of a node: `OcTree`, `OcTreeStamped` (whose
-    /// stamps are not in the file) and `ColorOcTree` (whose colours are passed over) are read.
+    /// A `.bt` may have any class name. In an `.ot` the class defines the layout of a node: `OcTree`, `OcTreeStamped` (whose
+    /// stamps are not in the file) and `ColorOcTree` (whose colors are passed over) are read.
     ///
     /// # Errors
-    /// [`IoError`] where a field is wrong, a log odds is not finite, the nodes are not as many as the header says, they
+    /// [`IoError`] where a field is wrong, a log odds is not finite, the number of nodes differs from the header's, they
     /// would take more than 4 GiB (a file that is not packed: 16 GiB), or bytes are missing or left over.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let input = crate::open(&path)?;
@@ -41,7 +41,7 @@ impl OctomapTree {
         read::read(input, packed, path.as_ref())
     }
 
-    /// Reads a file that is in memory, under the name that errors shall give.
+    /// Reads a file in memory; errors name it `name`.
     ///
     /// # Errors
     /// As [`OctomapTree::read`].
@@ -90,7 +90,7 @@ impl OctomapTree {
         self.stored.open_nodes()
     }
 
-    /// Whether the file had colours, which are not kept.
+    /// Whether the file had colors, which are not kept.
     pub fn colors_left_out(&self) -> bool {
         self.colors_left_out
     }
@@ -104,7 +104,7 @@ impl OctomapTree {
         write::file_bt(self, path.as_ref())
     }
 
-    /// Writes an `.ot`. Nodes are those of the file that was read, and read from an `.ot` without colours it has the same
+    /// Writes an `.ot`. Nodes are those of the file that was read, and read from an `.ot` without colors it has the same
     /// bytes. Comments stay; the class is `OcTree`, or `OcTreeStamped` where it was.
     ///
     /// # Errors

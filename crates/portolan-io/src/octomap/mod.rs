@@ -13,10 +13,10 @@
 //!
 //! Then the nodes, depth first, children in the order of their index (bit 0: upper half along x, bit 1: y, bit 2: z):
 //!
-//! - **.bt**: two bytes for each inner node, little-endian; bits `2c` and `2c + 1` tell of child `c`: 0 never observed,
+//! - **.bt**: two bytes for each inner node, little-endian; bits `2c` and `2c + 1` are the state of child `c`: 0 never observed,
 //!   1 a free leaf, 2 an occupied leaf, 3 an inner node.
 //! - **.ot**: for each node its log odds (f32, little-endian; of an inner node the largest of its children's), in a
-//!   ColorOcTree three bytes of colour, and a byte whose bit `c` tells that there is a child `c`.
+//!   ColorOcTree three bytes of color, and a byte whose bit `c` is set where child `c` exists.
 //!
 //! A byte of a file becomes many in memory (an inner node of a `.bt` has two there and 70 here, twice that while it is
 //! read), and a packed file has fewer still: reading takes at most 4 GiB for a packed file, some 33 million inner nodes, and

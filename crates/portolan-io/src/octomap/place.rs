@@ -27,7 +27,7 @@ pub(super) fn placed<'a, V: LogOddsValue>(
     if !(0..3).all(|k| (shift[k] - nearest[k]).abs() <= OFF) {
         let value = format!("{origin:?} m");
         let advice = format!(
-            "OctoMap's cells start at the world's zero: give an origin that is a multiple of the resolution ({resolution} m)"
+            "OctoMap's cells start at the world's origin: give an origin that is a multiple of the resolution ({resolution} m)"
         );
         return Err(IoError::unwritable(path, "the origin of the map", value, advice));
     }
@@ -38,7 +38,7 @@ pub(super) fn placed<'a, V: LogOddsValue>(
     if !(0..3).all(|k| low_world[k] >= -half && high_world[k] <= half) {
         let value = format!("from {low_world:?} to {high_world:?} cells");
         let advice = format!(
-            "OctoMap holds cells from -{HALF} to {HALF}: choose a coarser resolution or move the map to the world's zero"
+            "OctoMap holds cells from -{HALF} to {HALF}: choose a coarser resolution or move the map to the world's origin"
         );
         return Err(IoError::unwritable(path, "the observed box", value, advice));
     }

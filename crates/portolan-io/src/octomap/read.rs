@@ -32,7 +32,7 @@ pub(super) fn read_within(
     let header = Header::read(&mut reader, packed, path)?;
     let color = header.kind == Kind::Ot && header.class == "ColorOcTree";
     if header.kind == Kind::Ot && !color && !["OcTree", "OcTreeStamped"].contains(&header.class.as_str()) {
-        let advice = "nodes of OcTree, OcTreeStamped and ColorOcTree are known; write it as .bt with OctoMap";
+        let advice = "OcTree, OcTreeStamped and ColorOcTree are read; write it as .bt with OctoMap";
         return Err(IoError::binary(path, 0, "the class (id)", shown(header.class.as_bytes()), advice));
     }
     let mut nodes = Nodes {
@@ -163,7 +163,7 @@ impl<R: BufRead> Nodes<'_, R> {
         let offset = self.offset;
         let word = u16::from_le_bytes(self.take()?);
         if word == 0 {
-            return self.bad(offset, "the children of an inner node", "none", "the file is damaged");
+            return self.bad(offset, "the number of children of an inner node", "0", "the file is damaged");
         }
         let (number, record) = self.inner(offset)?;
         let mut merged = 0;
@@ -241,7 +241,7 @@ impl<R: BufRead> Nodes<'_, R> {
                 let value = shown(&rest[..rest.len().min(16)]);
                 self.bad(
                     self.offset,
-                    "what follows the last node",
+                    "the data after the last node",
                     value,
                     "the file is damaged; cut that off",
                 )

@@ -25,7 +25,7 @@ pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 
     write(&header, &tree, &stored, path)
 }
 
-/// The same in memory, for who hands files on in another way.
+/// The same as bytes in memory.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_octomap_bt`].

@@ -31,7 +31,7 @@ impl<'a> Column<'a> {
         self.scalar.read(&self.bytes[i * self.stride..], Endian::Little)
     }
 
-    /// The value of point `i` as the bits of a colour, whatever type the header calls it.
+    /// The value of point `i` as the bits of a color, whatever type the header calls it.
     #[inline(always)]
     pub(super) fn bits(&self, i: usize) -> u32 {
         match self.scalar.size() {

@@ -3,7 +3,7 @@
 //! A byte below 32 announces that many literals and one more. Any other repeats earlier output: its upper three bits are
 //! the length less two (seven: a byte to add follows), its lower five bits and the next byte the distance less one.
 
-/// Unpacks exactly `size` bytes. `Err` tells at which packed byte it went wrong. Memory is bounded by what so many packed
+/// Unpacks exactly `size` bytes. `Err` is the packed byte where it failed. Memory is bounded by what so many packed
 /// bytes can unpack to.
 pub(super) fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, usize> {
     // Three bytes repeat 264 at the most.

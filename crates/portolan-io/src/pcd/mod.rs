@@ -7,11 +7,11 @@
 //! | `VERSION` | 0.7 |
 //! | `FIELDS` (`COLUMNS`) | names; `_` is padding |
 //! | `SIZE`, `TYPE`, `COUNT` | bytes (1, 2, 4, 8), kind (I, U, F) and number of values of each field |
-//! | `WIDTH`, `HEIGHT`, `POINTS` | an organised cloud has `HEIGHT` rows |
+//! | `WIDTH`, `HEIGHT`, `POINTS` | an organized cloud has `HEIGHT` rows |
 //! | `VIEWPOINT` | position and `w x y z` of the sensor: reported, never applied |
 //! | `DATA` | `ascii`, `binary` (point by point) or `binary_compressed` (field by field), little-endian; the last line |
 //!
-//! Read are `x y z`, `intensity` (or `i`, `reflectivity`), `rgb`/`rgba` (packed `0x00RRGGBB`, also when called a float) or `r g b`,
+//! Read are `x y z`, `intensity` (or `i`, `reflectivity`), `rgb`/`rgba` (packed `0x00RRGGBB`, also where its type is float) or `r g b`,
 //! `normal_x normal_y normal_z`, `ring`, and a time (`t`, `time`, `timestamp`, ...: whole numbers are nanoseconds, others
 //! seconds). Bytes behind the last binary point are ignored (writers pad files to whole pages).
 

@@ -14,7 +14,7 @@ use crate::points::{CloudBuilder, PointCloudFile, Viewpoint, channel, is_time, m
 const LONGEST_HEADER: u64 = 64 << 10;
 
 /// Reads a PCD file, plain or packed by gzip or bzip2. Points are in the file's frame: the viewpoint is reported, not applied.
-/// Points that are NaN are no reading in an organised cloud, and refused in others.
+/// NaN points of an organized cloud are pixels without a reading; in other clouds they are refused.
 ///
 /// # Errors
 /// [`IoError::Text`] for a wrong header or a wrong line, [`IoError::Binary`] for a body that is too short or damaged.
@@ -143,7 +143,7 @@ fn put(out: &mut Vec<u8>, value: f64, scalar: Scalar, color: bool) {
         Scalar::U32 => out.extend((value as u32).to_le_bytes()),
         Scalar::I64 => out.extend((value as i64).to_le_bytes()),
         Scalar::U64 => out.extend((value as u64).to_le_bytes()),
-        // A colour called a float is often written as the whole number that it is.
+        // A color called a float is often written as the whole number that it is.
         Scalar::F32 if color && (1.0..=f64::from(u32::MAX)).contains(&value) => {
             out.extend((value as u32).to_le_bytes())
         }
@@ -173,7 +173,7 @@ fn cloud(body: &[u8], header: &Header, path: &Path) -> Result<PointCloudFile, Io
     let mut builder = CloudBuilder::new(fine);
     builder.cloud.viewpoint = header.viewpoint;
     if header.height > 1 {
-        builder.organise(header.width, header.height);
+        builder.organize(header.width, header.height);
     }
     for i in 0..header.points() {
         if !builder.push(i, position.map(|c| c.get(i))) {

@@ -106,17 +106,17 @@ fn what_open3d_writes() {
 }
 
 #[test]
-fn organised_clouds_keep_their_pixels_and_others_refuse_nan() {
+fn organized_clouds_keep_their_pixels_and_others_refuse_nan() {
     let text = |width, height| {
         format!(
             "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH {width}\nHEIGHT {height}\nPOINTS 4\nDATA ascii\n\
              1 2 3\nnan nan nan\n4 5 6\n7 8 2e8\n"
         )
     };
-    let organised = read(text(2, 2)).unwrap();
-    assert_eq!(organised.grid, Some(CloudGrid { columns: 2, rows: 2, pixels: vec![0, 2] }));
-    assert_eq!(organised.refused, RefusedPoints { not_finite: 0, too_far: 1, no_reading: 1 });
-    assert_eq!((organised.points.len(), organised.viewpoint), (2, None));
+    let organized = read(text(2, 2)).unwrap();
+    assert_eq!(organized.grid, Some(CloudGrid { columns: 2, rows: 2, pixels: vec![0, 2] }));
+    assert_eq!(organized.refused, RefusedPoints { not_finite: 0, too_far: 1, no_reading: 1 });
+    assert_eq!((organized.points.len(), organized.viewpoint), (2, None));
     let bag = read(text(4, 1)).unwrap();
     assert_eq!((bag.grid, bag.refused.not_finite), (None, 1));
 }
@@ -138,10 +138,10 @@ fn doubles_and_text_far_away_keep_their_millimetres() {
 fn what_is_written_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud.pcd");
-    let unorganised = mixed_cloud();
+    let unorganized = mixed_cloud();
     let grid = Some(CloudGrid { columns: 3, rows: 2, pixels: vec![1, 4] });
-    let organised = PointCloudFile { grid, ..mixed_cloud() };
-    for cloud in [unorganised, organised] {
+    let organized = PointCloudFile { grid, ..mixed_cloud() };
+    for cloud in [unorganized, organized] {
         write_pcd(&path, &cloud).unwrap();
         let mut again = read_points(&path).unwrap();
         again.refused.no_reading = 0;

@@ -7,7 +7,7 @@ use crate::points::{PointCloudFile, Viewpoint};
 use crate::{IoError, write_atomic};
 
 /// Writes a binary PCD file (version 0.7) with the fields that the cloud has; coordinates are doubles where it has an
-/// offset, else floats. Times are written as `timestamp` (doubles, seconds). An organised cloud gets its pixels without a
+/// offset, else floats. Times are written as `timestamp` (doubles, seconds). An organized cloud gets its pixels without a
 /// reading back as NaN.
 ///
 /// # Errors
@@ -20,7 +20,7 @@ pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), I
         ("intensities", cloud.intensity.len()),
         ("times", cloud.times.len()),
         ("rings", cloud.rings.len()),
-        ("colours", cloud.colors.len()),
+        ("colors", cloud.colors.len()),
         ("normals", cloud.normals.len()),
     ];
     if let Some((name, length)) = lists.iter().find(|(_, length)| *length != 0 && *length != n) {
@@ -29,7 +29,7 @@ pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), I
             path,
             format!("the number of {name}"),
             value,
-            format!("give {n} or none"),
+            format!("give {n}, or an empty list"),
         ));
     }
     if let Some(grid) = &cloud.grid {
@@ -41,7 +41,7 @@ pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), I
                 path,
                 "the size of the cloud",
                 value,
-                "give a pixel per point, ascending",
+                "give one pixel per point, in ascending order, within columns x rows",
             ));
         }
     }

@@ -11,8 +11,8 @@ use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, channel, is_time, m
 /// The most pixels of a range grid.
 const MOST_PIXELS: u64 = 1 << 30;
 
-/// Reads the vertices of a PLY file, with intensity, time, normals and colours where it has them, and with the rows and
-/// columns of its `range_grid` (whose size `obj_info num_cols` and `num_rows` tell). In a range scan the points are in the
+/// Reads the vertices of a PLY file, with intensity, time, normals and colors where it has them, and with the rows and
+/// columns of its `range_grid` (whose size is in `obj_info num_cols` and `num_rows`). In a range scan the points are in the
 /// order of pixels.
 ///
 /// # Errors
@@ -57,7 +57,7 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, I
 #[derive(Default)]
 struct Vertices(Vec<Option<u32>>);
 
-/// Where a vertex has what.
+/// The places of a vertex's properties.
 struct Fields {
     position: [(usize, Scalar); 3],
     intensity: Option<(usize, Scalar)>,

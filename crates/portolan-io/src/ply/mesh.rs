@@ -5,10 +5,10 @@ use std::path::Path;
 use super::body::Body;
 use super::header::{self, Element};
 use crate::IoError;
-use crate::bytes::open;
+use crate::bytes::{Input, open};
 use crate::points::{channel, most_bytes};
 
-/// A mesh of triangles. `normals` and `colors` have one entry per vertex, or none at all.
+/// A mesh of triangles. `normals` and `colors` have one entry per vertex, or are empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlyMesh {
     /// Corners (metres), as the file has them.
@@ -30,7 +30,14 @@ pub struct PlyMesh {
 /// [`IoError::Text`] for a wrong header or text, [`IoError::Binary`] for wrong binary data, both for a face whose corners are
 /// not there.
 pub fn read_ply_mesh(path: impl AsRef<Path>) -> Result<PlyMesh, IoError> {
-    let mut input = open(path)?;
+    parse_ply_mesh(open(path)?)
+}
+
+/// [`read_ply_mesh`] from any input.
+///
+/// # Errors
+/// As [`read_ply_mesh`].
+pub fn parse_ply_mesh(mut input: Input) -> Result<PlyMesh, IoError> {
     let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }

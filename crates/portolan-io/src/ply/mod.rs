@@ -16,10 +16,10 @@ mod write;
 
 pub(crate) use cloud::parse;
 pub use cloud::read_ply_cloud;
-pub use mesh::{PlyMesh, read_ply_mesh};
+pub use mesh::{PlyMesh, parse_ply_mesh, read_ply_mesh};
 pub use write::write_ply_cloud;
 
-/// What the header of a mesh promises: vertices and faces. The latter are `None` for triangle strips.
+/// The counts in the header of a mesh. Faces are `None` for triangle strips.
 pub(crate) type Counts = (u64, Option<u64>);
 
 /// The counts of a PLY with faces, by its first bytes; `None` for other files and for clouds: many writers give those an

@@ -14,7 +14,7 @@ fn mesh(bytes: &[u8]) -> Result<super::PlyMesh, IoError> {
     super::mesh::parse_bytes(bytes, "a.ply".as_ref())
 }
 
-/// A square and a triangle on five vertices, one of which is NaN, behind an element that nobody knows.
+/// A square and a triangle on five vertices, one of which is NaN, after an element of an unknown name.
 fn header(format: &str) -> String {
     format!(
         "ply\nformat {format} 1.0\ncomment made here\nelement other 2\nproperty list uchar short names\n\

@@ -17,10 +17,10 @@ pub fn write_ply_cloud(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result
     for (name, length) in [
         ("intensities", cloud.intensity.len()),
         ("normals", cloud.normals.len()),
-        ("colours", cloud.colors.len()),
+        ("colors", cloud.colors.len()),
     ] {
         if length != 0 && length != n {
-            let advice = format!("give {n} or none");
+            let advice = format!("give {n}, or an empty list");
             return Err(IoError::unwritable(
                 path,
                 format!("the number of {name}"),

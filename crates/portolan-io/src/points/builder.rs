@@ -1,13 +1,13 @@
-//! Takes points in one by one, refusing what no map could use.
+//! Takes points in one by one and refuses those that no map could use.
 
 use super::{CloudGrid, PointCloudFile};
 use crate::bytes::Scalar;
 
 /// Coordinates beyond this are refused (metres).
-const FURTHEST: f64 = 1e8;
+const FARTHEST: f64 = 1e8;
 /// From here on points are kept about an offset (metres): an `f32` resolves 0.06 mm there.
 const FAR: f64 = 1024.0;
-/// Times that span more than this many seconds are nanoseconds: no scan lasts eleven days, none a millisecond.
+/// Times that span more than this many seconds are nanoseconds: no scan lasts eleven days or less than a millisecond.
 const LONGEST_SCAN: f64 = 1e6;
 
 /// Builds a [`PointCloudFile`]. After a [`CloudBuilder::push`] that answers `true` the caller adds that point's entry to
@@ -19,7 +19,7 @@ pub(crate) struct CloudBuilder {
     pub(crate) times: Vec<f64>,
     /// The file holds more than `f32`.
     fine: bool,
-    organised: bool,
+    organized: bool,
 }
 
 impl CloudBuilder {
@@ -28,16 +28,16 @@ impl CloudBuilder {
         Self { fine, ..Self::default() }
     }
 
-    /// Says that the points are pixels of so many columns and rows.
-    pub(crate) fn organise(&mut self, columns: usize, rows: usize) {
+    /// Makes the points pixels of so many columns and rows.
+    pub(crate) fn organize(&mut self, columns: usize, rows: usize) {
         self.cloud.grid = Some(CloudGrid { columns, rows, pixels: Vec::new() });
-        self.organised = true;
+        self.organized = true;
     }
 
     /// Takes the point of pixel `i`; `false` where it is refused.
     #[inline]
     pub(crate) fn push(&mut self, i: usize, p: [f64; 3]) -> bool {
-        if !p.iter().all(|v| v.abs() <= FURTHEST) {
+        if !p.iter().all(|v| v.abs() <= FARTHEST) {
             self.refuse(p);
             return false;
         }
@@ -45,7 +45,7 @@ impl CloudBuilder {
             self.cloud.offset = p.map(f64::round);
         }
         self.cloud.points.push(std::array::from_fn(|k| (p[k] - self.cloud.offset[k]) as f32));
-        if self.organised
+        if self.organized
             && let Some(grid) = &mut self.cloud.grid
         {
             grid.pixels.push(i as u32);
@@ -56,7 +56,7 @@ impl CloudBuilder {
     #[cold]
     fn refuse(&mut self, p: [f64; 3]) {
         let refused = &mut self.cloud.refused;
-        *match (p.iter().all(|v| v.is_finite()), self.organised) {
+        *match (p.iter().all(|v| v.is_finite()), self.organized) {
             (true, _) => &mut refused.too_far,
             (false, true) => &mut refused.no_reading,
             (false, false) => &mut refused.not_finite,
@@ -71,7 +71,7 @@ impl CloudBuilder {
         if first <= last {
             let unit = if last - first > LONGEST_SCAN { 1e-9 } else { 1.0 };
             self.cloud.start_time = first * unit;
-            // A time that is NaN says nothing: it is taken as the start.
+            // A NaN time is taken as the start.
             let since = |t: f64| if t.is_finite() { ((t - first) * unit) as f32 } else { 0.0 };
             self.cloud.times = self.times.iter().map(|&t| since(t)).collect();
         }
@@ -89,7 +89,7 @@ pub(crate) fn time_unit(scalar: Scalar) -> f64 {
     if scalar.is_integer() { 1e-9 } else { 1.0 }
 }
 
-/// A channel of a colour as a byte: whole numbers by their width, others from 0 to 1.
+/// A channel of a color as a byte: whole numbers by their width, others from 0 to 1.
 pub(crate) fn channel(value: f64, scalar: Scalar) -> u8 {
     // A cast of a float saturates, and makes NaN 0.
     match scalar {

@@ -3,7 +3,7 @@
 use portolan::geom::Pose;
 use portolan::scan::{Origin, PointScan, RefusedBeams};
 
-/// A cloud of points as a file holds it. Lists beside `points` have one entry per point, or none at all where the file
+/// A cloud of points as a file holds it. Lists beside `points` have one entry per point, or are empty where the file
 /// does not have them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloudFile {
@@ -26,13 +26,13 @@ pub struct PointCloudFile {
     pub normals: Vec<[f32; 3]>,
     /// Rows and columns, where the file has more than one row.
     pub grid: Option<CloudGrid>,
-    /// Where the file says that the sensor stood.
+    /// Pose of the sensor by the file's header.
     pub viewpoint: Option<Viewpoint>,
     /// Points that were refused, by cause.
     pub refused: RefusedPoints,
 }
 
-/// The rows and columns of an organised cloud.
+/// The rows and columns of an organized cloud.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CloudGrid {
     /// Pixels in a row.
@@ -43,8 +43,8 @@ pub struct CloudGrid {
     pub pixels: Vec<u32>,
 }
 
-/// Where a sensor stood and how it was turned, as a PCD header tells it. It is **never applied** to points: some writers
-/// store points that were moved already, others do not, and the file does not say which.
+/// Position and orientation of a sensor in a PCD header. It is **never applied** to points: some writers
+/// store points that were moved already, others do not, and the file does not record which.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
     /// Position of the sensor (metres).
@@ -54,7 +54,7 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
-    /// The viewpoint that writers give who know none.
+    /// The viewpoint of writers that do not have one.
     pub const NONE: Self = Self { position: [0.0; 3], quaternion: [0.0, 0.0, 0.0, 1.0] };
 
     /// As a pose; `None` where the quaternion is zero or something is not finite.
@@ -69,9 +69,9 @@ impl Viewpoint {
 pub struct RefusedPoints {
     /// A coordinate is NaN or infinite, in a file without rows and columns.
     pub not_finite: u64,
-    /// A coordinate is beyond 10^8 m, further than any map on Earth reaches.
+    /// A coordinate is beyond 10^8 m, farther than any map on Earth reaches.
     pub too_far: u64,
-    /// Pixels of an organised cloud that are NaN or empty: no reading, which is no fault.
+    /// Pixels of an organized cloud that are NaN or empty: without a reading, which is not a fault.
     pub no_reading: u64,
 }
 
@@ -112,7 +112,7 @@ impl PointCloudFile {
         Pose { translation: self.offset, ..Pose::IDENTITY }
     }
 
-    /// Point `i` in the file's frame (metres). Panics where there is none.
+    /// Point `i` in the file's frame (metres). Panics for an `i` beyond the last.
     pub fn position(&self, i: usize) -> [f64; 3] {
         std::array::from_fn(|k| f64::from(self.points[i][k]) + self.offset[k])
     }

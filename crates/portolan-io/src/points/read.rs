@@ -1,4 +1,4 @@
-//! Any file of points, told by its first bytes and its name.
+//! Any file of points; its first bytes and its name decide the format.
 
 use std::io::BufRead;
 use std::path::Path;
@@ -29,9 +29,9 @@ pub enum PointFormat {
     Xyz,
 }
 
-/// The format of a file of points: PCD and PLY by their first bytes, the others, which have none, by the name (`.bin`;
-/// `.xyz`, `.txt`, `.csv`, `.pts`, `.asc`, `.dat`, `.xyzn`, `.xyzrgb`; `.gz` and `.bz2` behind it are passed over). `None`: none of
-/// them.
+/// The format of a file of points: PCD and PLY by their first bytes, the others by the name (`.bin`;
+/// `.xyz`, `.txt`, `.csv`, `.pts`, `.asc`, `.dat`, `.xyzn`, `.xyzrgb`; a further `.gz` or `.bz2` is passed over). `None`: any
+/// other file.
 pub fn point_format(path: impl AsRef<Path>, head: &[u8]) -> Option<PointFormat> {
     if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") {
         return Some(PointFormat::Ply);
@@ -55,7 +55,7 @@ pub fn point_format(path: impl AsRef<Path>, head: &[u8]) -> Option<PointFormat> 
 /// Reads a file of points in any of the formats of [`PointFormat`], plain or packed by gzip or bzip2.
 ///
 /// # Errors
-/// Those of the format's reader; [`IoError::Binary`] for a file of none of them.
+/// Those of the format's reader; [`IoError::Binary`] for any other file.
 pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
     parse_points(open(path)?)
 }

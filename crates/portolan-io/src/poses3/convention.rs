@@ -81,7 +81,7 @@ impl PoseConvention {
     }
 }
 
-/// A translation beyond this is no place on Earth (metres).
+/// No place on Earth has a translation beyond this (metres).
 const FARTHEST: f64 = 1e9;
 
 /// How far the last element may be from 1: it was written with few digits.

@@ -1,4 +1,4 @@
-//! Poses of sensors in space: the layouts that files have, and the conventions behind the same numbers.
+//! 3-D poses of sensors: the layouts that files have, and the conventions of their numbers.
 //!
 //! | columns | layout |
 //! |---|---|

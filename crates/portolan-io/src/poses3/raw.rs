@@ -9,14 +9,14 @@ use super::PoseConvention;
 /// A rotation that is off by more than this counts as mended (that is beyond the rounding of six decimals).
 pub const MENDED_FROM: f64 = 1e-5;
 
-/// A pose as it is in a file, before a convention says what it means.
+/// A pose as it is in a file, before a convention is applied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawPose {
     /// Rows of the 4x4 matrix. A time stamp in `[3][3]` has been taken out.
     pub matrix: [[f64; 4]; 4],
     /// The stamp (seconds of the file's clock), if the file has stamps.
     pub time: Option<f64>,
-    /// The scan that the file says it belongs to, if it says so.
+    /// The scan to which the file assigns it, if it does.
     pub number: Option<u64>,
     /// Where it begins in the file: line number, from 1.
     pub line: u64,
@@ -30,7 +30,7 @@ impl RawPose {
         Self { matrix, time: None, number: None, line }
     }
 
-    /// A pose of translation and quaternion `(x, y, z, w)`. The quaternion is not normalised: one of length `n` gives a
+    /// A pose of translation and quaternion `(x, y, z, w)`. The quaternion is not normalized: one of length `n` gives a
     /// rotation that is off by `n^4 - 1`, so that a wrong one is refused like any other pose.
     pub(crate) fn from_quaternion(translation: [f64; 3], [x, y, z, w]: [f64; 4], line: u64) -> Self {
         let rotation = [
@@ -45,7 +45,7 @@ impl RawPose {
     /// (see [`Pose::from_matrix`]); beyond [`MENDED_FROM`] that counts as mended.
     ///
     /// # Errors
-    /// [`PoseFault`] for what is no pose.
+    /// [`PoseFault`] for numbers that are not a pose.
     pub fn resolve(&self, convention: PoseConvention) -> Result<(Pose<3>, f64), PoseFault> {
         convention.resolve(&self.matrix)
     }

@@ -66,11 +66,11 @@ pub struct PoseFile {
     pub poses: Vec<RawPose>,
 }
 
-/// Reads a file of poses in space; see [`crate::poses3`] for the layouts. Linear in its length.
+/// Reads a file of 3-D poses; see [`crate::poses3`] for the layouts. Linear in its length.
 ///
 /// # Errors
-/// [`IoError::Text`] for a line that fits no layout, or another than the lines before, for a word that is no number, a
-/// matrix that ends early, and a file without poses. A pose that is not rigid is no error here: [`RawPose::resolve`] says so.
+/// [`IoError::Text`] for a line that fits no layout, or another than the lines before, for a word that is not a number, a
+/// matrix that ends early, and a file without poses. A pose that is not rigid is read; [`RawPose::resolve`] refuses it.
 pub fn read_poses_3d(path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
     parse_poses_3d(open(path)?)
 }
@@ -322,7 +322,7 @@ mod tests {
             resolved.collect::<Vec<_>>()
         };
         let fault = |corner: f64| Some(PoseFault::LastRow([0.0, 0.0, 0.0, corner]));
-        // One number in all of them is a scale, not a time; one pose says nothing of time; times do not descend.
+        // One number in all of them is a scale, not a time; a single pose cannot show it; times do not descend.
         assert_eq!(faults(&["2", "2", "2"]), [fault(2.0); 3]);
         assert_eq!(faults(&["1630577758.5"]), [fault(1_630_577_758.5)]);
         assert_eq!(faults(&["5", "7", "6"]), [fault(5.0), fault(7.0), fault(6.0)]);

@@ -3,9 +3,9 @@
 use portolan::geom::Pose;
 use portolan::geom::vector::{add, scale, unit};
 
-/// Between two poses that are further apart than this nothing is interpolated (seconds). Trajectories of lidars come at 10 Hz,
+/// Between two poses that are farther apart than this nothing is interpolated (seconds). Trajectories of lidars come at 10 Hz,
 /// some at 5 Hz, with times that jitter, so that 0.1 s would refuse every other pair of them; across what is longer poses were
-/// lost, and a straight line says nothing of where a hand went in that time.
+/// lost, and a straight line is a poor guess of where a hand went in that time.
 const LONGEST_GAP: f64 = 0.25;
 
 /// A pose of a trajectory: refused ones keep their place.

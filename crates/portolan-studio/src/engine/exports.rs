@@ -54,7 +54,7 @@ pub(super) fn contour(tsdf: &Tsdf2) -> Result<Reply, Refusal> {
 pub(super) fn map(tsdf: &Tsdf2, log: &str, scans: usize, settings: &Value) -> Result<Reply, Refusal> {
     let settings: Map<String, Value> = settings.as_object().cloned().unwrap_or_default();
     let header = MapHeader { logs: vec![log.into()], scans: scans as u64, settings, ..MapHeader::default() };
-    let mut content = MapFile::default();
+    let mut content = MapFile::<2>::default();
     (content.header, content.tsdf) = (header, Some(tsdf.clone()));
     file("map.portolan", content.to_bytes().map_err(refused)?)
 }

@@ -3,7 +3,7 @@
 use portolan::geom::Pose;
 use portolan::map::Tsdf3;
 use portolan::scan::{FrameFilter, Scan};
-use portolan_io::space_log::SpaceLog;
+use portolan_io::scan_log::ScanLog;
 
 /// The two logs that every session looks at. They never change.
 #[derive(Default)]
@@ -38,7 +38,7 @@ pub enum SpaceSource {
     /// A log whose frames are read when they are asked for.
     Recorded {
         /// Poses, and where the frames are.
-        log: Box<SpaceLog>,
+        log: Box<ScanLog>,
         /// Which readings are used.
         filter: FrameFilter,
     },

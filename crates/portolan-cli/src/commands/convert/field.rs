@@ -55,7 +55,7 @@ impl Field {
                 })
             }
             Source::SpaceMap(file) => {
-                let Some(map) = &file.tsdf else { return Ok(None) };
+                let Some(map) = &file.tsdf_bricks else { return Ok(None) };
                 let settings = &file.header.settings;
                 let saved = settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
                 let mut how =

@@ -4,14 +4,14 @@ use anyhow::bail;
 use portolan::cell::LogOddsRule;
 use portolan::store::Tree;
 use portolan::surface::marching_cubes;
-use portolan_io::{SpaceMapFile, write_octomap_bt, write_octomap_ot};
+use portolan_io::{MapFile, write_octomap_bt, write_octomap_ot};
 
 use super::{Args, Target};
 use crate::space::{mesh_settings, write_mesh};
 
 /// `false`: the map does not hold what the format needs, or the format is one of the plane.
-pub(super) fn convert(file: &SpaceMapFile, target: Target, args: &Args) -> anyhow::Result<bool> {
-    match (target, &file.occupancy, &file.tsdf) {
+pub(super) fn convert(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Result<bool> {
+    match (target, &file.occupancy_bricks, &file.tsdf_bricks) {
         (Target::Portolan, ..) => file.write(&args.out)?,
         (Target::OctomapBt | Target::OctomapOt, Some(map), _) => {
             let Some(tree) = Tree::from_bricks(&map.store) else {
@@ -24,7 +24,7 @@ pub(super) fn convert(file: &SpaceMapFile, target: Target, args: &Args) -> anyho
             }
         }
         (Target::Mesh, _, Some(map)) => {
-            let colors = file.colors.as_ref().map(|c| &c.store);
+            let colors = file.color_bricks.as_ref().map(|c| &c.store);
             return write_mesh(&args.out, &marching_cubes(&map.store, colors, &mesh_settings(map.weights)));
         }
         _ => return Ok(false),

@@ -23,7 +23,7 @@ pub(super) struct Found<'a> {
     pub(super) fusion: FusionReport,
     /// Bytes of each map, measured.
     pub(super) bytes: BTreeMap<&'static str, usize>,
-    pub(super) file: MapFile,
+    pub(super) file: MapFile<2>,
     pub(super) derived: Derived,
     pub(super) gallery: &'a Gallery,
     pub(super) drift: &'a Drift,

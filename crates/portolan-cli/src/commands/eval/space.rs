@@ -9,7 +9,7 @@ use portolan::surface::{
     CompareSettings, Mesh, MeshSettings, RangeNoise, RangePredictions, RayCastSettings, RayCaster, Reference,
     SurfaceComparison, SurfaceDistances, compare_surfaces, marching_cubes,
 };
-use portolan_io::{PlyMesh, PointCloudFile, SpaceMapFile, TsdfBricks, open, read_ply_mesh, read_points};
+use portolan_io::{MapFile, PlyMesh, PointCloudFile, TsdfBricks, open, read_ply_mesh, read_points};
 use serde_json::{Value, json};
 
 use super::{Args, prediction_text};
@@ -23,8 +23,8 @@ use crate::space::mesh_settings;
 const FURTHEST: f64 = 100.0;
 
 /// Evaluates the map.
-pub(super) fn run(args: &Args, file: &SpaceMapFile) -> anyhow::Result<()> {
-    let Some(tsdf) = &file.tsdf else {
+pub(super) fn run(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
+    let Some(tsdf) = &file.tsdf_bricks else {
         bail!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display());
     };
     let settings = MeshSettings { normals: false, colors: false, ..mesh_settings(tsdf.weights) };
@@ -105,7 +105,7 @@ fn about_a_vertex(mesh: &PlyMesh) -> Mesh {
 }
 
 /// Predicts the ranges of scans by casting rays through the map.
-fn predict(args: &Args, file: &SpaceMapFile, tsdf: &TsdfBricks, path: &Path) -> anyhow::Result<Value> {
+fn predict(args: &Args, file: &MapFile<3>, tsdf: &TsdfBricks<3>, path: &Path) -> anyhow::Result<Value> {
     let log = log::read_space(path, &args.source, false)?;
     let saved = |key: &str| file.header.settings.get(key);
     let number = |key: &str| saved(key).and_then(Value::as_f64);

@@ -2,25 +2,25 @@
 
 use portolan::cell::{Cell, Planes};
 use portolan::store::{Bricks, Store};
-use portolan_io::SpaceMapFile;
-use portolan_io::space_log::{CameraFrom, SpaceLog};
+use portolan_io::MapFile;
+use portolan_io::scan_log::{CameraFrom, ScanLog};
 use serde_json::{Value, json};
 
 use crate::json;
 use crate::space::brick_extent;
 
-pub(super) fn of_map(file: &SpaceMapFile) -> Value {
+pub(super) fn of_map(file: &MapFile<3>) -> Value {
     let header = &file.header;
     let mut maps = json!({});
-    if let Some(map) = &file.occupancy {
+    if let Some(map) = &file.occupancy_bricks {
         maps["tree"] = of_bricks("log odds, one byte", &map.store);
     }
-    if let Some(map) = &file.tsdf {
+    if let Some(map) = &file.tsdf_bricks {
         maps["tsdf"] = of_bricks("signed distance and weight, f32", &map.store);
         maps["tsdf"]["truncation"] = json!(map.truncation);
         maps["tsdf"]["w_max"] = json!(map.w_max.is_finite().then_some(map.w_max));
     }
-    if let Some(map) = &file.colors {
+    if let Some(map) = &file.color_bricks {
         maps["colors"] = of_bricks("red, green, blue, weight, 16 bits each", &map.store);
     }
     json!({
@@ -49,7 +49,7 @@ fn of_bricks<C: Cell>(cell: &str, store: &Bricks<C, 3>) -> Value {
     })
 }
 
-pub(super) fn of_log(log: &SpaceLog) -> Value {
+pub(super) fn of_log(log: &ScanLog) -> Value {
     let camera = log.camera().map(|camera| {
         let p = &camera.pinhole;
         let from = match &camera.from {

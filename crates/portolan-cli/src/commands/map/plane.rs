@@ -118,16 +118,16 @@ impl Args {
     }
 
     /// The map to go on with.
-    fn saved_map(&self) -> anyhow::Result<Option<MapFile>> {
+    fn saved_map(&self) -> anyhow::Result<Option<MapFile<2>>> {
         if !self.append {
             self.check_out()?;
             return Ok(None);
         }
-        Ok(Some(MapFile::read_within(self.map_path(), self.memory)?))
+        Ok(Some(MapFile::<2>::read_within(self.map_path(), self.memory)?))
     }
 
     /// What was given, else what the map to go on with was made with, else the defaults.
-    fn settings(&self, log: &CarmenLog, before: Option<&MapFile>, bounds: Option<Aabb<2>>) -> Settings {
+    fn settings(&self, log: &CarmenLog, before: Option<&MapFile<2>>, bounds: Option<Aabb<2>>) -> Settings {
         let saved = Saved(before.map(|f| &f.header.settings));
         let resolution = self.resolution.or(saved.number("resolution")).unwrap_or(0.05);
         let never_forget = before.map(|_| f32::INFINITY).filter(|_| saved.number("w_max").is_none());
@@ -173,7 +173,7 @@ impl Args {
     /// Empty maps, or the saved ones in their new grid. They are taken out of `file`.
     fn maps_to_fuse_into(
         &self,
-        file: &mut MapFile,
+        file: &mut MapFile<2>,
         settings: &Settings,
         grid: &Grid<2>,
     ) -> anyhow::Result<Maps> {
@@ -198,7 +198,7 @@ impl Args {
 }
 
 /// The grid of a saved map.
-fn grid_of(file: &MapFile) -> Option<Grid<2>> {
+fn grid_of(file: &MapFile<2>) -> Option<Grid<2>> {
     let dense = file.tsdf.as_ref().map(|m| *m.grid());
     dense
         .or_else(|| file.grid.as_ref().map(|m| *m.store().grid()))
@@ -206,7 +206,7 @@ fn grid_of(file: &MapFile) -> Option<Grid<2>> {
 }
 
 /// Writes into the file's header what it is made of.
-fn describe(file: &mut MapFile, settings: &Settings, log: &CarmenLog, stats: &portolan::scan::ScanStats) {
+fn describe(file: &mut MapFile<2>, settings: &Settings, log: &CarmenLog, stats: &portolan::scan::ScanStats) {
     let header = &mut file.header;
     let name = log.path().file_name().unwrap_or(log.path().as_os_str());
     header.logs.push(name.to_string_lossy().into_owned());

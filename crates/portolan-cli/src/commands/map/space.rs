@@ -6,8 +6,8 @@ use anyhow::{Context, bail};
 use portolan::geom::Aabb;
 use portolan::map::OccupancySweep;
 use portolan::scan::{FrameFilter, ScanStats};
-use portolan_io::space_log::SpaceLog;
-use portolan_io::{SpaceMapFile, weights_of, write_atomic};
+use portolan_io::scan_log::ScanLog;
+use portolan_io::{MapFile, weights_of, write_atomic};
 
 use super::common::{CARVE_WEIGHT, Watch, start_threads, three_cells, title};
 use super::{Args, SweepArg};
@@ -110,7 +110,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
 
 /// The origin of the lattice: zero, unless the log is so far from it that indices would run out or files of other
 /// programs could not hold them anyway; then the multiple of the resolution next to the first pose.
-fn anchor(log: &SpaceLog, resolution: f64) -> [f64; 3] {
+fn anchor(log: &ScanLog, resolution: f64) -> [f64; 3] {
     const FAR: f64 = 1e6;
     log.pose(0)
         .translation
@@ -139,7 +139,7 @@ impl Args {
     }
 
     /// Refuses options that this log or these maps have no use for.
-    fn check_fits(&self, log: &SpaceLog, settings: &Settings) -> anyhow::Result<()> {
+    fn check_fits(&self, log: &ScanLog, settings: &Settings) -> anyhow::Result<()> {
         let kind = log.kind().word();
         let (camera, source) = (log.camera().is_some(), &self.source);
         if !camera && (source.intrinsics.is_some() || source.depth_scale.is_some()) {
@@ -157,18 +157,18 @@ impl Args {
     }
 
     /// The map to go on with.
-    fn saved_space_map(&self) -> anyhow::Result<Option<SpaceMapFile>> {
+    fn saved_space_map(&self) -> anyhow::Result<Option<MapFile<3>>> {
         if !self.append {
             self.check_out()?;
             return Ok(None);
         }
-        Ok(Some(SpaceMapFile::read_within(self.map_path(), self.memory)?))
+        Ok(Some(MapFile::<3>::read_within(self.map_path(), self.memory)?))
     }
 
     /// What was given, else what the map to go on with was made with, else the defaults.
     fn space_settings(
         &self,
-        before: Option<&SpaceMapFile>,
+        before: Option<&MapFile<3>>,
         bounds: Option<Aabb<3>>,
     ) -> anyhow::Result<Settings> {
         let saved = Saved(before.map(|f| &f.header.settings));
@@ -220,7 +220,7 @@ impl Args {
     /// Empty maps, or the saved ones. They are taken out of `file`.
     fn space_maps(
         &self,
-        file: &mut SpaceMapFile,
+        file: &mut MapFile<3>,
         settings: &Settings,
         anchor: [f64; 3],
     ) -> anyhow::Result<SpaceMaps> {
@@ -235,7 +235,7 @@ impl Args {
 }
 
 /// Writes into the file's header what it is made of.
-fn describe(file: &mut SpaceMapFile, settings: &Settings, log: &SpaceLog, stats: &ScanStats) {
+fn describe(file: &mut MapFile<3>, settings: &Settings, log: &ScanLog, stats: &ScanStats) {
     let header = &mut file.header;
     header.logs.push(log.name().to_owned());
     header.scans += stats.scans;

@@ -6,7 +6,7 @@ use portolan::geom::Pose;
 use portolan::geom::vector::{add, norm, scale};
 use portolan::map::Tsdf3;
 use portolan::scan::Frame;
-use portolan_io::space_log::SpaceLog;
+use portolan_io::scan_log::ScanLog;
 use portolan_sim::SEED;
 use portolan_sim::space::{
     BuildingConfig, DepthCamera, SpaceLidar, SpaceSensor, SpaceWorld, building_poses, building_world,
@@ -48,7 +48,7 @@ impl Source {
         Self { logs: logs.clone(), walk }
     }
 
-    fn recorded(&self) -> Option<&SpaceLog> {
+    fn recorded(&self) -> Option<&ScanLog> {
         match &self.logs.space {
             SpaceSource::Recorded { log, .. } => Some(log),
             SpaceSource::Building | SpaceSource::Map { .. } => None,
@@ -81,7 +81,7 @@ impl Source {
 
     /// Frames that there are.
     pub(super) fn len(&self) -> usize {
-        self.walk.as_ref().map_or_else(|| self.recorded().map_or(0, SpaceLog::len), |walk| walk.poses.len())
+        self.walk.as_ref().map_or_else(|| self.recorded().map_or(0, ScanLog::len), |walk| walk.poses.len())
     }
 
     /// `world_from_sensor` of frame `i`, which there is.

@@ -1,0 +1,84 @@
+//! The settings of maps in the header, and the words for what they choose.
+
+use portolan::cell::OccupancyModel;
+use portolan::map::SweepKind;
+use portolan::sweep::WeightModel;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// Settings of an occupancy map.
+#[derive(Serialize, Deserialize)]
+pub(super) struct OccupancySettings {
+    #[serde(with = "Model")]
+    pub(super) model: OccupancyModel,
+    #[serde(flatten)]
+    pub(super) more: Map<String, Value>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "OccupancyModel")]
+struct Model {
+    p_hit: f64,
+    p_miss: f64,
+    p_min: f64,
+    p_max: f64,
+    p_prior: f64,
+    wall_depth: Option<f64>,
+}
+
+/// Settings of a TSDF.
+#[derive(Serialize, Deserialize)]
+pub(super) struct TsdfSettings {
+    pub(super) truncation: f64,
+    /// `None`, `null` in JSON: never forget.
+    pub(super) w_max: Option<f32>,
+    pub(super) carve_weight: f32,
+    pub(super) weights: String,
+    #[serde(flatten)]
+    pub(super) more: Map<String, Value>,
+}
+
+impl TsdfSettings {
+    /// Clamp of the weight.
+    pub(super) fn w_max(&self) -> f32 {
+        self.w_max.unwrap_or(f32::INFINITY)
+    }
+}
+
+/// Settings of a map of colors.
+#[derive(Serialize, Deserialize)]
+pub(super) struct ColorSettings {
+    pub(super) w_max: f32,
+    #[serde(flatten)]
+    pub(super) more: Map<String, Value>,
+}
+
+/// The word for a sweep in files and on the command line.
+pub fn sweep_word(sweep: SweepKind) -> &'static str {
+    match sweep {
+        SweepKind::CellCentre => "cell-centre",
+        SweepKind::March => "march",
+    }
+}
+
+/// The sweep of a word; `None` for any other word.
+pub fn sweep_of(word: &str) -> Option<SweepKind> {
+    [SweepKind::CellCentre, SweepKind::March].into_iter().find(|&s| sweep_word(s) == word)
+}
+
+/// The word for a weight model in files and on the command line.
+pub fn weights_word(weights: WeightModel) -> &'static str {
+    match weights {
+        WeightModel::Constant => "constant",
+        WeightModel::InverseSquare => "range",
+        WeightModel::CosIncidence => "incidence",
+        WeightModel::InverseSquareCosIncidence => "range-incidence",
+    }
+}
+
+/// The weight model of a word; `None` for any other word.
+pub fn weights_of(word: &str) -> Option<WeightModel> {
+    use WeightModel::*;
+    let all = [Constant, InverseSquare, CosIncidence, InverseSquareCosIncidence];
+    all.into_iter().find(|&w| weights_word(w) == word)
+}

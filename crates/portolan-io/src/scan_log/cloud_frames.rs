@@ -1,0 +1,145 @@
+//! The scans of a lidar: a cloud of points each.
+
+use std::path::{Path, PathBuf};
+
+use portolan::geom::Pose;
+use portolan::scan::{Frame, OrganisedPoints, Origin, PointScan, orthographic_image};
+
+use super::parts::FrameSource;
+use crate::IoError;
+use crate::points::{CloudGrid, PointCloudFile, PointFormat, read_points_as};
+
+/// Where the rays of a log's clouds begin.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Rays {
+    /// In one point a scan, in the frame of the files (metres).
+    From(Vec<[f64; 3]>),
+    /// Above each point: a scanner that looks along -z from far away.
+    Parallel,
+}
+
+/// Reads clouds.
+pub(super) struct CloudFrames {
+    files: Vec<PathBuf>,
+    format: Option<PointFormat>,
+    rays: Rays,
+    /// Whole metres that are taken off every point, so that an `f32` holds clouds far from zero.
+    base: [f64; 3],
+}
+
+impl CloudFrames {
+    /// `format`: of all files; `None`: each file's own. The first file with points is looked at where files may hold points
+    /// far from their zero: all frames are about its offset, which is [`CloudFrames::files_from_frames`].
+    pub(super) fn new(files: Vec<PathBuf>, format: Option<PointFormat>, rays: Rays) -> Result<Self, IoError> {
+        // These are never far: they hold nothing but floats.
+        let looked_at = if format == Some(PointFormat::KittiBin) { &[][..] } else { &files };
+        let mut base = [0.0; 3];
+        for file in looked_at {
+            let cloud = read_points_as(file, format)?;
+            if !cloud.points.is_empty() {
+                base = cloud.offset;
+                break;
+            }
+        }
+        Ok(Self { files, format, rays, base })
+    }
+
+    /// What leads from the frames' points to the files': the offset. `None` where they are the same.
+    pub(super) fn files_from_frames(&self) -> Option<Pose<3>> {
+        file_from_frames(self.base)
+    }
+}
+
+/// What leads from points about `base` to those of the file. `None` where they are the same.
+pub(super) fn file_from_frames(base: [f64; 3]) -> Option<Pose<3>> {
+    (base != [0.0; 3]).then_some(Pose { translation: base, ..Pose::IDENTITY })
+}
+
+impl FrameSource for CloudFrames {
+    fn frame(&self, i: usize) -> Result<Frame, IoError> {
+        let cloud = about(read_points_as(&self.files[i], self.format)?, self.base, &self.files[i])?;
+        Ok(Frame::Points(match &self.rays {
+            Rays::From(origins) => scan_from(cloud, origins[i]),
+            Rays::Parallel => range_scan(cloud, &self.files[i])?,
+        }))
+    }
+
+    fn origin(&self, i: usize) -> [f64; 3] {
+        match &self.rays {
+            Rays::From(origins) => std::array::from_fn(|k| origins[i][k] - self.base[k]),
+            Rays::Parallel => [0.0; 3],
+        }
+    }
+}
+
+/// How far the offset of a scan may be from that of the first (metres): beyond, an `f32` is coarser than 4 mm.
+const FARTHEST_APART: f64 = 65_536.0;
+
+/// The cloud with another offset.
+///
+/// # Errors
+/// [`IoError::Layout`] for a cloud so far from there that its shape would be lost.
+pub(super) fn about(
+    mut cloud: PointCloudFile,
+    base: [f64; 3],
+    path: &Path,
+) -> Result<PointCloudFile, IoError> {
+    if cloud.offset != base {
+        let apart = (0..3).any(|k| (cloud.offset[k] - base[k]).abs() > FARTHEST_APART);
+        if apart && !cloud.points.is_empty() {
+            let (value, advice) = (
+                format!("about {:?} m", cloud.offset),
+                format!("the first scan's are about {base:?} m; give scans of one place, within 65 km"),
+            );
+            return Err(IoError::layout(path, "the place of the points", value, advice));
+        }
+        let moved = (0..cloud.points.len()).map(|i| {
+            let p = cloud.position(i);
+            std::array::from_fn(|k| (p[k] - base[k]) as f32)
+        });
+        cloud.points = moved.collect();
+        cloud.offset = base;
+    }
+    Ok(cloud)
+}
+
+/// A scan of rays from one point (in the file's frame), with an image about that point where the cloud has rows and columns
+/// that a sensor can have.
+fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
+    let image = cloud.grid.as_ref().and_then(|grid| {
+        let about_origin = |i: usize| std::array::from_fn(|k| (cloud.position(i)[k] - origin[k]) as f32);
+        let points: Vec<[f32; 3]> = (0..cloud.points.len()).map(about_origin).collect();
+        let CloudGrid { columns, rows, ref pixels } = *grid;
+        OrganisedPoints { points: &points, pixels, colors: &cloud.colors, columns, rows }.image()
+    });
+    PointScan { image, ..cloud.into_scan(origin) }
+}
+
+/// A range scan of parallel rays: the points as they are, each with its own origin, and the image of them.
+fn range_scan(cloud: PointCloudFile, path: &Path) -> Result<PointScan, IoError> {
+    let grid = cloud.grid.clone();
+    let highest = cloud.points.iter().map(|p| p[2]).fold(f32::NEG_INFINITY, f32::max);
+    let image = grid.and_then(|g| orthographic_image(&cloud.points, &g.pixels, g.columns, g.rows));
+    let top = match image.as_ref().map(|i| &i.projection) {
+        Some(portolan::scan::Projection::Orthographic { top, .. }) => *top as f32,
+        _ => highest + height_above(&cloud.points),
+    };
+    if cloud.points.is_empty() {
+        return Err(IoError::layout(path, "the number of points", "0", "give a range scan with points"));
+    }
+    let origins = cloud.points.iter().map(|p| [p[0], p[1], top]).collect();
+    // Nothing lies on this origin: it is replaced.
+    let mut scan = cloud.into_scan([f64::INFINITY; 3]);
+    scan.origin = Origin::PerPoint(origins);
+    scan.image = image;
+    Ok(scan)
+}
+
+/// How far above the highest point rays begin without an image: a hundredth of the scan's size.
+fn height_above(points: &[[f32; 3]]) -> f32 {
+    let extent = |k: usize| {
+        let (low, high) = points.iter().fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        high - low
+    };
+    0.01 * extent(0).max(extent(1)).max(extent(2)).max(1e-6)
+}
