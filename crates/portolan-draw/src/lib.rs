@@ -24,6 +24,7 @@ mod plot;
 mod render;
 mod text;
 mod ticks;
+mod units;
 mod view;
 
 pub use canvas::{Canvas, Pen};
@@ -34,4 +35,5 @@ pub use panels::{Panel, Panels};
 pub use render::{Camera, MeshView, Preview, Sensor, Setting, preview, render_mesh};
 pub use text::{Anchor, Font};
 pub use ticks::{linear_ticks, log_ticks, tick_label};
+pub use units::{shown_bytes, shown_seconds};
 pub use view::{PixelRect, View};

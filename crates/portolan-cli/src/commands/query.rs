@@ -7,7 +7,7 @@ use anyhow::bail;
 use portolan::Answer;
 use portolan::field::{Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
 use portolan::geom::Pose;
-use portolan::map::{MapRepr, OccupancySweep, SparseOccupancy};
+use portolan::map::{OccupancySweep, SparseOccupancy};
 use portolan::store::Store;
 use portolan_io::{
     AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,

@@ -30,7 +30,6 @@ mod tests {
     use crate::testing::bad_bytes;
     use portolan::cell::OccupancyModel;
     use portolan::geom::Grid;
-    use portolan::map::MapRepr;
     use portolan::map::TsdfConfig;
     use portolan::scan::{RangeLimits, Scan};
     use serde_json::json;
@@ -57,9 +56,9 @@ mod tests {
         let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
         for k in 0..3 {
             let pose = Pose::<2>::new(0.1 * f64::from(k), 0.0, 0.3);
-            file.grid.as_mut().unwrap().integrate_scan(&pose, &scan);
-            file.tree.as_mut().unwrap().integrate_scan(&pose, &scan);
-            file.tsdf.as_mut().unwrap().integrate_scan(&pose, &scan);
+            file.grid.as_mut().unwrap().integrate(&pose, &scan);
+            file.tree.as_mut().unwrap().integrate(&pose, &scan);
+            file.tsdf.as_mut().unwrap().integrate(&pose, &scan, true);
             file.poses.push(pose);
         }
         file.unknown_maps.push(json!({"kind": "wavelets", "cell": "i16", "chunk": "WAVE"}));

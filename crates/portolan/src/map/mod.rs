@@ -1,10 +1,9 @@
-//! The maps: named combinations of sweep, cell and store, and the thin view that compares them.
+//! The maps: named combinations of sweep, cell and store.
 
 mod cloud;
 mod error;
 mod integrate;
 mod occupancy_grid;
-mod repr;
 mod sparse_fuse;
 mod sparse_occupancy;
 #[cfg(test)]
@@ -17,13 +16,10 @@ mod tsdf;
 pub use cloud::Cloud;
 pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
-pub use repr::{Abilities, Derived, DerivedField, MapRepr};
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
 pub use sparse_tsdf::SparseTsdf;
 pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
-pub use tree_map::{
-    CoarseOccupancy, Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio,
-};
+pub use tree_map::{CoarseOccupancy, Octree, Quadtree, TreeMap};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 
 /// A TSDF of the plane.
@@ -32,5 +28,3 @@ pub type Tsdf2 = Tsdf<2>;
 pub type Tsdf3 = Tsdf<3>;
 /// Settings of a TSDF of the plane.
 pub type Tsdf2Config = TsdfConfig<2>;
-/// Settings of a TSDF of space.
-pub type Tsdf3Config = TsdfConfig<3>;

@@ -1,8 +1,8 @@
 //! The flat occupancy grid: one byte a cell.
 
+use super::MapError;
 use super::error::check_grid;
 use super::integrate::integrate;
-use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
 use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, OccupancyModel, ProbabilityTable};
 use crate::geom::vector::distance;
@@ -118,6 +118,11 @@ impl<const D: usize> OccupancyGrid<D> {
         &self.rule
     }
 
+    /// Bytes of the cells, measured.
+    pub fn memory_bytes(&self) -> usize {
+        self.store.memory_bytes()
+    }
+
     /// Number of cells that were observed.
     pub fn observed_cells(&self) -> usize {
         (0..self.store.grid().len()).filter(|&i| self.store.at(i).is_some()).count()
@@ -156,28 +161,6 @@ fn for_each_on_ring<const D: usize>(centre: [i32; D], ring: i32, mut visit: impl
                 return;
             }
         }
-    }
-}
-
-impl<const D: usize> MapRepr<D> for OccupancyGrid<D> {
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        self.integrate(world_from_sensor, scan)
-    }
-
-    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
-        self.probability(p_world).known()
-    }
-
-    fn distance(&self, _: [f64; D]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { occupancy: true, distance: false }
     }
 }
 
@@ -225,7 +208,6 @@ mod tests {
         assert!((d - 1.0).abs() < 1e-9);
         assert_eq!(map.search_distance_by_rings(at(2.05), 0.9), None);
         assert_eq!(map.search_distance_by_rings(at(1e6), f64::INFINITY), None);
-        assert_eq!(map.abilities(), Abilities { occupancy: true, distance: false });
 
         let tilted = Pose { rotation: [[0.5; D]; D], translation: [1.0; D] };
         assert_eq!(map.integrate(&tilted, &scan).refused_poses, 1);

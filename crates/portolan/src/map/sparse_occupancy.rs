@@ -1,8 +1,8 @@
 //! Occupancy of space in bricks: memory only where something was seen.
 
+use super::MapError;
 use super::error::{most_bricks, too_many};
 use super::sparse_fuse::{free_reach, fuse, stats, union};
-use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
 use crate::cell::{LogOdds8, LogOddsValue, OccupancyModel, Planes};
 use crate::geom::{Aabb, Lattice, Pose, block_cells};
@@ -316,12 +316,10 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
     pub fn memory_bytes(&self) -> usize {
         self.store.memory_bytes()
     }
-}
 
-impl<V: LogOddsValue> MapRepr<3> for SparseOccupancy<V> {
-    /// Exactly, whatever the sweep: beams of a [`Scan`] have no rows and columns. Where the limit of memory is met, what had
-    /// room is fused; [`SparseOccupancy::integrate`] tells of it.
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<3>, scan: &Scan<3>) -> ScanStats {
+    /// Fuses beams exactly, whatever the sweep: a [`Scan`] has no rows and columns. Where the limit of memory is met,
+    /// what had room is fused; [`SparseOccupancy::integrate`] reports it.
+    pub fn integrate_scan(&mut self, world_from_sensor: &Pose<3>, scan: &Scan<3>) -> ScanStats {
         if !self.has_place(world_from_sensor) {
             return ScanStats { refused_poses: 1, ..Default::default() };
         }
@@ -345,22 +343,6 @@ impl<V: LogOddsValue> MapRepr<3> for SparseOccupancy<V> {
             }
             Err(_) => ScanStats { scans: 1, beams, refused: scan.refused(), ..Default::default() },
         }
-    }
-
-    fn occupancy(&self, p_world: [f64; 3]) -> Option<f64> {
-        self.probability(p_world).known()
-    }
-
-    fn distance(&self, _: [f64; 3]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.memory_bytes()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { occupancy: true, distance: false }
     }
 }
 

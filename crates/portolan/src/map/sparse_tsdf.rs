@@ -1,8 +1,8 @@
 //! Truncated signed distance fields of space in bricks.
 
+use super::MapError;
 use super::error::{check_lattice, most_bricks, too_many};
 use super::sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
-use super::{Abilities, MapError};
 use crate::answer::Answer;
 use crate::cell::{
     Cell, Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
@@ -365,11 +365,6 @@ impl SparseTsdf {
             Answer::Known(d) | Answer::Saturated(d) => Some(if d < 0.0 { 1.0 } else { 0.0 }),
             Answer::Unknown | Answer::Outside => None,
         }
-    }
-
-    /// What it can answer at all: the sign, no distance.
-    pub fn abilities(&self) -> Abilities {
-        Abilities { occupancy: true, distance: false }
     }
 
     /// The distances.

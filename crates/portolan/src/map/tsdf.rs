@@ -1,8 +1,8 @@
 //! Truncated signed distance fields.
 
+use super::MapError;
 use super::error::check_grid;
 use super::integrate::integrate_watched;
-use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
 use crate::cell::{Cell, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule};
 use crate::geom::{Aabb, BlockKey, Grid, Pose, block_cells};
@@ -233,6 +233,17 @@ impl<const D: usize> Tsdf<D> {
         }
     }
 
+    /// 1 behind the surface, 0 in front of it: the sign of the estimate. `None`: never observed, or outside.
+    pub fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
+        let i = self.store.grid().index_of(p_world)?;
+        self.store.at(i).map(|c| if c.distance < 0.0 { 1.0 } else { 0.0 })
+    }
+
+    /// Bytes of the cells, measured.
+    pub fn memory_bytes(&self) -> usize {
+        self.store.memory_bytes()
+    }
+
     /// Cells and where they are.
     pub fn store(&self) -> &Dense<SignedDistance, D> {
         &self.store
@@ -256,31 +267,6 @@ impl<const D: usize> Tsdf<D> {
     /// Shape and place.
     pub fn grid(&self) -> &Grid<D> {
         self.store.grid()
-    }
-}
-
-impl<const D: usize> MapRepr<D> for Tsdf<D> {
-    /// With carving.
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        self.integrate(world_from_sensor, scan, true)
-    }
-
-    /// The sign of the estimate: 1 behind the surface, 0 in front of it.
-    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
-        let i = self.store.grid().index_of(p_world)?;
-        self.store.at(i).map(|c| if c.distance < 0.0 { 1.0 } else { 0.0 })
-    }
-
-    fn distance(&self, _: [f64; D]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { occupancy: true, distance: false }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use portolan::Answer;
 use portolan::field::{SparseEsdf, UnknownSpace};
-use portolan::map::{MapRepr, Tsdf2};
+use portolan::map::Tsdf2;
 use portolan_io::{AnswerRow, certified_reach, write_answer};
 use serde_json::{Value, json};
 

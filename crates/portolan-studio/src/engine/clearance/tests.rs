@@ -8,7 +8,7 @@ use portolan::field::{
     Clearance, ClearanceField, EsdfSettings, SparseEsdf, SparseEsdfSettings, UnknownSpace,
 };
 use portolan::geom::{Pose, vector};
-use portolan::map::{MapRepr, Tsdf2};
+use portolan::map::Tsdf2;
 use portolan::plan::{Cause, PathCheck, Waypoints, check_path};
 use portolan::scan::{Beam, BeamKind, Scan};
 use portolan::surface::{ContourSettings, marching_squares};

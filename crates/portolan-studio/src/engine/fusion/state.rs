@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use portolan::geom::vector::along;
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{MapRepr, Tsdf2};
+use portolan::map::Tsdf2;
 use portolan::scan::ScanStats;
 use serde_json::json;
 

@@ -1,6 +1,7 @@
 //! The numbers: metres, seconds, bytes; `null` where a representation cannot answer.
 
-use portolan::gallery::{Cost, ErrorSummary, MeasuredField, Row, TreeCrossover, Winner};
+use portolan_chapter::gallery::{Cost, MeasuredField, Row, TreeCrossover, Winner};
+use portolan_sim::ErrorSummary;
 use serde_json::{Value, json};
 
 use super::state::Made;

@@ -1,6 +1,6 @@
 //! The run of this tab, and what of it is looked at.
 
-use portolan::radiance::{PARKED, Scene};
+use portolan_chapter::radiance::{PARKED, Scene};
 
 use super::ask::{Ask, ChannelsChoice, OptimizerChoice};
 use super::run::Run;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use portolan::radiance::{
+use portolan_chapter::radiance::{
     AMBIGUOUS, Channels, Experiment, Fit, NAMED_SEEDS, OPAQUE, PARKED, Scene, Settings, TWO_NOT_ENOUGH,
     transmittance,
 };
