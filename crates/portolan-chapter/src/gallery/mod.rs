@@ -2,7 +2,9 @@
 //!
 //! The library reads no clock: the caller passes one. Accuracy needs a [`Truth`], which the simulator has.
 
+mod against_truth;
 mod asker;
+mod build;
 mod costs;
 mod crossover;
 mod document;

@@ -4,7 +4,8 @@ use portolan_sim::ErrorSummary;
 
 use super::page::{escaped, figure, table};
 use super::{Facts, Section};
-use crate::pictures::{self, Layer};
+use crate::gallery::Gallery;
+use crate::pictures::{self, Layer, Scene};
 
 /// Median, p99, worst over, worst under in millimetres.
 fn cells(error: Option<ErrorSummary>) -> Vec<String> {
@@ -18,19 +19,52 @@ fn cells(error: Option<ErrorSummary>) -> Vec<String> {
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     facts.scene.world?;
     let gallery = facts.scene.gallery;
+    let body = [distances(gallery), fields(gallery), surfaces(gallery), gradients(&facts.scene)].concat();
+    Some(Section {
+        title: "How true the answers are",
+        body,
+        command: "portolan demo --out out   (for machines: out/gallery.json)",
+    })
+}
+
+fn distances(gallery: &Gallery) -> String {
     let header = ["answer", "median", "99 %", "worst, too large", "worst, too small"];
-    let named = |name: String, error| {
-        let mut row = vec![name];
-        row.extend(cells(error));
-        row
-    };
-    let distances: Vec<_> = gallery
-        .rows
+    let asked = gallery.rows.iter().filter(|r| r.distance_error.is_some());
+    let rows: Vec<_> = asked.map(|r| [vec![escaped(&r.name)], cells(r.distance_error)].concat()).collect();
+    format!(
+        "<p>The text has no such column, and it matters more than speed. Distances are asked at observed free points and \
+         compared with the true world (millimetres):</p>{}\
+         <p>Too large is the direction that hurts a robot. Where a surface was never seen no map can know of it, and all of \
+         them overestimate there; that is in the column too.</p>",
+        table(&header, &rows, &[])
+    )
+}
+
+fn fields(gallery: &Gallery) -> String {
+    let header =
+        ["distances", "contour: median", "99 %", "too large", "too small", "world: median", "99 %", "‖∇d‖"];
+    let rows: Vec<Vec<String>> = gallery
+        .fields
         .iter()
-        .filter(|r| r.distance_error.is_some())
-        .map(|r| named(escaped(&r.name), r.distance_error))
+        .map(|field| {
+            let mut row = vec![field.name().to_owned()];
+            row.extend(cells(field.against_contour));
+            row.extend(cells(field.against_truth).into_iter().take(2));
+            row.push(format!("{:.3}", field.gradient));
+            row
+        })
         .collect();
-    let surfaces: Vec<_> = gallery
+    format!(
+        "<p>Three ways to make distances of one map, against the exact distance to the extracted contour and against the world \
+         (millimetres). The accurate one measures to the contour's segments; what is left is the interpolation between cells. The \
+         text's seeds take a cell's offset to the surface to be at right angles to the way there. A mask knows whole cells.</p>{}",
+        table(&header, &rows, &[])
+    )
+}
+
+fn surfaces(gallery: &Gallery) -> String {
+    let header = ["surface from", "median", "bias", "99 %", "occupancy wrong"];
+    let rows: Vec<_> = gallery
         .rows
         .iter()
         .filter(|r| r.surface_error.is_some())
@@ -44,33 +78,8 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
             row
         })
         .collect();
-    let fields: Vec<Vec<String>> = gallery
-        .fields
-        .iter()
-        .map(|field| {
-            let mut row = vec![field.name().to_owned()];
-            row.extend(cells(field.against_contour));
-            row.extend(cells(field.against_truth).into_iter().take(2));
-            row.push(format!("{:.3}", field.gradient));
-            row
-        })
-        .collect();
-    let picture = figure(
-        &pictures::figure(Layer::EsdfError, &facts.scene),
-        "wide",
-        "Error of the ESDF over the apartment",
-        "<b>Where the ESDF errs.</b> Blue: the answer is too small, which is safe. Orange: too large, which is not. Full \
-         colour is 10 cm; gray was not observed or lies inside.",
-    );
-    let body = format!(
-        "<p>The text has no such column, and it matters more than speed. Distances are asked at observed free points and \
-         compared with the true world (millimetres):</p>{}\
-         <p>Too large is the direction that hurts a robot. Where a surface was never seen no map can know of it, and all of \
-         them overestimate there; that is in the column too.</p>\
-         <p>Three ways to make distances of one map, against the exact distance to the extracted contour and against the world \
-         (millimetres). The accurate one measures to the contour's segments; what is left is the interpolation between cells. The \
-         text's seeds take a cell's offset to the surface to be at right angles to the way there. A mask knows whole cells.</p>{}\
-         <p>Surfaces, and answers to \"is this point occupied?\" (millimetres; positive bias: in front of the true face; \
+    format!(
+        "<p>Surfaces, and answers to \"is this point occupied?\" (millimetres; positive bias: in front of the true face; \
          wrong answers among points further than half a cell from any face):</p>{}\
          <p>Maps of bits stand a whole cell in front of the faces here: the faces of this apartment lie on the borders of \
          cells, the noise of the range puts half of all end points into the cell in front, and one end point in a scan is \
@@ -80,32 +89,23 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
          that a ray meets decides, by the side that it shows; through a gap in the contour it still sees the wrong wall.</p>\
          <p>Thin walls come out too thick. Each side's claim reaches the truncation deep and meets the other side's there: at \
          τ = 15 cm a wall of 10 cm comes out 11.1 cm thick, at τ = 30 cm 16.4 cm. Walls between τ and 2 τ keep their faces. A \
-         smaller truncation is the remedy, as far as the noise of the range allows.</p>\
-         <p>A gradient of length one says \"this way is away from the obstacle\". Median ‖∇‖ at observed free points: \
+         smaller truncation is the remedy, as far as the noise of the range allows.</p>",
+        table(&header, &rows, &[])
+    )
+}
+
+fn gradients(scene: &Scene) -> String {
+    let picture = figure(
+        &pictures::figure(Layer::EsdfError, scene),
+        "wide",
+        "Error of the ESDF over the apartment",
+        "<b>Where the ESDF errs.</b> Blue: the answer is too small, which is safe. Orange: too large, which is not. Full \
+         colour is 10 cm; gray was not observed or lies inside.",
+    );
+    format!(
+        "<p>A gradient of length one says \"this way is away from the obstacle\". Median ‖∇‖ at observed free points: \
          <b>{:.3}</b> for the ESDF, <b>{:.3}</b> for the raw TSDF, which is constant beyond 15 cm: a planner on it stands \
          still.</p>{picture}",
-        table(&header, &distances, &[]),
-        table(
-            &[
-                "distances",
-                "contour: median",
-                "99 %",
-                "too large",
-                "too small",
-                "world: median",
-                "99 %",
-                "‖∇d‖"
-            ],
-            &fields,
-            &[]
-        ),
-        table(&["surface from", "median", "bias", "99 %", "occupancy wrong"], &surfaces, &[]),
-        gallery.fields[0].gradient,
-        gallery.tsdf_gradient,
-    );
-    Some(Section {
-        title: "How true the answers are",
-        body,
-        command: "portolan demo --out out   (for machines: out/gallery.json)",
-    })
+        scene.gallery.fields[0].gradient, scene.gallery.tsdf_gradient,
+    )
 }

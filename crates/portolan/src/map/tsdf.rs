@@ -34,7 +34,7 @@ pub struct TsdfConfig<const D: usize> {
     pub truncation: f64,
     /// Clamp of the weight. Infinity: never forget.
     pub w_max: f32,
-    /// Weight of an observation of free space beyond the truncation, times the beam's. The chapter's is 1. With
+    /// Weight of an observation of free space beyond the truncation, times the beam's. The textbook's is 1. With
     /// less, what was seen of a surface counts for more than that beams passed near it: thin things survive, and
     /// what has gone fades more slowly, by the same factor.
     pub carve_weight: f32,
@@ -45,7 +45,7 @@ pub struct TsdfConfig<const D: usize> {
 }
 
 impl<const D: usize> Default for TsdfConfig<D> {
-    /// The chapter's parameters (r 5 cm, tau 15 cm, W_max 64) and no cells.
+    /// The textbook's parameters (r 5 cm, tau 15 cm, W_max 64) and no cells.
     fn default() -> Self {
         Self {
             cells: [0; D],

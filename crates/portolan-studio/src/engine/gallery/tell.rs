@@ -94,7 +94,7 @@ fn tree(t: &TreeCrossover) -> Value {
     })
 }
 
-/// The chapter's node and ours over leaves of one size.
+/// The textbook's node and ours over leaves of one size.
 pub(super) fn tree_pair(pair: &[TreeCrossover; 2]) -> Value {
     json!(pair.each_ref().map(tree))
 }
