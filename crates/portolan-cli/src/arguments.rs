@@ -156,23 +156,7 @@ pub(crate) fn bytes(text: &str) -> Result<u64, String> {
     }
 }
 
-/// Bytes for people.
-pub(crate) fn shown_bytes(bytes: f64) -> String {
-    const UNITS: [&str; 6] = ["B", "kB", "MB", "GB", "TB", "PB"];
-    let (mut value, mut unit) = (bytes, 0);
-    while value >= 1000.0 && unit + 1 < UNITS.len() {
-        value /= 1000.0;
-        unit += 1;
-    }
-    let digits = if unit == 0 || value >= 100.0 {
-        0
-    } else if value >= 10.0 {
-        1
-    } else {
-        2
-    };
-    format!("{value:.digits$} {}", UNITS[unit])
-}
+pub(crate) use portolan_draw::shown_bytes;
 
 #[cfg(test)]
 mod tests {
@@ -212,8 +196,5 @@ mod tests {
         for bad in ["", "G", "-1", "4X", "nanM", "1e40"] {
             assert!(bytes(bad).is_err(), "{bad}");
         }
-        assert_eq!(shown_bytes(999.0), "999 B");
-        assert_eq!(shown_bytes(4_650_000.0), "4.65 MB");
-        assert_eq!(shown_bytes(173_000.0), "173 kB");
     }
 }

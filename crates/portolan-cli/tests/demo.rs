@@ -70,7 +70,7 @@ fn check_graph(g2o: &[u8]) {
     assert_eq!(graph.vertices().iter().filter(|v| v.fixed).count(), 1);
     assert!(graph.vertices().len() == 200 && graph.edges().len() > 199 + 100);
     let written: Vec<_> = graph.vertices().iter().map(|v| v.world_from_vertex).collect();
-    let kernel = portolan_sim::CorrectionSettings::default().kernel;
+    let kernel = portolan_chapter::poses::CorrectionSettings::default().kernel;
     graph.optimise(&portolan_graph::Settings { kernel, ..Default::default() }).unwrap();
     for (before, after) in written.iter().zip(graph.vertices()) {
         assert!(before.translation_to(&after.world_from_vertex) < 1e-3);

@@ -1,4 +1,4 @@
-//! The colours of the chapter, in tones that stay apart for colour-blind readers and in print.
+//! The colours of all pictures, in tones that stay apart for colour-blind readers and in print.
 //!
 //! Signed distance runs from orange (negative, behind a surface) through transparent at zero to blue
 //! (positive, free space); measurements are green, extracted surfaces purple, ground truth gray and dashed.

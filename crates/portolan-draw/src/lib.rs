@@ -1,7 +1,7 @@
 //! Maps and charts as PNG bytes in memory.
 //!
-//! Not a plotting library: it has the few shapes that portolan's own pictures need, in the colours of the
-//! chapter, and it opens no files. A picture is a [`Canvas`]; a [`View`] says which box of the world, in
+//! Not a plotting library: it has the few shapes that portolan's own pictures need, in one set of
+//! colours, and it opens no files. A picture is a [`Canvas`]; a [`View`] says which box of the world, in
 //! metres, lies on which rectangle of pixels; [`Panels`] puts several views side by side; a [`Chart`] has
 //! axes. Nothing here panics on empty, constant or non-finite data: such points are left out.
 //!
@@ -24,6 +24,7 @@ mod plot;
 mod render;
 mod text;
 mod ticks;
+mod units;
 mod view;
 
 pub use canvas::{Canvas, Pen};
@@ -34,4 +35,5 @@ pub use panels::{Panel, Panels};
 pub use render::{Camera, MeshView, Preview, Sensor, Setting, preview, render_mesh};
 pub use text::{Anchor, Font};
 pub use ticks::{linear_ticks, log_ticks, tick_label};
+pub use units::{shown_bytes, shown_seconds};
 pub use view::{PixelRect, View};

@@ -6,7 +6,7 @@ use portolan::geom::Pose;
 use portolan::geom::vector::{along, distance, sub, unit};
 use portolan::scan::Scan;
 
-/// The seed of the chapter's log.
+/// The seed of the lap that every figure is measured on.
 pub const SEED: u64 = 0x00C0_FFEE;
 
 /// Scans with the poses they were taken at.
@@ -26,7 +26,7 @@ pub struct LapConfig {
 }
 
 impl Default for LapConfig {
-    /// The chapter's: 200 scans, seed 0xC0FFEE.
+    /// 200 scans, seed 0xC0FFEE.
     fn default() -> Self {
         Self { scans: 200, lidar: Lidar::default(), seed: SEED, first_index: 0 }
     }
@@ -137,7 +137,7 @@ mod tests {
         }
         let other = lap(&world, &LapConfig { first_index: 200, ..Default::default() });
         assert_ne!(fingerprint(&other), fingerprint(&whole));
-        // The lap of the chapter: every figure in the documentation is measured on these bytes.
+        // Every figure in the documentation is measured on these bytes.
         assert_eq!(fingerprint(&whole), 0xd73c_713a_6321_6ae4);
     }
 }

@@ -4,10 +4,8 @@
 //! |---|---|
 //! | what is there, what does the robot see | [`apartment`], [`lap`], [`scan_at`] |
 //! | where do the wheels say that it is | [`measure_motions`], [`dead_reckon`] |
-//! | where was it really | [`correct`]: scan matching ([`match_scans`]), loop closures, pose graph |
-//! | how far off are poses | [`PoseErrors`]; without truth [`score_relations`] |
-//! | the same in space: a building, a lidar, a depth camera, truth | [`space`], [`building`] |
-//! | how long does a map believe in what is gone, and what does forgetting cost | [`ghost`](fn@ghost), [`static_noise`](fn@static_noise) |
+//! | how far off are answers | [`Truth`], [`ErrorSummary`] |
+//! | the same in 3-D: a building, a lidar, a depth camera, truth | [`space`], [`building`] |
 //!
 //! Every transcendental function comes from `libm` and every random number from one small generator, so that a
 //! seed gives the same bytes on every platform and for any number of threads.
@@ -23,38 +21,22 @@
 //! assert_eq!(scan.len(), 360);
 //! ```
 
+mod accuracy;
 mod apartment;
 mod drive;
-mod followed;
-mod ghost;
-mod ghost_watch;
 mod lidar;
-mod loop_closure;
 mod odometry;
-mod outline;
-mod pose_error;
 mod random;
-mod relations;
-mod scan_match;
 mod solid;
 pub mod space;
-mod static_noise;
 mod world;
 
+pub use accuracy::{ErrorSummary, Truth};
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
 pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
-pub use followed::GhostGroup;
-pub use ghost::{Ghost, GhostRun, GhostSettings, ghost};
-pub use ghost_watch::GhostWatch;
 pub use lidar::{Lidar, scan_at};
-pub use loop_closure::{Closure, CorrectedLap, CorrectionSettings, RefusedCandidates, Round, correct};
-pub use odometry::{OdometryNoise, dead_reckon, measure_motions};
-pub use outline::Outline;
-pub use pose_error::{ErrorMeasures, PoseErrors};
+pub use odometry::{OdometryNoise, dead_reckon, heading, measure_motions, planar};
 pub use random::Random;
-pub use relations::{Relation, RelationError, parse_relations, score_relations};
-pub use scan_match::{MatchRefusal, MatchSettings, ScanMatch, match_scans};
 pub use solid::{Solid, SolidKind};
 pub use space::building;
-pub use static_noise::{StaticNoise, static_noise};
 pub use world::{BoundarySegment, RayHit, World};

@@ -80,13 +80,13 @@ pub fn dead_reckon(start: Pose<2>, motions: &[Pose<2>]) -> Vec<Pose<2>> {
     poses
 }
 
-/// Heading in `(-pi, pi]`, the same bytes on every platform.
-pub(crate) fn heading(pose: &Pose<2>) -> f64 {
+/// Heading of a pose in `(-pi, pi]` (radians), the same bytes on every platform.
+pub fn heading(pose: &Pose<2>) -> f64 {
     libm::atan2(pose.rotation[1][0], pose.rotation[0][0])
 }
 
-/// A pose, the same bytes on every platform.
-pub(crate) fn planar(x: f64, y: f64, theta: f64) -> Pose<2> {
+/// A pose of a position (metres) and a heading (radians), the same bytes on every platform.
+pub fn planar(x: f64, y: f64, theta: f64) -> Pose<2> {
     Pose::from_cos_sin(x, y, libm::cos(theta), libm::sin(theta))
 }
 

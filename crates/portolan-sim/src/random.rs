@@ -10,8 +10,13 @@ impl Random {
     /// The stream of a seed and an index: streams of different indices are independent, so that they can be
     /// drawn in any order and on any thread.
     pub fn stream(seed: u64, index: u64) -> Self {
-        let mut mixer = Self { state: seed ^ index.wrapping_mul(0xD1B5_4A32_D192_ED03) };
-        Self { state: mixer.bits() }
+        let mut mixer = Self::from_state(seed ^ index.wrapping_mul(0xD1B5_4A32_D192_ED03));
+        Self::from_state(mixer.bits())
+    }
+
+    /// The generator in a given state.
+    pub fn from_state(state: u64) -> Self {
+        Self { state }
     }
 
     /// Sixty-four random bits.

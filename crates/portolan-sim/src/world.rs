@@ -1,7 +1,6 @@
 //! A world of solids, and the truth about it.
 
-use crate::{Solid, SolidKind};
-use portolan::gallery::Truth;
+use crate::{Solid, SolidKind, Truth};
 use portolan::geom::Aabb;
 use portolan::geom::vector::{along, cross, dot, point_segment, sub, unit};
 

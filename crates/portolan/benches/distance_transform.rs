@@ -61,7 +61,7 @@ fn nearest_within_20(bencher: Bencher, arg: (&str, usize)) {
     one_core(bencher, arg, |mask| transform.nearest(mask).expect("all cells"));
 }
 
-/// The envelope of real parabolas, what the chapter's field is made with.
+/// The envelope of real parabolas, what the textbook's field is made with.
 #[divan::bench(args = ARGS, max_time = 2)]
 fn envelope(bencher: Bencher, arg: (&str, usize)) {
     one_core(bencher, arg, |mask| {

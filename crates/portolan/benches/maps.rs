@@ -1,4 +1,4 @@
-//! Every row of the chapter's table on the simulated Apartment: 240 x 180 cells of 5 cm, 200 scans of 360 beams.
+//! Every map on the simulated Apartment: 240 x 180 cells of 5 cm, 200 scans of 360 beams.
 //!
 //! `update` fuses the whole lap into an empty map, so that its time is divided by 200 for a scan.
 
@@ -6,8 +6,8 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::OccupancyModel;
 use portolan::field::{Esdf2, esdf_from_tsdf};
-use portolan::geom::{Grid, Lattice, Pose};
-use portolan::map::{BeamSweep, Cloud, MapRepr, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
+use portolan::geom::{Grid, Pose};
+use portolan::map::{Cloud, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
 use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use std::sync::LazyLock;
@@ -120,13 +120,13 @@ mod probe {
     #[divan::bench]
     fn occupancy_grid(bencher: Bencher) {
         let map = occupancy();
-        bench(bencher, |p| map.occupancy(p));
+        bench(bencher, |p| map.probability(p).known());
     }
 
     #[divan::bench]
     fn occupancy_quadtree(bencher: Bencher) {
         let map = quadtree(0.05);
-        bench(bencher, |p| map.occupancy(p));
+        bench(bencher, |p| map.probability(p).known());
     }
 
     #[divan::bench]

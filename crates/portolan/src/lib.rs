@@ -36,19 +36,16 @@
 //! | is this path free, this pose of a robot, and where would it be? | [`plan`] over a field | steps of the clearance |
 //! | where does the known end, and what would be seen from there? | [`explore`] over [`map::Tsdf3`] | changed bricks |
 //! | how near is the nearest measurement? | [`map::Cloud`] | a k-d tree |
-//! | what does a renderer make of it? | [`radiance`] | on a line, so far |
 
 mod answer;
 pub mod cell;
 pub mod explore;
 pub mod field;
-pub mod gallery;
 pub mod geom;
 pub mod handover;
 pub mod map;
 mod parallel;
 pub mod plan;
-pub mod radiance;
 pub mod scan;
 pub mod store;
 pub mod surface;

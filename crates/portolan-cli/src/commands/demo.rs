@@ -1,4 +1,4 @@
-//! `demo`: the chapter's experiment on the simulated Apartment.
+//! `demo`: the textbook's experiment on the simulated Apartment.
 
 mod found;
 
@@ -9,9 +9,12 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use portolan::geom::{Grid, Pose};
-use portolan::map::BeamSweep;
+use portolan::map::{SweepKind, Tsdf2Config};
 use portolan::scan::{RangeLimits, Scan, ScanStats};
 use portolan::sweep::WeightModel;
+use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
+use portolan_chapter::pictures::{self, Scene};
+use portolan_chapter::report::{self, Facts};
 use portolan_io::{MapFile, write_atomic};
 use portolan_sim::{LapConfig, Lidar, SEED};
 
@@ -19,13 +22,10 @@ use self::found::Found;
 use super::gallery;
 use crate::arguments::ForgettingArgs;
 use crate::esdf::EsdfArg;
-use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::json;
 use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, fuse};
 use crate::output::Output;
-use crate::pictures::{self, Scene};
 use crate::progress::Progress;
-use crate::report::{self, Facts};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan demo --out out")]
@@ -42,7 +42,7 @@ pub(crate) struct Args {
     scans: u32,
     /// Poses that the maps are made with
     #[arg(long, value_enum, default_value = "optimised")]
-    poses: PoseSet,
+    poses: PosesArg,
     #[command(flatten)]
     forgetting: ForgettingArgs,
     /// Leave out the experiment with the moved chair
@@ -52,11 +52,32 @@ pub(crate) struct Args {
     output: Output,
 }
 
-/// The chapter's: cells of 5 cm, truncation 15 cm.
+/// The textbook's: cells of 5 cm, truncation 15 cm.
 const RESOLUTION: f64 = 0.05;
 const TRUNCATION: f64 = 0.15;
 /// Probes per direct question.
 const PROBES: usize = 100_000;
+
+/// Which poses the maps are made with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum PosesArg {
+    /// Those of the simulator
+    True,
+    /// Those that the wheels lead to
+    Odometry,
+    /// Those of the pose graph
+    Optimised,
+}
+
+impl From<PosesArg> for PoseSet {
+    fn from(arg: PosesArg) -> Self {
+        match arg {
+            PosesArg::True => Self::True,
+            PosesArg::Odometry => Self::Odometry,
+            PosesArg::Optimised => Self::Optimised,
+        }
+    }
+}
 
 fn seed(text: &str) -> Result<u64, String> {
     let parsed = match text.trim().to_ascii_lowercase().strip_prefix("0x") {
@@ -76,19 +97,19 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };
 
     let world = portolan_sim::apartment().world;
-    let (mut drift, scans) = run.timed("simulate", || Drift::drive(&world, &config, args.poses))?;
+    let (mut drift, scans) = run.timed("simulate", || Drift::drive(&world, &config, args.poses.into()))?;
     let settings = settings(&config.lidar, args.forgetting.w_max());
     let grid = gallery::apartment_grid(RESOLUTION);
     let (mut file, fusion, bytes) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
     describe(&mut file, &settings, &config, &fusion.stats);
     let derived = run.timed("derive", || Derived::of(&file, &settings));
-    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &settings))?;
+    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings)))?;
     let gallery =
         run.timed("gallery", || gallery::measure(&scans, &grid, &settings, PROBES, Some(&world)))?;
 
     gallery::make_folder(&args.out)?;
-    let scene = Scene { gallery: &gallery, log: &scans, poses: args.poses.poses(), world: Some(&world) };
-    let table = gallery::document(&gallery, "the simulated Apartment", scans.len());
+    let scene = Scene { gallery: &gallery, log: &scans, poses: drift.chosen.poses(), world: Some(&world) };
+    let table = portolan_chapter::gallery::document(&gallery, "the simulated Apartment", scans.len());
     // The gallery is measured: from here on nobody minds a busy neighbour.
     let (ghost, written) = std::thread::scope(|scope| {
         let ghost = (!args.no_ghost).then(|| scope.spawn(|| seconds_of(|| Forgetting::run(config.seed))));
@@ -217,6 +238,16 @@ fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
         bounds: None,
         maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
         esdf: EsdfArg::default(),
+    }
+}
+
+/// What the contours of the three sets of poses are made with.
+fn config_of(settings: &Settings) -> Tsdf2Config {
+    Tsdf2Config {
+        resolution: settings.resolution,
+        truncation: settings.truncation,
+        w_max: settings.w_max,
+        ..Default::default()
     }
 }
 

@@ -7,15 +7,16 @@ use std::time::Instant;
 use anyhow::{Context, anyhow};
 use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
-use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
 use portolan::geom::{Aabb, Grid, Pose};
 use portolan::map::{BeamSweep, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::ContourSettings;
 use portolan::sweep::WeightModel;
+use portolan_chapter::gallery::{Gallery, GallerySettings, document};
+use portolan_chapter::pictures::{Scene, sheet};
 use portolan_io::write_atomic;
 use portolan_sim::{LapConfig, World};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::arguments::{bounds, bytes, length};
 use crate::error::bad_call;
@@ -23,7 +24,6 @@ use crate::esdf::EsdfArg;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen, with_outlier};
 use crate::output::Output;
-use crate::pictures::{Scene, sheet};
 
 #[derive(clap::Args)]
 #[command(
@@ -112,7 +112,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 impl Args {
-    /// As `demo` has them: free space weighs as much as a surface, as in the chapter (`map` gives it less).
+    /// As `demo` has them: free space weighs as much as a surface, as in the textbook (`map` gives it less).
     fn settings(&self) -> Settings {
         Settings {
             resolution: self.resolution,
@@ -136,7 +136,7 @@ fn every<T>(items: Vec<T>, n: Option<u64>) -> Vec<T> {
     items.into_iter().step_by(n.unwrap_or(1) as usize).collect()
 }
 
-/// The box of the Apartment, 12 m x 9 m from zero: at 5 cm the chapter's 240 x 180 cells.
+/// The box of the Apartment, 12 m x 9 m from zero: at 5 cm the textbook's 240 x 180 cells.
 pub(crate) fn apartment_grid(resolution: f64) -> Grid<2> {
     // The small number keeps a rounded-up quotient from making one more column.
     let cells = |metres: f64| (metres / resolution - 1e-9).ceil().max(1.0) as usize;
@@ -162,8 +162,8 @@ pub(crate) fn measure(
     };
     let start = Instant::now();
     let mut clock = || start.elapsed().as_secs_f64();
-    let truth = world.map(|w| w as &dyn portolan::gallery::Truth<2>);
-    Ok(portolan::gallery::run(scans, &settings, truth, &mut clock)?)
+    let truth = world.map(|w| w as &dyn portolan_sim::Truth<2>);
+    Ok(portolan_chapter::gallery::run(scans, &settings, truth, &mut clock)?)
 }
 
 /// What heads the picture.
@@ -194,77 +194,4 @@ pub(crate) fn write_files(
     write_atomic(folder.join("gallery.json"), |w| writeln!(w, "{document:#}"))?;
     write_atomic(folder.join("gallery.txt"), |w| write!(w, "{}", scene.gallery))?;
     Ok(["gallery.png", "gallery.json", "gallery.txt"])
-}
-
-/// The gallery for machines: metres, seconds, bytes; `null` where a map cannot answer.
-pub(crate) fn document(gallery: &Gallery, log: &str, scans: usize) -> Value {
-    let name = |i: usize| gallery.rows[i].name.as_str();
-    let winners: Vec<_> = gallery
-        .winners
-        .iter()
-        .map(|w| {
-            let level: Vec<_> = w.level.iter().map(|&i| name(i)).collect();
-            json!({ "workload": w.workload.name(), "row": name(w.row), "level": level, "ahead": w.ahead })
-        })
-        .collect();
-    let never: Vec<_> = gallery.never_win.iter().map(|&i| name(i)).collect();
-    let trees: Vec<_> = gallery
-        .trees
-        .iter()
-        .map(|t| {
-            json!({
-                "name": t.name, "node_bytes": t.node_bytes, "resolution": t.resolution,
-                "predicted_resolution": t.predicted_resolution, "predicted_ratio": t.predicted_ratio,
-                "measured_ratio": t.measured_ratio,
-            })
-        })
-        .collect();
-    let cloud = &gallery.cloud_crossover;
-    let measured: Vec<_> =
-        cloud.measured.iter().map(|&(n, s)| json!({ "points": n, "seconds": s })).collect();
-    let finite = |v: f64| v.is_finite().then_some(v);
-    let fields: Vec<_> = gallery
-        .fields
-        .iter()
-        .map(|f| {
-            json!({
-                "method": f.name(), "seconds": f.seconds, "gradient_norm": finite(f.gradient),
-                "against_contour": error(f.against_contour), "against_truth": error(f.against_truth),
-            })
-        })
-        .collect();
-    json!({
-        "log": log,
-        "scans": scans,
-        "resolution": gallery.tsdf.config().resolution,
-        "cells": gallery.tsdf.grid().shape,
-        "truncation": gallery.tsdf.config().truncation,
-        "rows": gallery.rows.iter().map(row).collect::<Vec<_>>(),
-        "winners": winners,
-        "never_win": never,
-        "tree_crossovers": trees,
-        "cloud_crossover": { "points": cloud.points, "measured": measured },
-        "gradient_norm": { "tsdf": finite(gallery.tsdf_gradient), "esdf": finite(gallery.fields[0].gradient) },
-        "fields": fields,
-    })
-}
-
-fn error(error: Option<ErrorSummary>) -> Option<Value> {
-    error.map(|e| {
-        json!({
-            "count": e.count, "median": e.median, "p95": e.p95, "p99": e.p99, "bias": e.bias,
-            "worst_over": e.worst_over, "worst_under": e.worst_under,
-        })
-    })
-}
-
-fn row(row: &Row) -> Value {
-    let cost = |cost: Option<Cost>| cost.map(|c| json!({ "seconds": c.seconds, "by": c.by }));
-    json!({
-        "name": row.name, "memory_bytes": row.memory_bytes, "derived": row.derived,
-        "update": cost(row.update), "occupancy": cost(row.occupancy), "distance": cost(row.distance),
-        "surface": cost(row.surface), "occupancy_wrong": row.occupancy_wrong,
-        "distance_error": error(row.distance_error), "surface_error": error(row.surface_error),
-        "note": row.note,
-    })
 }

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use portolan::geom::{Aabb, Grid};
-use portolan::map::MapRepr;
 use portolan::store::Store;
 use portolan_io::{CarmenLog, EsdfBin, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
 use portolan_io::{OctomapTree, Polyline, detect_no_return};

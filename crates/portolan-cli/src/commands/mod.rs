@@ -13,7 +13,7 @@ mod studio;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
-    /// The chapter's experiment: a simulated lap, every representation, the gallery
+    /// The textbook's experiment: a simulated lap, every representation, the gallery
     Demo(demo::Args),
     /// One log in every representation: what each costs and how true its answers are
     Gallery(gallery::Args),

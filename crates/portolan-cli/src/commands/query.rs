@@ -7,7 +7,7 @@ use anyhow::bail;
 use portolan::Answer;
 use portolan::field::{Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
 use portolan::geom::Pose;
-use portolan::map::{MapRepr, Occupancy};
+use portolan::map::{OccupancySweep, SparseOccupancy};
 use portolan::store::Store;
 use portolan::sweep::OccupancySweep;
 use portolan_io::{

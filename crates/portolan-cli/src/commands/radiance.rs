@@ -1,25 +1,15 @@
 //! `portolan radiance`: fits a radiance field on a line, shows what it became and why.
 
-mod document;
-mod pictures;
-mod text;
-
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::ValueEnum;
-use portolan::radiance::{
-    Channels, Experiment, NAMED_SEEDS, NamedSeed, Optimizer, Outcome, PARKED, Settings, Terms,
-};
+use portolan_chapter::radiance::{Channels, Experiment, NAMED_SEEDS, Optimizer, PARKED, Settings};
+use portolan_chapter::radiance_report::{Comparison, Seed};
 
-/// Surfaces nearer than this do not count as empty space, m.
-const MARGIN: f64 = 0.3;
-/// Steps into the second channel after which its terms are shown.
-const BEGUN: usize = 500;
-
-/// The differentiable renderer on a line, as in the last section of the chapter.
+/// The differentiable renderer on a line, as in the textbook's last section.
 ///
 /// Ten rays in a corridor of 80 bins, three of them held out, are fitted through the renderer by gradient
 /// descent. Writes density, transmittance, rays, residuals and the bias of depth as PNG, and all numbers as
@@ -50,13 +40,6 @@ pub(crate) struct Args {
     quiet: bool,
 }
 
-/// A seed and, where it has one, its name.
-#[derive(Clone, Copy, Debug)]
-struct Seed {
-    value: u64,
-    named: Option<NamedSeed>,
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 enum ChannelsArg {
     /// Depth alone.
@@ -85,23 +68,6 @@ enum OptimizerArg {
     Adam,
 }
 
-/// One fit, and how long it took.
-struct Run {
-    channels: Channels,
-    outcome: Outcome,
-    elapsed: Duration,
-}
-
-/// Why depth alone keeps the density that it parked, and what the second channel does about it.
-struct Explanation {
-    /// The bin with most density in empty space under depth alone.
-    bin: usize,
-    /// Its gradient where depth alone ended.
-    stuck: Vec<Terms>,
-    /// Its gradient a little later, with reflectance in the likelihood.
-    begun: Vec<Terms>,
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -117,34 +83,21 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         settings: Settings { optimizer, ..Settings::default() },
         ..Experiment::default()
     };
-    let mut runs = Vec::new();
-    for channels in chosen(&args.channels) {
-        let begin = Instant::now();
-        let outcome = experiment.run(args.seed.value, channels)?;
-        runs.push(Run { channels, outcome, elapsed: begin.elapsed() });
-    }
-    let explanation = explain(&experiment, args.seed.value, &runs)?;
+    let start = Instant::now();
+    let mut clock = || start.elapsed().as_secs_f64();
+    let comparison = Comparison::new(experiment, args.seed, &chosen(&args.channels), &mut clock)?;
 
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}: choose another --out", args.out.display()))?;
-    let files = [
-        ("density.png", pictures::density(&experiment, args.seed, &runs)),
-        ("transmittance.png", pictures::transmittance(&experiment, args.seed, &runs)),
-        ("rays.png", pictures::rays(&experiment, args.seed, &runs)),
-        ("residuals.png", pictures::residuals(&experiment, args.seed, &runs)),
-        ("bias.png", pictures::bias(&experiment)),
-        ("radiance.json", document::full(&experiment, args.seed, &runs, explanation.as_ref())?),
-    ];
+    let files = comparison.files()?;
     for (name, bytes) in &files {
         write(&args.out.join(name), bytes)?;
     }
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
     if args.json {
-        let summary =
-            document::summary(&experiment, args.seed, &runs, explanation.as_ref(), &args.out, &names);
-        println!("{}", serde_json::to_string_pretty(&summary)?);
+        println!("{}", serde_json::to_string_pretty(&comparison.summary(&args.out, &names))?);
     } else if !args.quiet {
-        print!("{}", text::report(&experiment, args.seed, &runs, explanation.as_ref()));
+        print!("{}", comparison.text());
         println!("\nwrote {} to {}", names.join(", "), args.out.display());
     }
     Ok(())
@@ -159,18 +112,6 @@ fn chosen(args: &[ChannelsArg]) -> Vec<Channels> {
         }
     }
     channels
-}
-
-/// The terms of the worst bin of the fit by depth alone; `None` when that was not run.
-fn explain(experiment: &Experiment, seed: u64, runs: &[Run]) -> Result<Option<Explanation>> {
-    let Some(stuck) = runs.iter().find(|run| run.channels == Channels::Depth) else { return Ok(None) };
-    let Some(bin) = stuck.outcome.worst_bin(&experiment.scene, MARGIN) else { return Ok(None) };
-    let start = stuck.outcome.fit.line().clone();
-    let begun = Experiment { steps: BEGUN, ..experiment.clone() };
-    let begun = begun.run_from(start, seed, Channels::DepthReflectance)?;
-    let explanation =
-        Explanation { bin, stuck: stuck.outcome.fit.explain(bin), begun: begun.fit.explain(bin) };
-    Ok(Some(explanation))
 }
 
 /// Writes a file under a temporary name and renames it, so that there is never half of one.
@@ -189,7 +130,7 @@ fn parse_seed(text: &str) -> Result<Seed, String> {
     }
     let names: Vec<&str> = NAMED_SEEDS.iter().map(|named| named.name).collect();
     let value = text.parse().map_err(|_| format!("not a number, nor one of {}", names.join(", ")))?;
-    Ok(Seed { value, named: NAMED_SEEDS.iter().find(|named| named.seed == value).copied() })
+    Ok(Seed::of(value))
 }
 
 fn help() -> String {
@@ -198,22 +139,4 @@ fn help() -> String {
         text += &format!("  {:15} {}\n", named.name, named.shows);
     }
     text + "\nExample:\n  portolan radiance --out out/radiance --seed parked --channels depth,depth-reflectance"
-}
-
-/// Name of a set of channels, as on the command line.
-fn name(channels: Channels) -> &'static str {
-    match channels {
-        Channels::Depth => "depth",
-        Channels::DepthReflectance => "depth-reflectance",
-        Channels::DepthReflectanceSpread => "depth-reflectance-spread",
-    }
-}
-
-/// The same in words.
-fn title(channels: Channels) -> &'static str {
-    match channels {
-        Channels::Depth => "depth alone",
-        Channels::DepthReflectance => "depth and reflectance",
-        Channels::DepthReflectanceSpread => "depth, reflectance and spread",
-    }
 }

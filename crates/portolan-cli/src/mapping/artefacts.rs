@@ -7,7 +7,7 @@ use std::time::Instant;
 use portolan::cell::LogOddsValue;
 use portolan::field::Esdf;
 use portolan::geom::Grid;
-use portolan::map::{DerivedField, Quadtree};
+use portolan::map::Quadtree;
 use portolan::surface::{Contour, ContourSettings, DoubledLength, ThinWalls};
 use portolan::surface::{doubled_length, marching_squares, thin_walls};
 use portolan_io::{

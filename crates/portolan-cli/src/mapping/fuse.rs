@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use portolan::geom::Pose;
-use portolan::map::{MapRepr, OccupancyGrid, Quadtree, Tsdf};
+use portolan::map::{OccupancyGrid, Quadtree, Tsdf};
 use portolan::scan::{Scan, ScanStats};
 
 use crate::progress::Progress;

@@ -3,7 +3,7 @@
 use super::block::{Block, transposed};
 
 /// The pattern of a symmetric matrix over `variables` unknowns in elimination order, and of its factor
-/// (Davis 2006, chapter 4). It does not depend on the block size.
+/// (Davis 2006, section 4). It does not depend on the block size.
 pub(crate) struct Pattern {
     /// Place of each variable in the elimination order.
     pub(super) position: Vec<usize>,

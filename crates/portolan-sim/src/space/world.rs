@@ -2,7 +2,7 @@
 
 use super::shape::Shape;
 use super::tree::Tree;
-use portolan::gallery::Truth;
+use crate::Truth;
 use portolan::geom::Aabb;
 use portolan::geom::vector::{along, distance, scale, sub, unit};
 use std::cmp::{Ordering, Reverse};

@@ -17,7 +17,7 @@ pub struct Logs {
 /// Scans of the plane.
 #[derive(Default)]
 pub enum PlaneLog {
-    /// The chapter's lap through the Apartment, over and over.
+    /// The textbook's lap through the Apartment, over and over.
     #[default]
     Apartment,
     /// A log that was read.

@@ -186,7 +186,7 @@ fn the_chair_is_dragged_where_there_is_room_and_nowhere_else() {
     page.wait_for("document.getElementById('status').matches('.error')");
     let refused = page.text("status");
     assert!(refused.contains("chair"), "{refused}");
-    // Where the chapter puts it.
+    // Where the textbook puts it.
     drag(middle, [1.38, -1.62]);
     page.wait_text("status", "The chair was moved");
     page.wait_for("location.hash.includes('chair=5')");

@@ -1,6 +1,6 @@
 //! The view of radiance: what it shows is what the library's experiment comes to.
 
-use portolan::radiance::{Channels, Experiment, PARKED};
+use portolan_chapter::radiance::{Channels, Experiment, PARKED};
 use serde_json::json;
 
 use super::Studio;

@@ -3,7 +3,7 @@
 use super::{SparseEsdf, SparseEsdfSettings, squared_distance_transform};
 use crate::answer::Answer;
 use crate::geom::{Grid, interpolate, vector};
-use crate::map::{Abilities, DenseTsdf, DerivedField};
+use crate::map::Tsdf;
 
 /// Settings of [`esdf_from_tsdf`] as a derived field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,6 +142,11 @@ impl<const D: usize> Esdf<D> {
         &self.grid
     }
 
+    /// Bytes held, measured.
+    pub fn memory_bytes(&self) -> usize {
+        self.distance.capacity() * size_of::<f32>() + size_of::<Self>()
+    }
+
     /// Samples at the cell centres (metres), x fastest; NaN where nothing is known.
     pub fn samples(&self) -> &[f32] {
         &self.distance
@@ -197,32 +202,6 @@ impl<const D: usize> Esdf<D> {
         let (value, slope) = interpolate(&self.distance, &self.grid.strides(), at, &fraction);
         // One unknown corner makes the sum NaN.
         if value.is_nan() { Answer::Unknown } else { Answer::Known((value, slope)) }
-    }
-}
-
-impl<const D: usize> DerivedField<D> for Esdf<D> {
-    type Settings = EsdfSettings;
-
-    fn derive(tsdf: &DenseTsdf<D>, settings: &EsdfSettings) -> Self {
-        esdf_from_tsdf(tsdf, settings.min_weight, settings.band_cells)
-    }
-
-    /// The sign of the distance.
-    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
-        let v = *self.distance.get(self.grid.index_of(p_world)?)?;
-        (!v.is_nan()).then_some(if v < 0.0 { 1.0 } else { 0.0 })
-    }
-
-    fn distance(&self, p_world: [f64; D]) -> Option<f64> {
-        Self::distance(self, p_world).known()
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.distance.capacity() * size_of::<f32>() + size_of::<Self>()
-    }
-
-    fn abilities() -> Abilities {
-        Abilities { occupancy: true, distance: true }
     }
 }
 

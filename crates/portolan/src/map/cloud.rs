@@ -1,6 +1,5 @@
 //! The point cloud under a k-d tree.
 
-use super::{Abilities, MapRepr};
 use crate::geom::Pose;
 use crate::scan::{Scan, ScanStats};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -62,31 +61,12 @@ impl<const D: usize> Cloud<D> {
         let tree = self.tree.as_ref().filter(|_| p.iter().all(|v| v.is_finite()))?;
         Some(tree.query(&p).nearest_one::<SquaredEuclidean<f64>>().execute().distance.sqrt())
     }
-}
 
-impl<const D: usize> MapRepr<D> for Cloud<D> {
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        self.integrate(world_from_sensor, scan)
-    }
-
-    fn occupancy(&self, _: [f64; D]) -> Option<f64> {
-        None
-    }
-
-    /// Unsigned: a cloud has no inside.
-    fn distance(&self, p_world: [f64; D]) -> Option<f64> {
-        self.nearest_distance(p_world)
-    }
-
-    /// The points twice: as they came, and in the tree's leaves with their index of 4 bytes. The tree does not tell
+    /// The points twice: as they came, and in the tree's leaves with their index of 4 bytes. The tree does not give
     /// its own size: its inner levels, some 3 % more, are not counted.
-    fn memory_bytes(&self) -> usize {
+    pub fn memory_bytes(&self) -> usize {
         let in_tree = if self.tree.is_some() { self.points.len() * (size_of::<[f64; D]>() + 4) } else { 0 };
         self.points.capacity() * size_of::<[f64; D]>() + in_tree
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { occupancy: false, distance: true }
     }
 }
 

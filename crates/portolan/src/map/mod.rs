@@ -1,10 +1,11 @@
-//! The maps: named combinations of sweep, cell and store, and the thin view that compares them.
+//! The maps: named combinations of sweep, cell and store.
 
 mod cloud;
 mod error;
 mod integrate;
-mod occupancy;
-mod occupancy_3d;
+mod occupancy_grid;
+mod sparse_fuse;
+mod sparse_occupancy;
 #[cfg(test)]
 mod occupancy_projective_tests;
 mod occupancy_rings;
@@ -22,13 +23,12 @@ mod watch;
 
 pub use cloud::Cloud;
 pub use error::MapError;
-pub use integrate::integrate;
-pub use occupancy::Occupancy;
-pub use occupancy_tree::{CoarseOccupancy, crossover_resolution, inner_only_node_bytes, memory_ratio};
-pub use repr::{Abilities, Derived, DerivedField, MapRepr};
-pub use scan_kind::ScanKind;
-pub use tsdf::Tsdf;
-pub use tsdf_config::{BeamSweep, PointSweep, TsdfConfig};
+pub use occupancy_grid::OccupancyGrid;
+pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
+pub use sparse_tsdf::SparseTsdf;
+pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
+pub use tree_map::{CoarseOccupancy, Octree, Quadtree, TreeMap};
+pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 
 use crate::cell::{LogOdds8, SignedDistance};
 use crate::store::{Dense, Tree};
@@ -39,9 +39,5 @@ pub type DenseTsdf<const D: usize> = Tsdf<D, Dense<SignedDistance, D>>;
 pub type Tsdf2 = DenseTsdf<2>;
 /// A 3-D TSDF in bricks.
 pub type Tsdf3 = Tsdf<3>;
-/// An occupancy map over all cells of a grid, one byte each.
-pub type OccupancyGrid<const D: usize> = Occupancy<D, LogOdds8, Dense<LogOdds8, D>>;
-/// A 2-D occupancy map in a pruned tree.
-pub type Quadtree = Occupancy<2, LogOdds8, Tree<LogOdds8, 2>>;
-/// A 3-D occupancy map in a pruned tree.
-pub type Octree = Occupancy<3, LogOdds8, Tree<LogOdds8, 3>>;
+/// Settings of a TSDF of the plane.
+pub type Tsdf2Config = TsdfConfig<2>;

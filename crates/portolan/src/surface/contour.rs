@@ -1,8 +1,7 @@
 //! Contours: oriented segments in the plane.
 
-use super::{ContourSettings, Polyline, marching_squares};
+use super::Polyline;
 use crate::geom::vector::{distance, point_segment};
-use crate::map::{Abilities, DerivedField, Tsdf2};
 
 /// Segments with shared vertices; free space lies on the left of every segment.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,34 +74,14 @@ impl Contour {
         })
     }
 
-    /// The segments joined end to end.
-    pub fn polylines(&self) -> Vec<Polyline> {
-        super::polyline::join(self)
-    }
-}
-
-impl DerivedField<2> for Contour {
-    type Settings = ContourSettings;
-
-    fn derive(tsdf: &Tsdf2, settings: &ContourSettings) -> Self {
-        marching_squares(tsdf, settings)
-    }
-
-    fn occupancy(&self, p_world: [f64; 2]) -> Option<f64> {
-        self.is_inside(p_world).map(|inside| if inside { 1.0 } else { 0.0 })
-    }
-
-    /// None: a contour has to search ([`Contour::nearest_distance`]).
-    fn distance(&self, _: [f64; 2]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
+    /// Bytes held, measured.
+    pub fn memory_bytes(&self) -> usize {
         self.vertices.capacity() * size_of::<[f64; 2]>() + self.segments.capacity() * size_of::<[u32; 2]>()
     }
 
-    fn abilities() -> Abilities {
-        Abilities { occupancy: true, distance: false }
+    /// The segments joined end to end.
+    pub fn polylines(&self) -> Vec<Polyline> {
+        super::polyline::join(self)
     }
 }
 

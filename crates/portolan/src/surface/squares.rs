@@ -11,7 +11,7 @@ pub enum Ambiguity {
     /// computed exactly.
     #[default]
     Decide,
-    /// Always keep the inside corners apart, as the chapter's table does.
+    /// Always keep the inside corners apart, as the textbook's table does.
     FixedTable,
 }
 
@@ -25,14 +25,14 @@ pub struct ContourSettings {
 }
 
 impl Default for ContourSettings {
-    /// The chapter's `W_min` 0.5.
+    /// `W_min` 0.5.
     fn default() -> Self {
         Self { min_weight: 0.5, ambiguity: Ambiguity::Decide }
     }
 }
 
 impl ContourSettings {
-    /// The default with a `W_min` of half of what one ordinary beam weighs in this map (the chapter's 0.5 where all
+    /// The default with a `W_min` of half of what one ordinary beam weighs in this map (0.5 where all
     /// beams weigh 1).
     pub fn of(tsdf: &Tsdf2) -> Self {
         Self { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..Self::default() }

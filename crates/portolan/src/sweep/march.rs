@@ -9,8 +9,8 @@ use crate::geom::{BlockKey, Lattice, Pose};
 use crate::scan::{Scan, ScanStats};
 
 /// Marches along every beam in steps of half a cell and gives each cell `d = z - s` of the first sample `s`
-/// that falls into it (chapter 3.3, `tsdf_integrate`). The weight tapers linearly to 0 at `-truncation`
-/// behind the surface.
+/// that falls into it. The weight tapers linearly to 0 at `-truncation` behind the surface. The textbook's
+/// `tsdf_integrate` (section 3.3; which textbook: docs/REFERENCES.md).
 ///
 /// The sample is nearer to the sensor than the cell's centre, on average, which puts surfaces about a quarter
 /// of a cell too far away; [`super::CellCentre`] does not do that.

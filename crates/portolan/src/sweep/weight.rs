@@ -3,7 +3,7 @@
 use crate::scan::{Scan, cos_incidence};
 
 /// Weight of a beam's observations, before the taper behind the surface
-/// (Oleynikova et al. 2017, section III; chapter 3.3, D2 step 5).
+/// (Oleynikova et al. 2017, section III).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WeightModel {
     /// Every beam 1.

@@ -13,7 +13,7 @@ pub(crate) struct Apartment {
     pub(crate) log: Lap,
 }
 
-/// The chapter's log: 200 scans, seed 0xC0FFEE.
+/// The lap of every figure: 200 scans, seed 0xC0FFEE.
 pub(crate) fn apartment() -> &'static Apartment {
     static APARTMENT: OnceLock<Apartment> = OnceLock::new();
     APARTMENT.get_or_init(|| {
@@ -23,7 +23,7 @@ pub(crate) fn apartment() -> &'static Apartment {
     })
 }
 
-/// The chapter's grid: 240 x 180 cells of 5 cm.
+/// The grid of every figure: 240 x 180 cells of 5 cm.
 pub(crate) fn grid() -> Grid<2> {
     Grid::new([0.0; 2], 0.05, [240, 180])
 }

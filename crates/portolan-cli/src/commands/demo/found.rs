@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use portolan::gallery::Gallery;
 use portolan::geom::Grid;
+use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
+use portolan_chapter::gallery::Gallery;
 use portolan_io::MapFile;
 use portolan_sim::{LapConfig, World};
 use serde_json::{Value, json};
 
 use super::Run;
-use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::json;
 use crate::mapping::{Derived, FusionReport, Settings};
 

@@ -3,7 +3,7 @@
 use portolan::cell::FusionEvent;
 use portolan::geom::Aabb;
 use portolan::map::Tsdf2;
-use portolan_sim::{GhostGroup, GhostWatch};
+use portolan_chapter::ghost::{GhostGroup, GhostWatch};
 use serde_json::{Value, json};
 
 use super::lap::Move;

@@ -39,7 +39,7 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// The chapter's, with the default sweep.
+    /// The textbook's, with the default sweep.
     fn default() -> Self {
         let config = TsdfConfig::<2>::default();
         Self {

@@ -89,7 +89,7 @@ fn a_cells_history_is_what_the_library_says() {
 }
 
 #[test]
-fn laps_are_the_chapters() {
+fn laps_are_the_textbooks() {
     let mut lap_of = super::lap::Lap::new(&Arc::default(), 0.01);
     let world = apartment().world;
     for k in [0, 1] {

@@ -1,7 +1,7 @@
 //! One question to all representations: what is there?
 
 use portolan::geom::vector::norm;
-use portolan::map::{DerivedField, MapRepr};
+use portolan_chapter::MapRepr;
 use portolan_sim::World;
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ pub(super) fn at(made: &Made, p: [f64; 2]) -> Value {
         "esdf": { "distance": m.distance().distance(p).known(), "status": m.distance().distance(p).status() },
         "contour": {
             "distance": m.contour.nearest_distance(p),
-            "inside": DerivedField::occupancy(&m.contour, p).map(|o| o > 0.5),
+            "inside": m.contour.is_inside(p),
         },
         "cloud": { "distance": m.cloud.nearest_distance(p) },
         "truth": made.truth.as_ref().map(|world: &World| world.signed_distance(p)),

@@ -1,6 +1,6 @@
 //! What the gallery can be asked.
 
-use portolan::gallery::Workload;
+use portolan_chapter::gallery::Workload;
 use serde::Deserialize;
 
 /// A question. The representations are of the scans that the view of fusion holds.

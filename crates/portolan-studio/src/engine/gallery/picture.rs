@@ -2,9 +2,9 @@
 
 use portolan::cell::LogOddsValue;
 use portolan::geom::Grid;
-use portolan::map::MapRepr;
 use portolan::store::Store;
 use portolan::surface::{Ambiguity, level_set};
+use portolan_chapter::MapRepr;
 use serde_json::json;
 
 use super::state::Made;

@@ -2,11 +2,11 @@
 
 use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
-use portolan::gallery::{
-    Gallery as Measured, GallerySettings, TreeCrossover, Truth, run, tree_crossovers_at,
-};
 use portolan::surface::ContourSettings;
-use portolan_sim::World;
+use portolan_chapter::gallery::{
+    Gallery as Measured, GallerySettings, TreeCrossover, run, tree_crossovers_at,
+};
+use portolan_sim::{Truth, World};
 use serde_json::{Value, json};
 
 use super::ask::Ask;

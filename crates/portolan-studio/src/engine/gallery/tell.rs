@@ -1,6 +1,7 @@
 //! The numbers: metres, seconds, bytes; `null` where a representation cannot answer.
 
-use portolan::gallery::{Cost, ErrorSummary, MeasuredField, Row, TreeCrossover, Winner};
+use portolan_chapter::gallery::{Cost, MeasuredField, Row, TreeCrossover, Winner};
+use portolan_sim::ErrorSummary;
 use serde_json::{Value, json};
 
 use super::state::Made;
@@ -93,7 +94,7 @@ fn tree(t: &TreeCrossover) -> Value {
     })
 }
 
-/// The chapter's node and ours over leaves of one size.
+/// The textbook's node and ours over leaves of one size.
 pub(super) fn tree_pair(pair: &[TreeCrossover; 2]) -> Value {
     json!(pair.each_ref().map(tree))
 }

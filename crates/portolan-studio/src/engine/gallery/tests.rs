@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
-use portolan::gallery::{Gallery, GallerySettings, LEVEL, Truth, run};
 use portolan::geom::{Grid, Pose};
 use portolan::map::{Tsdf2, TsdfConfig};
 use portolan::scan::{Beam, BeamKind, Scan};
 use portolan::surface::ContourSettings;
-use portolan_sim::{LapConfig, apartment, lap};
+use portolan_chapter::gallery::{Gallery, GallerySettings, LEVEL, run};
+use portolan_sim::{LapConfig, Truth, apartment, lap};
 use serde_json::{Value, json};
 
 use crate::engine::{Clock, Limits, Logs, PlaneLog, Session, Wire};

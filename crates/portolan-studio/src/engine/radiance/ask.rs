@@ -1,6 +1,6 @@
 //! What the view of radiance can be asked.
 
-use portolan::radiance::{Channels, Optimizer, Settings};
+use portolan_chapter::radiance::{Channels, Optimizer, Settings};
 use serde::{Deserialize, Serialize};
 
 /// A question. All are answered with the fit as it is then (`tell.rs`).

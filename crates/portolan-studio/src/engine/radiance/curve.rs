@@ -1,6 +1,6 @@
 //! How a fit came along, in no more points than a picture can show.
 
-use portolan::radiance::Progress;
+use portolan_chapter::radiance::Progress;
 
 /// Points that are kept at most, but for the few where the run was changed.
 const MOST: usize = 1024;
@@ -81,7 +81,7 @@ impl Curve {
 
 #[cfg(test)]
 mod tests {
-    use portolan::radiance::Residuals;
+    use portolan_chapter::radiance::Residuals;
 
     use super::*;
 

@@ -1,6 +1,6 @@
 //! A fit from its random start to where it stands, through every change of what it learns from.
 
-use portolan::radiance::{Fit, Line, Measurement, Progress, Report, Scene, Settings};
+use portolan_chapter::radiance::{Fit, Line, Measurement, Progress, Report, Scene, Settings};
 use serde::Serialize;
 
 use super::ask::{ChannelsChoice, OptimizerChoice};
@@ -46,7 +46,7 @@ impl Run {
         Ok(Self { seed, training, held_out, fit, phases, curve: Curve::new(), from })
     }
 
-    /// Goes on from the field as it stands, as [`portolan::radiance::Experiment::run_from`] does.
+    /// Goes on from the field as it stands, as [`portolan_chapter::radiance::Experiment::run_from`] does.
     pub(super) fn go_on(
         &mut self,
         channels: ChannelsChoice,
@@ -110,7 +110,7 @@ fn settings(channels: ChannelsChoice, optimizer: OptimizerChoice) -> Settings {
 
 #[cfg(test)]
 mod tests {
-    use portolan::radiance::{Channels, Experiment, Optimizer, PARKED};
+    use portolan_chapter::radiance::{Channels, Experiment, Optimizer, PARKED};
 
     use super::*;
 

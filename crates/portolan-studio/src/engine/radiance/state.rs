@@ -1,6 +1,6 @@
 //! The run of this tab, and what of it is looked at.
 
-use portolan::radiance::{PARKED, Scene};
+use portolan_chapter::radiance::{PARKED, Scene};
 
 use super::ask::{Ask, ChannelsChoice, OptimizerChoice};
 use super::run::Run;
@@ -77,7 +77,7 @@ impl Radiance {
         }
     }
 
-    /// The run; the one that the chapter speaks of most where none was asked for.
+    /// The run; the one that the text speaks of most where none was asked for.
     fn run(&mut self) -> Result<&mut Run, Refusal> {
         if self.run.is_none() {
             let (channels, optimizer) = (ChannelsChoice::Depth, OptimizerChoice::Descent);

@@ -1,6 +1,6 @@
 //! What the page is told: the corridor once, the fit again and again.
 
-use portolan::radiance::{
+use portolan_chapter::radiance::{
     Fit, Measurement, NAMED_SEEDS, Residuals, Scene, Term, Terms, opacity, transmittance,
 };
 use serde_json::{Value, json};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use portolan::radiance::{
+use portolan_chapter::radiance::{
     AMBIGUOUS, Channels, Experiment, Fit, NAMED_SEEDS, OPAQUE, PARKED, Scene, Settings, TWO_NOT_ENOUGH,
     transmittance,
 };
@@ -135,7 +135,7 @@ fn terms_add_up_to_the_gradient() {
     }
 }
 
-/// The lesson of the chapter, through the session: what depth alone keeps parked leaves when reflectance arrives.
+/// The lesson of the text, through the session: what depth alone keeps parked leaves when reflectance arrives.
 #[test]
 fn parked_matter_leaves_when_reflectance_arrives() {
     let mut session = session();

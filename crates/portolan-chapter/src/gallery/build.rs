@@ -1,0 +1,191 @@
+//! Fuses one log into every representation and derives the fields.
+
+use super::crossover::{CHAPTER_NODE, CloudCrossover, OUR_NODE, TreeCrossover};
+use super::fields::{MeasuredField, fields_of};
+use super::probes::{Clock, seconds_of};
+use super::row::{Cost, Row};
+use super::run::{Gallery, GallerySettings};
+use crate::memory::inner_only_node_bytes;
+use portolan::cell::OccupancyModel;
+use portolan::geom::{Grid, Pose};
+use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
+use portolan::scan::{Scan, ScanStats};
+use portolan::store::Store;
+use portolan::surface::{Contour, marching_squares};
+
+/// A map, and what fusing one scan into it took (seconds).
+struct Fused<M> {
+    map: M,
+    update: f64,
+}
+
+impl<M> Fused<M> {
+    fn new(
+        clock: &mut Clock<'_>,
+        log: &[(Pose<2>, Scan<2>)],
+        mut map: M,
+        mut fuse: impl FnMut(&mut M, &Pose<2>, &Scan<2>) -> ScanStats,
+    ) -> Self {
+        let start = clock();
+        for (pose, scan) in log {
+            fuse(&mut map, pose, scan);
+        }
+        let update = (clock() - start) / log.len().max(1) as f64;
+        Self { map, update }
+    }
+}
+
+/// Every map of the log.
+struct Maps {
+    occupancy: Fused<OccupancyGrid<2>>,
+    tree: Fused<Quadtree>,
+    chapter_tree: Fused<Quadtree>,
+    tsdf: Fused<Tsdf2>,
+    /// Without carving.
+    banded: Fused<Tsdf2>,
+    marched: Fused<Tsdf2>,
+    cloud: Fused<Cloud<2>>,
+    /// Seconds that the cloud's tree took.
+    cloud_build: f64,
+}
+
+impl Maps {
+    fn fuse(
+        log: &[(Pose<2>, Scan<2>)],
+        settings: &GallerySettings,
+        clock: &mut Clock<'_>,
+    ) -> Result<Self, MapError> {
+        let (grid, model) = (settings.grid, settings.model);
+        let config = settings.tsdf.with_grid(&grid);
+        let march = Tsdf2Config { sweep: SweepKind::March, ..config };
+        let in_tree = |map: &mut Quadtree, at: &Pose<2>, scan: &Scan<2>| map.integrate(at, scan);
+        let carving = |map: &mut Tsdf2, at: &Pose<2>, scan: &Scan<2>| map.integrate(at, scan, true);
+
+        let occupancy =
+            Fused::new(clock, log, OccupancyGrid::new(grid, model)?, |map, at, scan| map.integrate(at, scan));
+        let tree = Fused::new(clock, log, Quadtree::covering(&grid, model)?, in_tree);
+        let chapter_tree = Fused::new(clock, log, chapter_tree(&grid, model)?, in_tree);
+        let tsdf = Fused::new(clock, log, Tsdf2::new(config)?, carving);
+        let banded =
+            Fused::new(clock, log, Tsdf2::new(config)?, |map, at, scan| map.integrate(at, scan, false));
+        let marched = Fused::new(clock, log, Tsdf2::new(march)?, carving);
+        let mut cloud = Fused::new(clock, log, Cloud::new(), |map, at, scan| map.integrate(at, scan));
+        let (cloud_build, ()) = seconds_of(clock, || cloud.map.rebuild());
+        Ok(Self { occupancy, tree, chapter_tree, tsdf, banded, marched, cloud, cloud_build })
+    }
+
+    /// The rows of the maps themselves; what a workload costs comes in the same order: `costs.rs`.
+    fn rows(&self, segments: impl Fn(&Tsdf2) -> usize) -> Vec<Row> {
+        let (occupancy, cloud, tsdf) = (&self.occupancy.map, &self.cloud.map, &self.tsdf.map);
+        let nodes = |map: &Quadtree| {
+            format!("{} nodes, {} of them inner", map.tree().nodes(), map.tree().inner_nodes())
+        };
+        let tree = |name, fused: &Fused<Quadtree>| {
+            row(name, fused.map.memory_bytes(), Cost::direct(fused.update), nodes(&fused.map))
+        };
+        let banded = format!(
+            "{} ms without carving, {} segments there",
+            format_ms(self.banded.update),
+            segments(&self.banded.map)
+        );
+        let marched = format!("{} segments", segments(&self.marched.map));
+        let built =
+            format!("{} points, tree built in {} ms", cloud.points().len(), format_ms(self.cloud_build));
+        vec![
+            row(
+                "occupancy grid, 1 B/cell",
+                occupancy.memory_bytes(),
+                Cost::direct(self.occupancy.update),
+                format!("{} cells observed", occupancy.observed_cells()),
+            ),
+            tree("quadtree, 9 B/inner node, same cells", &self.tree),
+            tree("quadtree, 6.25 cm leaves, 16 m root", &self.chapter_tree),
+            row("TSDF, f32 D and W", tsdf.memory_bytes(), Cost::direct(self.tsdf.update), banded),
+            row(
+                "TSDF, the chapter's march",
+                self.marched.map.memory_bytes(),
+                Cost::direct(self.marched.update),
+                marched,
+            ),
+            row("point cloud, k-d tree", cloud.memory_bytes(), Cost::direct(self.cloud.update), built),
+        ]
+    }
+}
+
+/// Fuses and derives everything. What updates cost is known then, and all that needs no probes.
+pub(super) fn build(
+    log: &[(Pose<2>, Scan<2>)],
+    settings: &GallerySettings,
+    clock: &mut Clock<'_>,
+) -> Result<Gallery, MapError> {
+    let maps = Maps::fuse(log, settings, clock)?;
+    let fields = fields_of(clock, &maps.tsdf.map, &settings.esdf);
+    let (contour_build, contour) = seconds_of(clock, || marching_squares(&maps.tsdf.map, &settings.contour));
+
+    let mut rows = maps.rows(|map| marching_squares(map, &settings.contour).segments.len());
+    let cloud = rows.len() - 1;
+    rows.splice(cloud..cloud, derived_rows(&fields, &contour, contour_build));
+    Ok(Gallery {
+        rows,
+        winners: Vec::new(),
+        never_win: Vec::new(),
+        trees: tree_crossovers(settings, &contour, &maps),
+        cloud_crossover: CloudCrossover { measured: Vec::new(), points: None },
+        tsdf_gradient: f64::NAN,
+        fields,
+        occupancy: maps.occupancy.map,
+        tree: maps.tree.map,
+        tsdf: maps.tsdf.map,
+        contour,
+        cloud: maps.cloud.map,
+        chapter_tree: maps.chapter_tree.map,
+        marched: maps.marched.map,
+        contour_settings: settings.contour,
+    })
+}
+
+/// The rows of what is derived from the TSDF.
+fn derived_rows(fields: &[MeasuredField; 3], contour: &Contour, contour_build: f64) -> [Row; 2] {
+    let accurate = &fields[0];
+    let esdf = row(
+        "ESDF, f32",
+        accurate.field.memory_bytes(),
+        Cost::by(accurate.seconds, "full rebuild"),
+        "distances to the contour's segments".into(),
+    );
+    let lines = row(
+        "extracted contour",
+        contour.memory_bytes(),
+        Cost::by(contour_build, "marching squares"),
+        format!("{} segments, {:.1} m", contour.segments.len(), contour.length()),
+    );
+    [esdf, lines].map(|row| Row { derived: true, ..row })
+}
+
+fn row(name: &str, memory_bytes: usize, update: Option<Cost>, note: String) -> Row {
+    Row { name: name.into(), memory_bytes, update, note, ..Default::default() }
+}
+
+/// The chapter's tree: leaves a 256th of a root of 16 m, or of as many doublings of it as the map needs.
+fn chapter_tree(grid: &Grid<2>, model: OccupancyModel) -> Result<Quadtree, MapError> {
+    let extent = grid.aabb().extent().into_iter().fold(0.0, f64::max);
+    let doublings = (extent / 16.0).log2().ceil().max(0.0) as u32;
+    Quadtree::new(grid.lattice.origin, 0.0625, 8 + doublings, model)
+}
+
+fn tree_crossovers(settings: &GallerySettings, contour: &Contour, maps: &Maps) -> Vec<TreeCrossover> {
+    let (grid, tree, chapter_tree) = (&settings.grid, &maps.tree.map, &maps.chapter_tree.map);
+    let [width, height] = grid.aabb().extent();
+    let plane = (settings.surface_length.unwrap_or(contour.length()), width * height);
+    let dense = grid.len();
+    let ours = inner_only_node_bytes::<2>(9.0);
+    let (fine, coarse) = (grid.lattice.resolution, chapter_tree.tree().lattice().resolution);
+    vec![
+        TreeCrossover::new(CHAPTER_NODE, (20.0, coarse), plane, (20 * chapter_tree.tree().nodes(), dense)),
+        TreeCrossover::new(OUR_NODE, (ours, fine), plane, (tree.memory_bytes(), dense)),
+    ]
+}
+
+pub(super) fn format_ms(seconds: f64) -> String {
+    format!("{:.3}", 1e3 * seconds)
+}

@@ -1,0 +1,237 @@
+//! The ghost of the chair: how long a map believes in what is no longer there, and what forgetting costs.
+//!
+//! The lap is driven until every cell of the chair's place that can saturate has done so; then the chair is moved and
+//! the laps go on. Of each cell the error against the new truth is followed from re-observation to
+//! re-observation. Filter theory says: it halves every `ln 2 / ln(1 + w / W_max)` of them.
+
+use super::{GhostGroup, GhostWatch, StaticNoise, static_noise};
+use portolan::geom::{Aabb, Grid};
+use portolan::map::{BeamSweep, MapError, Tsdf2, TsdfConfig};
+use portolan::sweep::WeightModel;
+use portolan_sim::{CHAIR_MOVE, LapConfig, World, apartment, lap};
+
+/// How the experiment is done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GhostSettings {
+    /// Clamps of the weight, one run each.
+    pub w_max: Vec<f32>,
+    /// Edge of a cell (metres).
+    pub resolution: f64,
+    /// Truncation (metres).
+    pub truncation: f64,
+    /// How scans become observations.
+    pub sweep: BeamSweep,
+    /// How much each beam is trusted.
+    pub weights: WeightModel,
+    /// One lap.
+    pub lap: LapConfig,
+    /// After so many laps the chair moves, saturated or not.
+    pub max_laps_before: usize,
+    /// The run ends after so many laps with the moved chair, at the latest.
+    pub max_laps_after: usize,
+    /// The run goes on until every measured cell was re-observed for so many predicted half-lives.
+    pub half_lives: f64,
+    /// Laps of a world in which nothing moves over which the noise of the map is measured, after half as many to
+    /// forget the beginning; 0 or 1: not measured.
+    pub noise_laps: usize,
+}
+
+impl Default for GhostSettings {
+    /// The chapter's map (5 cm, tau 15 cm), `W_max` of 4, 24 and 64, four laps, three half-lives.
+    fn default() -> Self {
+        Self {
+            w_max: vec![4.0, 24.0, 64.0],
+            resolution: 0.05,
+            truncation: 0.15,
+            sweep: BeamSweep::default(),
+            weights: WeightModel::default(),
+            lap: LapConfig::default(),
+            max_laps_before: 4,
+            max_laps_after: 16,
+            half_lives: 3.0,
+            noise_laps: 16,
+        }
+    }
+}
+
+/// The whole experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ghost {
+    /// One run for each clamp, in the order asked for.
+    pub per_w_max: Vec<GhostRun>,
+}
+
+/// What one map remembered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GhostRun {
+    /// The clamp.
+    pub w_max: f32,
+    /// Laps driven before the chair moved.
+    pub laps_before: usize,
+    /// Laps after which every cell of the chair's place was saturated; `None`: some were not after the last one.
+    pub laps_until_saturated: Option<usize>,
+    /// Laps driven afterwards.
+    pub laps_after: usize,
+    /// Cells of the abandoned place where the prediction should hold: saturated when the chair moved, and only
+    /// ever seen as free from then on.
+    pub measured: GhostGroup,
+    /// Those that had not reached `W_max`: their gain is higher than the clamp's, and they forget faster.
+    pub unclamped: GhostGroup,
+    /// Cells, here and at the chair's new place, of which at least one re-observation lay behind a surface, where the
+    /// weight tapers to 0: they learn slower than beams of full weight would teach them, and what they are told is
+    /// a distance along a beam, not the truth.
+    pub tapered: GhostGroup,
+    /// What this clamp costs where nothing moves, if it was asked for.
+    pub static_noise: Option<StaticNoise>,
+}
+
+struct Run {
+    w_max: f32,
+    tsdf: Tsdf2,
+    saturated_after: Option<usize>,
+    laps_before: usize,
+    laps_after: usize,
+    watch: Option<GhostWatch>,
+    done: bool,
+}
+
+/// Does the experiment: all maps see the same laps. Driving costs as much as fusing; some seconds in all.
+///
+/// # Errors
+/// Where resolution, truncation or a clamp is not possible.
+pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
+    let before = apartment().world;
+    let after = before.with_moved("chair", CHAIR_MOVE);
+    let places = [&before, &after].map(chair);
+    let region = places[0].union(places[1]).grown(settings.truncation + 2.0 * settings.resolution);
+    let grid =
+        Grid::covering(region, settings.resolution).ok_or(MapError::Resolution(settings.resolution))?;
+    let mut runs = Vec::new();
+    for &w_max in &settings.w_max {
+        runs.push(Run {
+            w_max,
+            tsdf: Tsdf2::covering(&grid, config(settings, w_max))?,
+            saturated_after: None,
+            laps_before: 0,
+            laps_after: 0,
+            watch: None,
+            done: false,
+        });
+    }
+
+    for k in 0..settings.max_laps_before {
+        let scans = lap(&before, &lap_config(settings, k));
+        for run in runs.iter_mut().filter(|r| r.saturated_after.is_none()) {
+            for (pose, scan) in &scans {
+                run.tsdf.integrate(pose, scan)?;
+            }
+            run.laps_before = k + 1;
+            let all = old_place(&run.tsdf, places[0]);
+            let full = |c: &[i32; 2]| run.tsdf.store_cell(*c).is_some_and(|s| s.weight >= run.w_max);
+            if all.iter().all(full) {
+                run.saturated_after = Some(k + 1);
+            }
+        }
+    }
+    for run in &mut runs {
+        run.follow(&after, places);
+    }
+    for k in 0..settings.max_laps_after {
+        if runs.iter().all(|r| r.done) {
+            break;
+        }
+        // Laps of another number than any before: other noise.
+        let scans = lap(&after, &lap_config(settings, (1 << 20) + k));
+        for run in runs.iter_mut().filter(|r| !r.done) {
+            run.drive(&scans, settings)?;
+        }
+    }
+    let mut per_w_max: Vec<_> = runs.into_iter().map(Run::tell).collect();
+    if settings.noise_laps > 1 {
+        let noise = static_noise(settings, settings.noise_laps / 2, settings.noise_laps)?;
+        per_w_max.iter_mut().zip(noise).for_each(|(run, noise)| run.static_noise = Some(noise));
+    }
+    Ok(Ghost { per_w_max })
+}
+
+fn config(settings: &GhostSettings, w_max: f32) -> TsdfConfig<2> {
+    TsdfConfig {
+        w_max,
+        truncation: settings.truncation,
+        beams: settings.sweep,
+        weights: settings.weights,
+        ..Default::default()
+    }
+}
+
+fn lap_config(settings: &GhostSettings, k: usize) -> LapConfig {
+    LapConfig { first_index: settings.lap.first_index + (k * settings.lap.scans) as u64, ..settings.lap }
+}
+
+fn chair(world: &World) -> Aabb<2> {
+    world.solids().iter().filter(|s| s.name == "chair").fold(Aabb::EMPTY, |b, s| b.union(s.aabb()))
+}
+
+/// Cells of the chair's place: centre in the chair or within a cell of it, estimated as behind or near its surface.
+pub(crate) fn old_place(tsdf: &Tsdf2, place: Aabb<2>) -> Vec<[i32; 2]> {
+    let near = place.grown(tsdf.grid().lattice.resolution);
+    let limit = (0.5 * tsdf.config().truncation) as f32;
+    cells_in(tsdf, near).filter(|&c| tsdf.store_cell(c).is_some_and(|s| s.distance < limit)).collect()
+}
+
+pub(crate) fn cells_in(tsdf: &Tsdf2, place: Aabb<2>) -> impl Iterator<Item = [i32; 2]> + '_ {
+    let grid = tsdf.grid();
+    (0..grid.len()).map(|i| grid.cell(i)).filter(move |&c| place.contains(grid.lattice.center(c)))
+}
+
+/// Shorter words for what is asked often.
+pub(crate) trait StoreCell {
+    fn store_cell(&self, cell: [i32; 2]) -> Option<portolan::cell::SignedDistance>;
+}
+
+impl StoreCell for Tsdf2 {
+    fn store_cell(&self, cell: [i32; 2]) -> Option<portolan::cell::SignedDistance> {
+        self.store().at(self.grid().index(cell)?)
+    }
+}
+
+impl Run {
+    /// Chooses the cells and watches them from now on.
+    fn follow(&mut self, after: &World, places: [Aabb<2>; 2]) {
+        let watch = GhostWatch::new(&self.tsdf, after, places);
+        self.tsdf.watch(watch.cells());
+        self.watch = Some(watch);
+    }
+
+    /// One more lap; done when all measured cells were seen often enough.
+    fn drive(
+        &mut self,
+        scans: &[(portolan::geom::Pose<2>, portolan::scan::Scan<2>)],
+        settings: &GhostSettings,
+    ) -> Result<(), MapError> {
+        let Some(watch) = &mut self.watch else { return Ok(()) };
+        for (pose, scan) in scans {
+            self.tsdf.integrate(pose, scan)?;
+            watch.observe(self.tsdf.events());
+        }
+        self.laps_after += 1;
+        self.done = watch.is_measured(self.tsdf.rule(), settings.half_lives);
+        Ok(())
+    }
+
+    fn tell(self) -> GhostRun {
+        let groups =
+            self.watch.map(|w| w.groups(self.tsdf.rule(), self.laps_after as f64)).unwrap_or_default();
+        let [measured, unclamped, tapered] = groups;
+        GhostRun {
+            w_max: self.w_max,
+            laps_before: self.laps_before,
+            laps_until_saturated: self.saturated_after,
+            laps_after: self.laps_after,
+            measured,
+            unclamped,
+            tapered,
+            static_noise: None,
+        }
+    }
+}

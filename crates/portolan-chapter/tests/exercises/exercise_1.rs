@@ -1,0 +1,85 @@
+//! Exercise 1: what a clamped weight does to a cell's variance.
+
+use crate::page::{check, mm};
+use portolan::cell::TsdfRule;
+use portolan_sim::Random;
+
+/// Sample variance of what a filter believes after `n` observations of variance `sigma^2 / w` of a zero, over
+/// `runs` runs.
+fn variance_after(w_max: f32, (sigma, w): (f64, f64), n: usize, runs: u64) -> f64 {
+    let rule = TsdfRule { truncation: 1.0, w_max };
+    let (mut sum, mut sum_sq) = (0.0, 0.0);
+    for run in 0..runs {
+        let mut random = Random::stream(41, run);
+        let (mut d, mut weight) = (0.0, 0.0);
+        for _ in 0..n {
+            let event = rule.step(d, weight, sigma / w.sqrt() * random.normal(), w);
+            (d, weight) = (event.after, event.weight_after);
+        }
+        (sum, sum_sq) = (sum + d, sum_sq + d * d);
+    }
+    let mean = sum / runs as f64;
+    sum_sq / runs as f64 - mean * mean
+}
+
+/// Exercise 1 (a): a clamped cell never comes to rest, and its variance is `sigma^2 / (2 W_max + w)`.
+#[test]
+fn exercise_1_steady_state_variance() {
+    let sigma = 0.02;
+    for (w_max, w) in [(4.0f32, 1.0), (24.0, 1.0), (64.0, 1.0), (16.0, 2.0), (8.0, 0.5)] {
+        // Long enough for the beginning to be forgotten to a part in 10,000.
+        let n = (10.0 * (f64::from(w_max) / w + 1.0)) as usize;
+        let measured = variance_after(w_max, (sigma, w), n, 8000);
+        let predicted = sigma * sigma / (2.0 * f64::from(w_max) + w);
+        println!(
+            "W_max {w_max}, w {w}: {:.3} mm, predicted {:.3}",
+            1e3 * measured.sqrt(),
+            1e3 * predicted.sqrt()
+        );
+        // The variance of 8000 runs is known to 1.6 %: three of those.
+        assert!((measured / predicted - 1.0).abs() < 0.05);
+    }
+}
+
+/// Exercise 1 (c): at `W_max = 24.5` a cell is as sure as an unclamped one after 50 scans: `2 * 24.5 + 1 = 50`.
+#[test]
+fn exercise_1_w_max_of_24_5_equals_50_unclamped_scans() {
+    let sigma = 0.02;
+    let clamped = variance_after(24.5, (sigma, 1.0), 400, 8000);
+    let unclamped = variance_after(f32::INFINITY, (sigma, 1.0), 50, 8000);
+    println!(
+        "standard deviation: clamped {:.3} mm, 50 scans {:.3} mm",
+        1e3 * clamped.sqrt(),
+        1e3 * unclamped.sqrt()
+    );
+    assert!((clamped / unclamped - 1.0).abs() < 0.07);
+    assert!((unclamped / (sigma * sigma / 50.0) - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn exercise_1_on_the_page() {
+    let sigma = 0.02;
+    let settled = |w_max: f32, w: f64| {
+        let n = (10.0 * (f64::from(w_max) / w + 1.0)) as usize;
+        let measured = variance_after(w_max, (sigma, w), n, 8000).sqrt();
+        let predicted = sigma / (2.0 * f64::from(w_max) + w).sqrt();
+        format!("{} measured, {} predicted", mm(measured), mm(predicted))
+    };
+    let unclamped = variance_after(f32::INFINITY, (sigma, 1.0), 50, 8000).sqrt();
+    // 2 W_max + w = 50 for w = 1.
+    let w_max = (50.0 - 1.0) / 2.0;
+    let rows = [
+        ("standard deviation at rest, `W_max` 4, `w` 1", settled(4.0, 1.0)),
+        ("standard deviation at rest, `W_max` 24, `w` 1", settled(24.0, 1.0)),
+        ("standard deviation at rest, `W_max` 64, `w` 1", settled(64.0, 1.0)),
+        ("standard deviation at rest, `W_max` 16, `w` 2", settled(16.0, 2.0)),
+        ("standard deviation at rest, `W_max` 8, `w` 0.5", settled(8.0, 0.5)),
+        ("`W_max` that equals 50 unclamped scans", format!("{w_max}")),
+        ("standard deviation there", settled(w_max as f32, 1.0)),
+        (
+            "standard deviation after 50 unclamped scans",
+            format!("{} measured, {} predicted", mm(unclamped), mm(sigma / 50f64.sqrt())),
+        ),
+    ];
+    check(1, &rows);
+}

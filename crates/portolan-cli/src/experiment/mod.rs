@@ -1,7 +1,0 @@
-//! The two experiments of `demo` beside the gallery: a lap that drifts and is corrected, and a chair that moves.
-
-mod drift;
-mod forgetting;
-
-pub(crate) use drift::{Drift, PoseSet};
-pub(crate) use forgetting::{Forgetting, shown as shown_half_life};
