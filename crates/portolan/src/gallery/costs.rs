@@ -105,7 +105,7 @@ fn occupancy_contour(grid: &Grid<2>, value: impl Fn([i32; 2]) -> Option<i8>) -> 
 }
 
 /// Where a distance field is zero.
-pub(super) fn zero_of(field: &crate::field::Esdf2) -> Contour {
+pub(super) fn zero_of(field: &crate::field::EsdfGrid<2>) -> Contour {
     let samples = field.samples();
     level_set(field.grid(), samples, |i| !samples[i].is_nan(), Ambiguity::Decide)
 }

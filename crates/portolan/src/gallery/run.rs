@@ -8,7 +8,7 @@ use super::fields::{MeasuredField, against_contour, fields_of};
 use super::probes::{Clock, points, seconds_of};
 use super::row::{Cost, Row, Winner, Workload};
 use crate::cell::OccupancyModel;
-use crate::field::{Esdf2, EsdfSettings};
+use crate::field::{EsdfGrid, EsdfSettings};
 use crate::geom::{Grid, Pose, vector};
 use crate::map::{
     Cloud, DerivedField, MapError, MapRepr, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config,
@@ -74,7 +74,7 @@ pub struct Gallery {
 
 impl Gallery {
     /// The accurate distance field.
-    pub fn distance(&self) -> &Esdf2 {
+    pub fn distance(&self) -> &EsdfGrid<2> {
         &self.fields[0].field
     }
 
@@ -98,7 +98,8 @@ pub fn run(
     let grid = settings.grid;
     let mut gallery = build(log, settings, clock)?;
     let everywhere = points(&grid.aabb(), settings.probes);
-    let free = observed_free(&gallery.tsdf, settings.esdf.min_weight, truth);
+    let min_weight = settings.esdf.min_weight.unwrap_or(gallery.tsdf.thresholds().observed);
+    let free = observed_free(&gallery.tsdf, min_weight, truth);
     hold_against_truth(&mut gallery, &Asker { truth, free, everywhere: &everywhere, grid });
     for workload in Workload::ALL {
         gallery.measure(workload, settings.probes, clock);

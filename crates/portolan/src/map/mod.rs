@@ -11,6 +11,7 @@ mod sparse_occupancy;
 mod sparse_occupancy_tests;
 mod sparse_tsdf;
 mod sparse_tsdf_config;
+mod thresholds;
 mod tree_map;
 mod tsdf;
 
@@ -21,6 +22,7 @@ pub use repr::{Abilities, Derived, DerivedField, MapRepr};
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
 pub use sparse_tsdf::SparseTsdf;
 pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
+pub use thresholds::{DistanceMap, Thresholds};
 pub use tree_map::{
     CoarseOccupancy, Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio,
 };

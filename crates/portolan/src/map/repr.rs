@@ -1,6 +1,7 @@
 //! The chapter's thesis as an interface: a map is what it can answer cheaply.
 
 use super::Tsdf;
+use crate::field::{Esdf, EsdfGrid, EsdfSettings};
 use crate::geom::Pose;
 use crate::scan::{Scan, ScanStats};
 
@@ -108,5 +109,31 @@ impl<F: DerivedField<D>, const D: usize> MapRepr<D> for Derived<F, D> {
 
     fn abilities(&self) -> Abilities {
         F::abilities()
+    }
+}
+
+impl<const D: usize> DerivedField<D> for EsdfGrid<D> {
+    type Settings = EsdfSettings;
+
+    fn derive(tsdf: &Tsdf<D>, settings: &EsdfSettings) -> Self {
+        Esdf::of(tsdf, settings).dense(tsdf.grid())
+    }
+
+    /// The sign of the distance.
+    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
+        let v = *self.samples().get(self.grid().index_of(p_world)?)?;
+        (!v.is_nan()).then_some(if v < 0.0 { 1.0 } else { 0.0 })
+    }
+
+    fn distance(&self, p_world: [f64; D]) -> Option<f64> {
+        Self::distance(self, p_world).known()
+    }
+
+    fn memory_bytes(&self) -> usize {
+        Self::memory_bytes(self)
+    }
+
+    fn abilities() -> Abilities {
+        Abilities { occupancy: true, distance: true }
     }
 }
