@@ -1,7 +1,7 @@
 //! How distance fields are made of maps.
 
-use portolan::field::{DenseEsdf, EsdfMethod, EsdfSettings, SparseEsdf, SparseEsdfSettings};
-use portolan::geom::{Grid, vector};
+use portolan::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings};
+use portolan::geom::vector;
 use portolan::map::Tsdf;
 use serde_json::{Map, Value};
 
@@ -22,7 +22,7 @@ impl EsdfArg {
     pub(crate) fn method(self) -> EsdfMethod {
         match self {
             Self::Accurate => EsdfMethod::Accurate,
-            Self::Seeded => EsdfMethod::Seeded { band_cells: 1.5 },
+            Self::Seeded => EsdfMethod::TEXTBOOK,
             Self::Mask => EsdfMethod::Mask,
         }
     }
@@ -45,26 +45,19 @@ impl EsdfArg {
 
 /// The field of a map of the plane, as far as the method reaches (509 cells where it is accurate), with distances to
 /// unknown cells where they are wanted.
-pub(crate) fn plane_esdf(tsdf: &Tsdf2, method: EsdfArg, unknown: bool) -> SparseEsdf<2> {
+pub(crate) fn plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg, unknown: bool) -> Esdf<2> {
     let grid = tsdf.grid();
     let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
-    let min_weight = EsdfSettings::of(tsdf).min_weight;
-    let how = SparseEsdfSettings { min_weight, max_distance, method: method.method(), unknown };
-    SparseEsdf::of_tsdf(tsdf, &how)
+    let how = EsdfSettings { max_distance, method: method.method(), unknown, ..EsdfSettings::default() };
+    Esdf::of(tsdf, &how)
 }
 
 /// The cells of a map of the plane.
-pub(crate) fn dense_plane_esdf(tsdf: &Tsdf2, method: EsdfArg) -> DenseEsdf<2> {
+pub(crate) fn dense_plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg) -> EsdfGrid<2> {
     plane_esdf(tsdf, method, false).dense(tsdf.grid())
 }
 
 /// The status plane of a file, where there is something to say that NaN does not.
-pub(crate) fn status_plane<const D: usize>(dense: &DenseEsdf<D>) -> Option<&[u8]> {
-    dense.status.contains(&2).then_some(&dense.status[..])
-}
-
-/// A field of samples that are known where they are numbers.
-pub(crate) fn known_where_finite<const D: usize>(grid: Grid<D>, distances: Vec<f32>) -> DenseEsdf<D> {
-    let status = distances.iter().map(|d| u8::from(!d.is_nan())).collect();
-    DenseEsdf { grid, distances, status }
+pub(crate) fn status_plane<const D: usize>(dense: &EsdfGrid<D>) -> Option<Vec<u8>> {
+    dense.is_saturated().then(|| dense.status_bytes())
 }

@@ -2,33 +2,8 @@
 
 use std::io::{self, Write};
 
-use portolan::Answer;
-use portolan::field::{ClearanceField, SparseEsdf, UnknownSpace};
-
-/// The status of a row's distance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AnswerStatus {
-    /// The distance is known.
-    Known,
-    /// Unobserved: the map has no distance there.
-    Unknown,
-    /// At least as far as the field reaches.
-    Saturated,
-    /// Outside of the map.
-    Outside,
-}
-
-impl AnswerStatus {
-    /// The word in the file.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Known => "known",
-            Self::Unknown => "unknown",
-            Self::Saturated => "saturated",
-            Self::Outside => "outside",
-        }
-    }
-}
+use portolan::field::{ClearanceField, Esdf, UnknownSpace};
+use portolan::{Answer, Status};
 
 /// One row of answers; `None` becomes an empty field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +11,7 @@ pub struct AnswerRow<const D: usize> {
     /// The query point (metres).
     pub point: [f64; D],
     /// What is known about the distance.
-    pub status: AnswerStatus,
+    pub status: Status,
     /// Probability of being occupied.
     pub occupancy: Option<f64>,
     /// Signed distance (metres).
@@ -52,29 +27,20 @@ pub struct AnswerRow<const D: usize> {
 impl<const D: usize> AnswerRow<D> {
     /// A row about a point: its occupancy, and the distance of a field, in the frame of the point.
     pub fn of(point: [f64; D], occupancy: Option<f64>, distance: Answer<(f64, [f64; D])>) -> Self {
-        let mut row = Self {
+        Self {
             point,
-            status: AnswerStatus::Unknown,
+            status: distance.status(),
             occupancy,
-            distance: None,
-            lower: None,
+            distance: distance.value().map(|(d, _)| d),
+            // Bounds are about the magnitude; the side is the distance's sign.
+            lower: if distance.status() == Status::Saturated {
+                distance.value().map(|(d, _)| d.abs())
+            } else {
+                None
+            },
             upper: None,
-            gradient: None,
-        };
-        match distance {
-            Answer::Known((d, gradient)) => {
-                row.status = AnswerStatus::Known;
-                (row.distance, row.gradient) = (Some(d), Some(gradient));
-            }
-            Answer::Saturated((d, _)) => {
-                row.status = AnswerStatus::Saturated;
-                // Bounds are about the magnitude; the side is the distance's sign.
-                (row.distance, row.lower) = (Some(d), Some(d.abs()));
-            }
-            Answer::Unknown => {}
-            Answer::Outside => row.status = AnswerStatus::Outside,
+            gradient: distance.known().map(|(_, gradient)| gradient),
         }
-        row
     }
 
     /// Fills in the certified bounds, where the row has a distance; `p` is its point in the frame of the field.
@@ -86,17 +52,14 @@ impl<const D: usize> AnswerRow<D> {
         unknown: UnknownSpace,
         limit: f64,
     ) {
-        if !matches!(self.status, AnswerStatus::Known | AnswerStatus::Saturated) {
+        if !self.status.has_value() {
             return;
         }
-        let bounds = |unknown| match field.clearance(p, unknown) {
-            Answer::Known(c) | Answer::Saturated(c) => Some(c),
-            Answer::Unknown | Answer::Outside => None,
-        };
+        let bounds = |unknown| field.clearance(p, unknown).value();
         let surface = bounds(UnknownSpace::Optimistic);
         let far = surface.is_some_and(|c| c.lower >= limit);
         if far {
-            self.status = AnswerStatus::Saturated;
+            self.status = Status::Saturated;
             self.distance = self.distance.map(|d| limit.copysign(d));
             self.gradient = None;
         }
@@ -112,7 +75,7 @@ pub const HELD_BACK: f64 = 2.0;
 
 /// Metres up to which a field in bricks certifies: bounds fall short of distances by less than the two cells that are
 /// held back.
-pub fn certified_reach<const D: usize>(field: &SparseEsdf<D>) -> f64 {
+pub fn certified_reach<const D: usize>(field: &Esdf<D>) -> f64 {
     f64::from(field.max_distance()) - HELD_BACK * field.lattice().resolution
 }
 
@@ -155,7 +118,7 @@ mod tests {
         write_answer_header::<2>(&mut out).unwrap();
         let row = AnswerRow {
             point: [0.1, 2.0],
-            status: AnswerStatus::Known,
+            status: Status::Known,
             occupancy: Some(0.25),
             distance: Some(-1.5),
             lower: Some(-1.6),
@@ -165,7 +128,7 @@ mod tests {
         write_answer(&mut out, &row).unwrap();
         let none = AnswerRow {
             point: [1.0, 2.0, 3.0],
-            status: AnswerStatus::Outside,
+            status: Status::Outside,
             occupancy: None,
             distance: None,
             lower: None,

@@ -18,6 +18,8 @@ use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
+use portolan::Status;
+use portolan::field::EsdfGrid;
 use portolan::geom::Grid;
 
 use crate::IoError;
@@ -30,48 +32,20 @@ const HEADER: u64 = 64;
 /// The most cells of a field: 2 GiB of distances.
 const MOST_CELLS: u64 = 1 << 29;
 
-/// A field in `D` dimensions as the file holds it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EsdfBin<const D: usize> {
-    /// Where the cells are.
-    pub grid: Grid<D>,
-    /// Signed distance of each cell (metres, positive in free space), x fastest; NaN where unknown.
-    pub distances: Vec<f32>,
-    /// Status of each distance: [`EsdfBin::UNKNOWN`], [`EsdfBin::KNOWN`] or [`EsdfBin::SATURATED`].
-    pub status: Option<Vec<u8>>,
-}
-
-/// A field of the dimension that the file has.
+/// A field whose dimension the file tells.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EsdfFile {
-    /// A 2-D field.
-    Two(EsdfBin<2>),
-    /// A 3-D field.
-    Three(EsdfBin<3>),
+    /// A field in the plane.
+    Two(EsdfGrid<2>),
+    /// A field in space.
+    Three(EsdfGrid<3>),
 }
 
-impl<const D: usize> EsdfBin<D> {
-    /// Status of a cell that was not observed.
-    pub const UNKNOWN: u8 = 0;
-    /// Status of a cell with a distance.
-    pub const KNOWN: u8 = 1;
-    /// Status of a cell that is at least so far from any surface.
-    pub const SATURATED: u8 = 2;
-
-    /// Writes the file.
-    ///
-    /// # Errors
-    /// [`IoError::Unwritable`] where lengths do not fit the grid or the grid does not fit the format, else as
-    /// [`write_atomic`].
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
-        write_esdf(path, &self.grid, &self.distances, self.status.as_deref())
-    }
-}
-
-/// Writes an `esdf.bin` from slices; the layout is in the documentation of [`EsdfBin`]'s fields.
+/// Writes an `esdf.bin`: distances (metres, x fastest, NaN where unknown), and what each is worth as [`Status::byte`] has it.
 ///
 /// # Errors
-/// As [`EsdfBin::write`].
+/// [`IoError::Unwritable`] where lengths do not fit the grid or the grid does not fit the format, else as
+/// [`write_atomic`].
 pub fn write_esdf<const D: usize>(
     path: impl AsRef<Path>,
     grid: &Grid<D>,
@@ -86,7 +60,7 @@ pub fn write_esdf<const D: usize>(
 /// The same as bytes in memory.
 ///
 /// # Errors
-/// [`IoError::Unwritable`] as [`EsdfBin::write`].
+/// [`IoError::Unwritable`] as [`write_esdf`].
 pub fn esdf_to_bytes<const D: usize>(
     grid: &Grid<D>,
     distances: &[f32],
@@ -214,7 +188,7 @@ fn body<const D: usize>(
     mut reader: impl Read,
     length: u64,
     path: &Path,
-) -> Result<EsdfBin<D>, IoError> {
+) -> Result<EsdfGrid<D>, IoError> {
     let bad = |at: u64, field: &str, value: String, advice: &str| {
         Err(IoError::binary(path, at, field, value, advice))
     };
@@ -271,18 +245,21 @@ fn body<const D: usize>(
         distances.extend(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
         left -= now;
     }
-    let mut status = None;
-    if flags == 1 {
+    let grid = Grid::new(origin, resolution, std::array::from_fn(|k| shape[k] as usize));
+    let field = if flags == 1 {
         let mut plane = vec![0; cells as usize];
         reader.read_exact(&mut plane).map_err(failed)?;
-        if let Some(i) = plane.iter().position(|&s| s > 2) {
+        let of_byte = |&s: &u8| Status::of_byte(s).filter(|s| *s != Status::Outside);
+        if let Some(i) = plane.iter().position(|s| of_byte(s).is_none()) {
             let at = HEADER + 4 * cells + i as u64;
             return bad(at, "a status", plane[i].to_string(), "0 unknown, 1 known, 2 saturated");
         }
-        status = Some(plane);
-    }
-    let grid = Grid::new(origin, resolution, std::array::from_fn(|k| shape[k] as usize));
-    Ok(EsdfBin { grid, distances, status })
+        EsdfGrid::with_status(grid, distances, plane.iter().filter_map(of_byte).collect())
+    } else {
+        EsdfGrid::from_samples(grid, distances)
+    };
+    // One sample and one status a cell were read.
+    field.map_err(|e| IoError::binary(path, 16, "the shape", format!("{shape:?}"), e.to_string()))
 }
 
 #[cfg(test)]
@@ -290,18 +267,26 @@ mod tests {
     use super::*;
     use crate::testing::{Random, bad_bytes};
 
-    fn field<const D: usize>(shape: [usize; D], with_status: bool) -> EsdfBin<D> {
+    fn field<const D: usize>(shape: [usize; D], with_status: bool) -> EsdfGrid<D> {
         let mut random = Random(4);
         let grid = Grid::new(std::array::from_fn(|k| 500_000.0 - 0.1 * k as f64), 0.05, shape);
         let distances = (0..grid.len()).map(|_| random.unit() as f32 - 0.5).collect();
-        let status = with_status.then(|| (0..grid.len()).map(|_| random.below(3) as u8).collect());
-        EsdfBin { grid, distances, status }
+        if !with_status {
+            return EsdfGrid::from_samples(grid, distances).unwrap();
+        }
+        let status = (0..grid.len()).map(|_| Status::of_byte(random.below(3) as u8).unwrap()).collect();
+        EsdfGrid::with_status(grid, distances, status).unwrap()
     }
 
-    fn bytes_of<const D: usize>(field: &EsdfBin<D>) -> Vec<u8> {
+    fn write<const D: usize>(field: &EsdfGrid<D>, path: &Path) {
+        let status = field.has_status().then(|| field.status_bytes());
+        write_esdf(path, field.grid(), field.samples(), status.as_deref()).unwrap();
+    }
+
+    fn bytes_of<const D: usize>(field: &EsdfGrid<D>) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("esdf.bin");
-        field.write(&path).unwrap();
+        write(field, &path);
         let bytes = std::fs::read(&path).unwrap();
         // As text: NaN does not equal itself.
         let [read, parsed] = [EsdfFile::read(&path), EsdfFile::parse(&bytes, &path)].map(Result::unwrap);
@@ -311,24 +296,26 @@ mod tests {
 
     #[test]
     fn round_trips_in_both_dimensions() {
+        let read = |bytes: &[u8]| format!("{:?}", EsdfFile::parse(bytes, "e".as_ref()).unwrap());
         for with_status in [false, true] {
             let two = field([7, 5], with_status);
-            assert_eq!(EsdfFile::parse(&bytes_of(&two), "e".as_ref()).unwrap(), EsdfFile::Two(two));
+            assert_eq!(read(&bytes_of(&two)), format!("{:?}", EsdfFile::Two(two)));
             let three = field([30, 50, 30], with_status);
-            assert_eq!(EsdfFile::parse(&bytes_of(&three), "e".as_ref()).unwrap(), EsdfFile::Three(three));
+            assert_eq!(read(&bytes_of(&three)), format!("{:?}", EsdfFile::Three(three)));
         }
-        let mut unknown = field([1, 1], false);
-        unknown.distances[0] = f32::NAN;
+        let grid = Grid::new([0.0; 2], 0.5, [1, 1]);
+        let unknown = EsdfGrid::from_samples(grid, vec![f32::NAN]).unwrap();
         let EsdfFile::Two(read) = EsdfFile::parse(&bytes_of(&unknown), "e".as_ref()).unwrap() else {
             panic!()
         };
-        assert!(read.distances[0].is_nan());
+        assert!(read.samples()[0].is_nan());
     }
 
     #[test]
     fn the_header_is_the_documented_one() {
         let grid = Grid::new([-1.0, 2.0], 0.5, [2, 1]);
-        let bytes = bytes_of(&EsdfBin { grid, distances: vec![1.0, -2.0], status: Some(vec![1, 2]) });
+        let status = vec![Status::Known, Status::Saturated];
+        let bytes = bytes_of(&EsdfGrid::with_status(grid, vec![1.0, -2.0], status).unwrap());
         let mut expected = b"PORTESDF\x01\0\0\0\x02\0\0\0\x02\0\0\0\x01\0\0\0\x01\0\0\0\x01\0\0\0".to_vec();
         expected.extend(b"\0\0\0\0\0\0\xf0\xbf\0\0\0\0\0\0\0\x40\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xe0\x3f");
         assert_eq!(expected.len(), 64);

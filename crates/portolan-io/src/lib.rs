@@ -62,9 +62,7 @@ mod svg;
 mod testing;
 mod xyz;
 
-pub use answer_row::{
-    AnswerRow, AnswerStatus, HELD_BACK, certified_reach, write_answer, write_answer_header,
-};
+pub use answer_row::{AnswerRow, HELD_BACK, certified_reach, write_answer, write_answer_header};
 pub use bytes::{Compression, Input, open, write_atomic};
 pub use carmen::{
     CarmenLog, CarmenScan, CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage, TimeOrder,
@@ -74,7 +72,7 @@ pub use container::{Chunk, Container, ContainerWriter};
 pub use costmap::write_costmap;
 pub use detect::{FileKind, detect};
 pub use error::IoError;
-pub use esdf_bin::{EsdfBin, EsdfFile, esdf_to_bytes, write_esdf};
+pub use esdf_bin::{EsdfFile, esdf_to_bytes, write_esdf};
 pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use log_writer::{LogLayout, LogWriter};

@@ -9,7 +9,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::{DistanceBrick, SignedDistance};
-use portolan::field::{EsdfMethod, SparseEsdf, SparseEsdfSettings, squared_distance_transform};
+use portolan::field::{Esdf, EsdfMethod, EsdfSettings, squared_distance_transform};
 use portolan::geom::{BlockKey, Lattice};
 use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::store::{Bricks, Store};
@@ -31,8 +31,8 @@ static BAND: LazyLock<Bricks<SignedDistance, 3>> = LazyLock::new(|| floor(CELLS,
 /// Walls at the ends of x; neither floor nor ceiling.
 static HALL: LazyLock<Bricks<SignedDistance, 3>> =
     LazyLock::new(|| floor([1000, 320, 64], false, |[x, _, _]| (x - 0.12).min(49.88 - x)));
-static FIELD: LazyLock<SparseEsdf<3>> = LazyLock::new(|| {
-    let field = SparseEsdf::of(&CARVED, &SparseEsdfSettings::default());
+static FIELD: LazyLock<Esdf<3>> = LazyLock::new(|| {
+    let field = Esdf::of(&*CARVED, &EsdfSettings::default());
     field.measure();
     field
 });
@@ -104,7 +104,7 @@ fn band_1m(bencher: Bencher, threads: usize) {
 }
 
 fn of(bencher: Bencher, bricks: &Bricks<SignedDistance, 3>, max_distance: f64, threads: usize) {
-    by(bencher, bricks, max_distance, EsdfMethod::Seeded { band_cells: 1.5 }, threads);
+    by(bencher, bricks, max_distance, EsdfMethod::TEXTBOOK, threads);
 }
 
 fn by(
@@ -114,9 +114,9 @@ fn by(
     method: EsdfMethod,
     threads: usize,
 ) {
-    let settings = SparseEsdfSettings { max_distance, method, ..Default::default() };
+    let settings = EsdfSettings { max_distance, method, ..Default::default() };
     let pool = pool(threads);
-    bencher.counter(cells(bricks)).bench(|| pool.install(|| SparseEsdf::of(bricks, &settings)));
+    bencher.counter(cells(bricks)).bench(|| pool.install(|| Esdf::of(bricks, &settings)));
 }
 
 #[divan::bench(args = [1, 2], max_time = 5)]
@@ -147,9 +147,9 @@ fn mask_carved_1m(bencher: Bencher) {
 /// Distances of all cells to the segments and triangles, which are otherwise measured when they are read.
 #[divan::bench(args = [1, 2], max_time = 5)]
 fn measure_carved_1m(bencher: Bencher, threads: usize) {
-    let settings = SparseEsdfSettings::default();
+    let settings = EsdfSettings::default();
     let pool = pool(threads);
-    bencher.counter(cells(&CARVED)).with_inputs(|| SparseEsdf::of(&CARVED, &settings)).bench_local_values(
+    bencher.counter(cells(&CARVED)).with_inputs(|| Esdf::of(&*CARVED, &settings)).bench_local_values(
         |esdf| {
             pool.install(|| esdf.measure());
             esdf
@@ -187,9 +187,8 @@ fn one_depth_frame_measured(bencher: Bencher, (max_distance, threads): (f64, usi
 
 fn follow(bencher: Bencher, max_distance: f64, threads: usize, measure: bool) {
     let [before, after] = &*WALK;
-    let min_weight = 0.5 * TsdfConfig::<3>::default().weights.typical_low();
-    let settings = SparseEsdfSettings { min_weight, max_distance, ..Default::default() };
-    let esdf = SparseEsdf::of(before.store(), &settings);
+    let settings = EsdfSettings { max_distance, ..Default::default() };
+    let esdf = Esdf::of(before, &settings);
     esdf.measure();
     let update = esdf.clone().update(after.store());
     let pool = pool(threads);

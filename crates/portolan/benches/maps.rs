@@ -5,7 +5,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::OccupancyModel;
-use portolan::field::{Esdf2, esdf_from_tsdf};
+use portolan::field::{EsdfGrid, esdf_from_tsdf};
 use portolan::geom::{Grid, Pose};
 use portolan::map::{Cloud, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
 use portolan::scan::Scan;
@@ -93,7 +93,7 @@ mod derive {
     use super::*;
 
     #[divan::bench]
-    fn esdf() -> Esdf2 {
+    fn esdf() -> EsdfGrid<2> {
         esdf_from_tsdf(black_box(&TSDF), 0.5, 1.5)
     }
 

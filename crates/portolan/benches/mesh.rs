@@ -79,18 +79,18 @@ fn array_with_normals(bencher: Bencher, threads: usize) {
 fn bricks(bencher: Bencher, threads: usize) {
     let pool = pool(threads);
     let settings = MeshSettings { normals: false, colors: false, ..Default::default() };
-    let triangles = marching_cubes(&BRICKS, None, &settings).triangles.len();
+    let triangles = marching_cubes(&*BRICKS, None, &settings).triangles.len();
     bencher
         .counter(ItemsCount::new(triangles))
-        .bench(|| pool.install(|| marching_cubes(black_box(&BRICKS), None, &settings)));
+        .bench(|| pool.install(|| marching_cubes(black_box(&*BRICKS), None, &settings)));
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10)]
 fn bricks_with_normals_and_colors(bencher: Bencher, threads: usize) {
     let pool = pool(threads);
     let settings = MeshSettings::default();
-    let triangles = marching_cubes(&BRICKS, None, &settings).triangles.len();
+    let triangles = marching_cubes(&*BRICKS, None, &settings).triangles.len();
     bencher
         .counter(ItemsCount::new(triangles))
-        .bench(|| pool.install(|| marching_cubes(black_box(&BRICKS), Some(&COLORS), &settings)));
+        .bench(|| pool.install(|| marching_cubes(black_box(&*BRICKS), Some(&COLORS), &settings)));
 }

@@ -1,6 +1,6 @@
-//! What a map says when asked.
+//! What a map answers when asked.
 
-/// An answer that says what it is. Unknown is never a number.
+/// An answer and what it is worth. Unknown is never a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer<T> {
     /// The map knows.
@@ -13,12 +13,36 @@ pub enum Answer<T> {
     Outside,
 }
 
+/// What an [`Answer`] is, without its value. In a byte, as batches, arrays and files hold it: 0 unknown, 1 known,
+/// 2 saturated, 3 outside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Status {
+    /// Inside the map, where nothing was observed.
+    #[default]
+    Unknown = 0,
+    /// The map knows.
+    Known = 1,
+    /// Beyond what the map maintains: at least so far.
+    Saturated = 2,
+    /// Outside of the map.
+    Outside = 3,
+}
+
 impl<T> Answer<T> {
     /// The value where it is known.
     pub fn known(self) -> Option<T> {
         match self {
             Self::Known(value) => Some(value),
             _ => None,
+        }
+    }
+
+    /// The value where there is one: known, or at least so much.
+    pub fn value(self) -> Option<T> {
+        match self {
+            Self::Known(value) | Self::Saturated(value) => Some(value),
+            Self::Unknown | Self::Outside => None,
         }
     }
 
@@ -32,13 +56,57 @@ impl<T> Answer<T> {
         }
     }
 
-    /// `known`, `saturated`, `unknown` or `outside`.
-    pub fn status(&self) -> &'static str {
+    /// What the answer is.
+    pub fn status(&self) -> Status {
         match self {
-            Self::Known(_) => "known",
-            Self::Saturated(_) => "saturated",
+            Self::Known(_) => Status::Known,
+            Self::Saturated(_) => Status::Saturated,
+            Self::Unknown => Status::Unknown,
+            Self::Outside => Status::Outside,
+        }
+    }
+}
+
+impl Status {
+    /// Of a byte; `None` above 3.
+    pub fn of_byte(byte: u8) -> Option<Self> {
+        [Self::Unknown, Self::Known, Self::Saturated, Self::Outside].get(usize::from(byte)).copied()
+    }
+
+    /// In a byte.
+    pub fn byte(self) -> u8 {
+        self as u8
+    }
+
+    /// `known`, `saturated`, `unknown` or `outside`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Known => "known",
+            Self::Saturated => "saturated",
             Self::Unknown => "unknown",
             Self::Outside => "outside",
         }
+    }
+
+    /// Whether there is a value: known or saturated.
+    pub fn has_value(self) -> bool {
+        matches!(self, Self::Known | Self::Saturated)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_and_words_are_those_of_files() {
+        let words = ["unknown", "known", "saturated", "outside"];
+        for (byte, word) in (0..4).zip(words) {
+            let status = Status::of_byte(byte).unwrap();
+            assert_eq!((status.byte(), status.word()), (byte, word));
+        }
+        assert_eq!(Status::of_byte(4), None);
+        assert_eq!(Answer::Saturated(3).map(|v| v + 1).status(), Status::Saturated);
+        assert_eq!((Answer::Saturated(3).value(), Answer::<u8>::Unknown.value()), (Some(3), None));
     }
 }

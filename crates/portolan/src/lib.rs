@@ -51,4 +51,4 @@ pub mod store;
 pub mod surface;
 pub mod sweep;
 
-pub use answer::Answer;
+pub use answer::{Answer, Status};

@@ -7,7 +7,7 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use portolan::field::{EsdfMethod, SparseEsdf, SparseEsdfSettings};
+use portolan::field::{Esdf, EsdfMethod, EsdfSettings};
 use portolan::geom::{Lattice, block_cells, vector};
 use portolan::map::BeamSweep;
 use portolan::surface::{ContourSettings, MeshSettings, NearestSurface, marching_cubes, marching_squares};
@@ -19,7 +19,7 @@ struct Errors(Vec<(f64, f64)>);
 
 impl Errors {
     /// Of every node that the field knows, or one of `every` of them.
-    fn of<const D: usize>(esdf: &SparseEsdf<D>, every: u64, exact: impl Fn([f64; D]) -> Option<f64>) -> Self {
+    fn of<const D: usize>(esdf: &Esdf<D>, every: u64, exact: impl Fn([f64; D]) -> Option<f64>) -> Self {
         let mut random = Random(1);
         let mut errors = Self::default();
         let r = esdf.lattice().resolution;
@@ -65,7 +65,7 @@ fn nodes_of_the_room(spoiled: Spoiled, share: f64, name: &str) {
     let store = room(112, [-40, 3, 0], Lattice::new([0.0; 3], 0.05), spoiled);
     let mesh = marching_cubes(&store, None, &MeshSettings::default());
     let nearest = NearestSurface::of_mesh(&mesh);
-    let esdf = SparseEsdf::of(&store, &SparseEsdfSettings::default());
+    let esdf = Esdf::of(&store, &EsdfSettings::default());
     Errors::of(&esdf, 4, |p| nearest.distance(p)).assert_exact(name, share);
 }
 
@@ -85,8 +85,8 @@ fn nodes_of_the_apartment_are_exact() {
     let settings = ContourSettings::of(&tsdf);
     let contour = marching_squares(&tsdf, &settings);
     let segments = Segments::of(&contour, 0.1);
-    let settings = SparseEsdfSettings { min_weight: settings.min_weight, ..Default::default() };
-    let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
+    let settings = EsdfSettings { min_weight: settings.min_weight, ..Default::default() };
+    let esdf = Esdf::of(&tsdf, &settings);
     Errors::of(&esdf, 1, |p| segments.distance(p)).assert_exact("apartment", 0.999);
 }
 
@@ -98,11 +98,11 @@ fn distances_of_the_apartment_by_every_method() {
     let settings = ContourSettings::of(&tsdf);
     let segments = Segments::of(&marching_squares(&tsdf, &settings), 0.1);
     let min_weight = settings.min_weight;
-    let methods = [EsdfMethod::Accurate, EsdfMethod::Seeded { band_cells: 1.5 }, EsdfMethod::Mask];
+    let methods = [EsdfMethod::Accurate, EsdfMethod::TEXTBOOK, EsdfMethod::Mask];
     let mut medians = Vec::new();
     for method in methods {
-        let settings = SparseEsdfSettings { min_weight, method, max_distance: 5.0, ..Default::default() };
-        let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
+        let settings = EsdfSettings { min_weight, method, max_distance: 5.0, ..Default::default() };
+        let esdf = Esdf::of(&tsdf, &settings);
         let (mut contour, mut walls, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
         for p in common::points(100_000) {
             let exact = segments.distance(p).unwrap();
@@ -134,9 +134,9 @@ fn distances_in_space_by_every_method() {
     let mut random = Random(2);
     let probes: Vec<[f64; 3]> = (0..60_000).map(|_| std::array::from_fn(|_| 5.6 * random.unit())).collect();
     let mut medians = Vec::new();
-    for method in [EsdfMethod::Accurate, EsdfMethod::Seeded { band_cells: 1.5 }, EsdfMethod::Mask] {
-        let settings = SparseEsdfSettings { method, max_distance: 2.0, ..Default::default() };
-        let esdf = SparseEsdf::of(&store, &settings);
+    for method in [EsdfMethod::Accurate, EsdfMethod::TEXTBOOK, EsdfMethod::Mask] {
+        let settings = EsdfSettings { method, max_distance: 2.0, ..Default::default() };
+        let esdf = Esdf::of(&store, &settings);
         let (mut errors, mut slopes) = (Vec::new(), Vec::new());
         for &p in &probes {
             let exact = nearest.distance(p).unwrap();

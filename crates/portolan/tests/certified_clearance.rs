@@ -10,7 +10,7 @@ mod scenes;
 use common::quantile;
 use portolan::Answer;
 use portolan::cell::SignedDistance;
-use portolan::field::{Clearance, ClearanceField, EsdfMethod, SparseEsdf, SparseEsdfSettings, UnknownSpace};
+use portolan::field::{Clearance, ClearanceField, Esdf, EsdfMethod, EsdfSettings, UnknownSpace};
 use portolan::geom::{BlockKey, Grid, Lattice, block_cells, vector};
 use portolan::map::{BeamSweep, Tsdf2, TsdfConfig};
 use portolan::store::{Bricks, Store};
@@ -21,7 +21,7 @@ use scenes::{Random, Segments, Spoiled, bricks, room};
 /// on the surface's corners and simplices, and close to all of these.
 struct Probes<'a, const D: usize> {
     random: Random,
-    esdf: &'a SparseEsdf<D>,
+    esdf: &'a Esdf<D>,
     keys: Vec<BlockKey<D>>,
     /// Corners of the simplices.
     simplices: &'a [[[f64; D]; D]],
@@ -95,7 +95,7 @@ impl Slack {
 }
 
 /// Bounds that are only as narrow as a demand needs are bounds, and decide what the narrow ones do.
-fn decides_alike<const D: usize>(esdf: &SparseEsdf<D>, p: [f64; D], exact: f64, narrow: &Clearance) {
+fn decides_alike<const D: usize>(esdf: &Esdf<D>, p: [f64; D], exact: f64, narrow: &Clearance) {
     for enough in [0.0, 0.5 * exact, exact - 0.001, exact - 0.02, exact + 0.001, exact + 0.02, 2.0 * exact] {
         let wide = esdf.clearance_against(p, UnknownSpace::Optimistic, enough).known().unwrap();
         assert!(wide.lower <= exact && exact <= wide.upper && wide.inside == narrow.inside);
@@ -107,7 +107,7 @@ fn decides_alike<const D: usize>(esdf: &SparseEsdf<D>, p: [f64; D], exact: f64, 
 /// Asks at a million points; exact distances to the surface are `exact`.
 fn no_bound_is_violated<const D: usize>(
     name: &str,
-    esdf: &SparseEsdf<D>,
+    esdf: &Esdf<D>,
     simplices: &[[[f64; D]; D]],
     exact: impl Fn([f64; D]) -> Option<f64>,
 ) {
@@ -153,7 +153,7 @@ fn of_the_room(name: &str, origin: [f64; 3], spoiled: Spoiled) {
     let store = room(112, [-40, 3, 0], Lattice::new(origin, 0.05), spoiled);
     let mesh = marching_cubes(&store, None, &MeshSettings::default());
     let nearest = NearestSurface::of_mesh(&mesh);
-    let esdf = SparseEsdf::of(&store, &SparseEsdfSettings::default());
+    let esdf = Esdf::of(&store, &EsdfSettings::default());
     let simplices: Vec<_> = mesh.triangles.iter().map(|&t| mesh.corners_world(t)).collect();
     no_bound_is_violated(name, &esdf, &simplices, |p| nearest.distance(p));
 }
@@ -174,8 +174,8 @@ fn bounds_hold_in_the_apartment() {
     let settings = ContourSettings::of(&tsdf);
     let contour = marching_squares(&tsdf, &settings);
     let segments = Segments::of(&contour, 0.1);
-    let settings = SparseEsdfSettings { min_weight: settings.min_weight, ..Default::default() };
-    let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
+    let settings = EsdfSettings { min_weight: settings.min_weight, ..Default::default() };
+    let esdf = Esdf::of(&tsdf, &settings);
     let simplices: Vec<_> = contour.ends().collect();
     no_bound_is_violated("apartment", &esdf, &simplices, |p| segments.distance(p));
 }
@@ -198,8 +198,8 @@ fn unknown_cells_are_bounded<const D: usize>(
         }
     });
     let exact = surface(&store);
-    let settings = SparseEsdfSettings { max_distance: 0.9, unknown: true, ..Default::default() };
-    let esdf = SparseEsdf::of(&store, &settings);
+    let settings = EsdfSettings { max_distance: 0.9, unknown: true, ..Default::default() };
+    let esdf = Esdf::of(&store, &settings);
     // Unknown cells in and around the box, further than any answer.
     let all = shape + 24;
     let cells = (0..all.pow(D as u32))
@@ -273,7 +273,7 @@ fn unknown_cells_are_bounded_in_space() {
 #[test]
 fn nothing_near_and_nothing_at_all() {
     let store = bricks(Lattice::new([0.0; 3], 0.1), [0; 3], 16, |_| 0.3);
-    let esdf = SparseEsdf::of(&store, &SparseEsdfSettings { unknown: true, ..Default::default() });
+    let esdf = Esdf::of(&store, &EsdfSettings { unknown: true, ..Default::default() });
     let ask = |p: [f64; 3]| UNKNOWN.map(|u| esdf.clearance(p, u));
     let free = ask([0.83; 3]);
     assert!(
@@ -286,8 +286,8 @@ fn nothing_near_and_nothing_at_all() {
         assert_eq!(esdf.unknown_distance(p), Answer::Outside);
     }
     assert_eq!(ask([-0.2; 3])[0], Answer::Unknown);
-    let seeded = SparseEsdfSettings { method: EsdfMethod::Mask, ..Default::default() };
-    let seeded = SparseEsdf::of(&store, &seeded);
+    let seeded = EsdfSettings { method: EsdfMethod::Mask, ..Default::default() };
+    let seeded = Esdf::of(&store, &seeded);
     assert_eq!(UNKNOWN.map(|u| seeded.clearance([0.83; 3], u)), [Answer::Unknown; 2]);
 }
 

@@ -7,7 +7,7 @@ mod common;
 mod scenes;
 
 use common::{apartment, points, tsdf};
-use portolan::field::{SparseEsdf, SparseEsdfSettings};
+use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::{Pose, vector};
 use portolan::map::{BeamSweep, Tsdf2, Tsdf3, TsdfConfig};
 use portolan::plan::{
@@ -21,10 +21,10 @@ use scenes::{Random, Segments};
 use std::sync::LazyLock;
 
 /// The Apartment at 5 cm, its field up to one metre, and the contour it is about.
-static APARTMENT: LazyLock<(Tsdf2, SparseEsdf<2>, Segments)> = LazyLock::new(|| {
-    let tsdf = tsdf(BeamSweep::CellCentre, true, &apartment().log);
-    let settings = SparseEsdfSettings { unknown: true, ..Default::default() };
-    let esdf = SparseEsdf::of_tsdf(&tsdf, &settings);
+static APARTMENT: LazyLock<(Tsdf2, Esdf<2>, Segments)> = LazyLock::new(|| {
+    let tsdf = tsdf(SweepKind::CellCentre, true, &apartment().log);
+    let settings = EsdfSettings { unknown: true, ..Default::default() };
+    let esdf = Esdf::of(&tsdf, &settings);
     let contour = ContourSettings { min_weight: settings.min_weight, ..Default::default() };
     let segments = Segments::of(&marching_squares(&tsdf, &contour), 0.1);
     (tsdf, esdf, segments)
@@ -149,8 +149,8 @@ fn certified_motions_through_the_building_keep_their_clearance() {
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();
     }
-    let settings = SparseEsdfSettings { unknown: true, ..Default::default() };
-    let esdf = SparseEsdf::of(map.store(), &settings);
+    let settings = EsdfSettings { unknown: true, ..Default::default() };
+    let esdf = Esdf::of(map.store(), &settings);
     let mesh = MeshSettings { min_weight: settings.min_weight, ..Default::default() };
     let surface = NearestSurface::of_mesh(&marching_cubes(map.store(), None, &mesh));
     // A drone: a ball in the middle, four around it.

@@ -113,7 +113,7 @@ pub(super) fn sign_of(field: &Esdf2, p: [f64; 2]) -> Option<f64> {
 }
 
 /// Where a distance field is zero.
-pub(super) fn zero_of(field: &Esdf2) -> Contour {
+pub(super) fn zero_of(field: &crate::field::EsdfGrid<2>) -> Contour {
     let samples = field.samples();
     level_set(field.grid(), samples, |i| !samples[i].is_nan(), Ambiguity::Decide)
 }

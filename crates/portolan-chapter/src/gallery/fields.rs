@@ -1,10 +1,9 @@
 //! One distance field by each method.
 
 use super::probes::{Clock, seconds_of};
-use portolan::field::{Esdf2, EsdfMethod, EsdfSettings, SparseEsdfSettings};
-use portolan::geom::vector;
-use portolan::map::Tsdf2;
-use portolan_sim::ErrorSummary;
+use crate::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings};
+use crate::geom::vector;
+use crate::map::Tsdf2;
 
 /// A distance field of the TSDF, and how far to trust it.
 #[derive(Debug)]
@@ -12,7 +11,7 @@ pub struct MeasuredField {
     /// How it was made.
     pub method: EsdfMethod,
     /// Distances at the cell centres.
-    pub field: Esdf2,
+    pub field: EsdfGrid<2>,
     /// Seconds of a full rebuild.
     pub seconds: f64,
     /// Interpolated distance less the exact distance to the extracted contour (metres), at observed free points more than
@@ -38,15 +37,9 @@ impl MeasuredField {
 /// The field by every method, the accurate one first.
 pub(super) fn fields_of(clock: &mut Clock<'_>, tsdf: &Tsdf2, settings: &EsdfSettings) -> [MeasuredField; 3] {
     let max_distance = vector::norm(tsdf.grid().aabb().extent()).max(tsdf.grid().lattice.resolution);
-    let seeded = EsdfMethod::Seeded { band_cells: settings.band_cells as f32 };
-    [EsdfMethod::Accurate, seeded, EsdfMethod::Mask].map(|method| {
-        let how = SparseEsdfSettings {
-            min_weight: settings.min_weight,
-            max_distance,
-            method,
-            ..Default::default()
-        };
-        let (seconds, field) = seconds_of(clock, || Esdf2::of_tsdf(tsdf, &how));
+    [EsdfMethod::Accurate, EsdfMethod::TEXTBOOK, EsdfMethod::Mask].map(|method| {
+        let how = EsdfSettings { max_distance, method, unknown: false, ..*settings };
+        let (seconds, field) = seconds_of(clock, || Esdf::of(tsdf, &how).dense(tsdf.grid()));
         let (against_contour, against_truth, gradient) = (None, None, f64::NAN);
         MeasuredField { method, field, seconds, against_contour, against_truth, gradient }
     })
@@ -54,7 +47,7 @@ pub(super) fn fields_of(clock: &mut Clock<'_>, tsdf: &Tsdf2, settings: &EsdfSett
 
 /// Error at these points against their exact distances to the contour, where those are more than 5 cm.
 pub(super) fn against_contour(
-    field: &Esdf2,
+    field: &EsdfGrid<2>,
     probes: &[[f64; 2]],
     exact: &[Option<f64>],
 ) -> Option<ErrorSummary> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::cell::{DistancePlanes, LogOdds8, LogOddsValue, OccupancyModel};
-use portolan::field::{DenseEsdf, Esdf};
+use portolan::field::EsdfGrid;
 use portolan::geom::{Grid, Pose};
 use portolan::map::{OccupancyGrid, Tsdf, TsdfConfig};
 use portolan::store::Dense;
@@ -87,23 +87,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Source::Server(map) => convert_server(map, target, args)?,
         Source::Esdf(EsdfFile::Two(field)) => {
             if target == Target::Esdf {
-                field.write(&args.out)?; // the same file, its status plane included
-                true
+                write_whole(field, args)?
             } else {
-                let mut samples = field.distances.clone();
-                let status = field.status.iter().flatten();
-                samples
-                    .iter_mut()
-                    .zip(status)
-                    .filter(|(_, s)| **s == portolan_io::EsdfBin::<2>::UNKNOWN)
-                    .for_each(|(d, _)| *d = f32::NAN);
-                convert_esdf(&Esdf::from_samples(field.grid, samples)?, target, args)?
+                convert_esdf(field, target, args)?
             }
         }
-        Source::Esdf(EsdfFile::Three(field)) if target == Target::Esdf => {
-            field.write(&args.out)?;
-            true
-        }
+        Source::Esdf(EsdfFile::Three(field)) if target == Target::Esdf => write_whole(field, args)?,
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
         Source::Octomap(file) => convert_octomap(file, target, args)?,
         Source::SpaceMap(file) => space::convert(file, target, args)?,
@@ -225,7 +214,7 @@ fn convert_octomap(file: &OctomapTree, target: Target, args: &Args) -> anyhow::R
     Ok(true)
 }
 
-fn convert_esdf(esdf: &Esdf<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
+fn convert_esdf(esdf: &EsdfGrid<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match target {
         Target::MapServer => {
             let cell = |d: &f32| match d {
@@ -242,8 +231,8 @@ fn convert_esdf(esdf: &Esdf<2>, target: Target, args: &Args) -> anyhow::Result<b
     Ok(true)
 }
 
-fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> Esdf<2> {
-    Esdf::from_mask(grid, |i| match cells[i] {
+fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> EsdfGrid<2> {
+    EsdfGrid::from_mask(grid, |i| match cells[i] {
         MapCell::Occupied => Some(true),
         MapCell::Free => Some(false),
         MapCell::Unknown => None,
@@ -263,10 +252,17 @@ fn write_field_as(field: &Field, target: Target, args: &Args) -> anyhow::Result<
     Ok(true)
 }
 
-fn write_dense<const D: usize>(field: &DenseEsdf<D>, args: &Args) -> anyhow::Result<()> {
+/// The same file: statuses only where it has them.
+fn write_whole<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Result<bool> {
+    let status = field.has_status().then(|| field.status_bytes());
+    write_esdf(&args.out, field.grid(), field.samples(), status.as_deref())?;
+    Ok(true)
+}
+
+fn write_dense<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Result<()> {
     // In space the status has always been written.
-    let status = if D == 3 { Some(&field.status[..]) } else { status_plane(field) };
-    Ok(write_esdf(&args.out, &field.grid, &field.distances, status)?)
+    let status = if D == 3 { Some(field.status_bytes()) } else { status_plane(field) };
+    Ok(write_esdf(&args.out, field.grid(), field.samples(), status.as_deref())?)
 }
 
 impl Args {
@@ -313,7 +309,7 @@ fn write_lines(contour: &Contour, args: &Args) -> anyhow::Result<bool> {
 }
 
 /// The zero level set of a distance field.
-fn contour_of(esdf: &Esdf<2>) -> anyhow::Result<Contour> {
+fn contour_of(esdf: &EsdfGrid<2>) -> anyhow::Result<Contour> {
     let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
     let (distances, weights) = esdf.samples().iter().map(known).unzip();
     let planes = DistancePlanes::from_parts(distances, weights);

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use portolan::field::EsdfSettings;
 use portolan::geom::vector::distance;
 use portolan::surface::{
     Contour, ContourSettings, RayCast, RayCastSettings, cast_ray, doubled_length, marching_squares,
@@ -133,7 +132,6 @@ fn predict(args: &Args, file: &MapFile<2>, path: &Path) -> anyhow::Result<Value>
     }
 
     let resolution = tsdf.grid().lattice.resolution;
-    let min_weight = EsdfSettings::of(tsdf).min_weight;
     let mut errors = Vec::new();
     let (mut hits, mut unknown, mut outside, mut free) = (0u64, 0u64, 0u64, 0u64);
     let progress = Progress::new(scans.len(), "predicting", args.output);
@@ -142,8 +140,7 @@ fn predict(args: &Args, file: &MapFile<2>, path: &Path) -> anyhow::Result<Value>
         for beam in scan.beams().filter(|b| b.is_hit()) {
             hits += 1;
             let direction = world_from_sensor.rotate(beam.direction);
-            let settings =
-                RayCastSettings { min_weight, unknown_tolerance: 2.0 * resolution, ..Default::default() };
+            let settings = RayCastSettings { unknown_tolerance: 2.0 * resolution, ..Default::default() };
             match cast_ray(tsdf, world_from_sensor.translation, direction, &settings) {
                 RayCast::Hit(range) => errors.push(range - beam.range),
                 RayCast::Unknown(_) => unknown += 1,

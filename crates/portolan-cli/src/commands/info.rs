@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use portolan::Status;
+use portolan::field::EsdfGrid;
 use portolan::geom::{Aabb, Grid};
 use portolan::store::Store;
-use portolan_io::{CarmenLog, EsdfBin, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
+use portolan_io::{CarmenLog, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
 use portolan_io::{OctomapTree, Polyline, detect_no_return};
 use serde_json::{Value, json};
 
@@ -133,14 +135,14 @@ fn of_map(file: &MapFile<2>) -> Value {
     })
 }
 
-fn of_esdf<const D: usize>(field: &EsdfBin<D>) -> Value {
-    let known = || field.distances.iter().copied().filter(|d| !d.is_nan());
-    let count = |status: u8| field.status.as_ref().map(|s| s.iter().filter(|&&v| v == status).count());
+fn of_esdf<const D: usize>(field: &EsdfGrid<D>) -> Value {
+    let known = || field.samples().iter().copied().filter(|d| !d.is_nan());
+    let saturated = || (0..field.samples().len()).filter(|&i| field.status(i) == Status::Saturated).count();
     json!({
         "dimension": D,
-        "extent": json::grid::<D>(&field.grid),
+        "extent": json::grid::<D>(field.grid()),
         "known": known().count(),
-        "saturated": count(EsdfBin::<D>::SATURATED),
+        "saturated": field.has_status().then(saturated),
         "smallest": known().min_by(f32::total_cmp),
         "largest": known().max_by(f32::total_cmp),
     })

@@ -55,8 +55,8 @@ fn no_tsdf(args: &Args) -> anyhow::Error {
 fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let ambiguity = if args.fixed_table { Ambiguity::FixedTable } else { Ambiguity::Decide };
-    let min_weight = args.min_weight.unwrap_or(ContourSettings::of(tsdf).min_weight);
-    let contour = marching_squares(tsdf, &ContourSettings { min_weight, ambiguity });
+    let min_weight = args.min_weight.unwrap_or(tsdf.thresholds().surface);
+    let contour = marching_squares(tsdf, &ContourSettings { min_weight: Some(min_weight), ambiguity });
     let lines = polylines(&contour);
     if !write_contour(&args.out, &lines)? {
         return Err(bad_call(format!("{}: give OUT the name .geojson or .svg", args.out.display())));
@@ -83,8 +83,8 @@ fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
     }
     let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
     let usual = mesh_settings(tsdf.weights);
-    let settings = MeshSettings { min_weight: args.min_weight.unwrap_or(usual.min_weight), ..usual };
-    let mesh = marching_cubes(&tsdf.store, file.color_bricks.as_ref().map(|c| &c.store), &settings);
+    let settings = MeshSettings { min_weight: args.min_weight.or(usual.min_weight), ..usual };
+    let mesh = marching_cubes(&tsdf.store, file.colors.as_ref().map(|c| &c.store), &settings);
     if !write_mesh(&args.out, &mesh)? {
         return Err(bad_call(format!("{}: give OUT the name .ply, .glb or .obj", args.out.display())));
     }

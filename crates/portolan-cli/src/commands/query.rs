@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Esdf, EsdfMethod, SparseEsdf, UnknownSpace};
+use portolan::field::{Esdf, EsdfGrid, EsdfMethod, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map::{OccupancySweep, SparseOccupancy};
 use portolan::store::Store;
 use portolan::sweep::OccupancySweep;
 use portolan_io::{
-    AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
-    certified_reach, write_answer, write_answer_header,
+    AnswerRow, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
+    SpaceMapFile, certified_reach, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
@@ -141,18 +141,14 @@ type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>
 
 /// Certified bounds of the distance.
 struct Certified<const D: usize> {
-    field: SparseEsdf<D>,
+    field: Esdf<D>,
     unknown: UnknownSpace,
     /// Where as much is certified, more is not said (metres).
     limit: f64,
 }
 
 /// What a field in bricks answers. Only the accurate method certifies.
-fn sparse<const D: usize>(
-    field: SparseEsdf<D>,
-    limit: f64,
-    args: &Args,
-) -> (Distance<D>, Option<Certified<D>>) {
+fn sparse<const D: usize>(field: Esdf<D>, limit: f64, args: &Args) -> (Distance<D>, Option<Certified<D>>) {
     let unknown = args.unknown.map_or(UnknownSpace::Optimistic, UnknownArg::space);
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
     let reach = certified_reach(&field);
@@ -161,7 +157,7 @@ fn sparse<const D: usize>(
     (Box::new(move |p| field.distance_and_gradient(p)), certified)
 }
 
-fn dense<const D: usize>(esdf: Esdf<D>) -> Distance<D> {
+fn dense<const D: usize>(esdf: EsdfGrid<D>) -> Distance<D> {
     Box::new(move |p| esdf.distance_and_gradient(p))
 }
 
@@ -169,8 +165,8 @@ impl Fields {
     fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
             Source::Map(file) => Self::Two(of_map(*file, args)),
-            Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
-            Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
+            Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)),
+            Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)),
             Source::Server(map) => Self::Two(of_server(map)),
             Source::SpaceMap(file) => Self::Three(of_space_map(*file, args)?),
             Source::Octomap(file) => Self::Three(of_octomap(*file)),
@@ -200,7 +196,7 @@ fn of_map(file: MapFile<2>, args: &Args) -> Field<2> {
     let of_grid = || {
         let map = file.grid.as_ref()?;
         let occupied = |i: usize| map.store().at(i).map(|v| v.0 > 0);
-        Some(Esdf::from_mask(*map.store().grid(), occupied))
+        Some(EsdfGrid::from_mask(*map.store().grid(), occupied))
     };
     let (distance, clearance) = match of_tsdf {
         Some((distance, clearance)) => (Some(distance), clearance),
@@ -225,7 +221,7 @@ fn of_space_map(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
         if how.method == EsdfMethod::Accurate {
             how.max_distance += HELD_BACK * map.store.lattice().resolution;
         }
-        sparse(SparseEsdf::of(&map.store, &how), max_distance, args)
+        sparse(Esdf::of(&map.store, &how), max_distance, args)
     });
     let (distance, clearance) =
         field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
@@ -246,20 +242,9 @@ fn of_space_map(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     Ok(Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY })
 }
 
-fn of_esdf<const D: usize>(file: EsdfBin<D>) -> anyhow::Result<Field<D>> {
-    let mut samples = file.distances;
-    if let Some(status) = &file.status {
-        let unknown = samples.iter_mut().zip(status).filter(|(_, s)| **s == EsdfBin::<D>::UNKNOWN);
-        unknown.for_each(|(d, _)| *d = f32::NAN);
-    }
-    let esdf = Esdf::from_samples(file.grid, samples)?;
+fn of_esdf<const D: usize>(esdf: EsdfGrid<D>) -> Field<D> {
     let occupancy: Occupancy<D> = Box::new(|_| Answer::Unknown);
-    let status = file.status;
-    let distance: Distance<D> = Box::new(move |p| match esdf.distance_and_gradient(p) {
-        Answer::Known(answer) if is_saturated(&esdf, status.as_deref(), p) => Answer::Saturated(answer),
-        answer => answer,
-    });
-    Ok(Field { distance: Some(distance), clearance: None, occupancy, world_from_field: Pose::IDENTITY })
+    Field { distance: Some(dense(esdf)), clearance: None, occupancy, world_from_field: Pose::IDENTITY }
 }
 
 fn of_server(map: MapServerMap) -> Field<2> {
@@ -291,8 +276,8 @@ fn logistic(log_odds: f32) -> f64 {
 }
 
 /// The distance field of a map_server map, in its own frame.
-pub(super) fn esdf_of_server(map: &MapServerMap) -> Esdf<2> {
-    Esdf::from_mask(map.grid, |i| match map.cells[i] {
+pub(super) fn esdf_of_server(map: &MapServerMap) -> EsdfGrid<2> {
+    EsdfGrid::from_mask(map.grid, |i| match map.cells[i] {
         MapCell::Occupied => Some(true),
         MapCell::Free => Some(false),
         MapCell::Unknown => None,
@@ -314,15 +299,4 @@ impl<const D: usize> Field<D> {
         }
         row
     }
-}
-
-/// Whether one of the cells that a point is interpolated from is.
-fn is_saturated<const D: usize>(esdf: &Esdf<D>, status: Option<&[u8]>, p: [f64; D]) -> bool {
-    let Some(status) = status else { return false };
-    let grid = esdf.grid();
-    let Some((base, _)) = grid.interpolation(p) else { return false };
-    (0..1usize << D).any(|c| {
-        let cell = std::array::from_fn(|k| base[k] + ((c >> k) & 1) as i32);
-        grid.index(cell).is_some_and(|i| status[i] == EsdfBin::<D>::SATURATED)
-    })
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use portolan::cell::LogOddsValue;
-use portolan::field::Esdf;
+use portolan::field::EsdfGrid;
 use portolan::geom::Grid;
 use portolan::map::Quadtree;
 use portolan::surface::{Contour, ContourSettings, DoubledLength, ThinWalls};
@@ -29,9 +29,7 @@ pub(crate) struct Derived {
     pub(crate) contour: Option<Contour>,
     pub(crate) doubled: DoubledLength,
     pub(crate) thin: ThinWalls,
-    pub(crate) esdf: Option<Esdf<2>>,
-    /// What its cells are worth, where the reach of the method ends within the map.
-    pub(crate) esdf_status: Option<Vec<u8>>,
+    pub(crate) esdf: Option<EsdfGrid<2>>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
 }
 
@@ -52,9 +50,7 @@ impl Derived {
         }
         if settings.wants(MapKind::Esdf) {
             let start = Instant::now();
-            let dense = dense_plane_esdf(tsdf, settings.esdf);
-            derived.esdf_status = status_plane(&dense).map(<[u8]>::to_vec);
-            derived.esdf = Esdf::from_samples(dense.grid, dense.distances).ok();
+            derived.esdf = Some(dense_plane_esdf(tsdf, settings.esdf));
             derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
         }
         derived
@@ -86,8 +82,8 @@ impl Artefacts<'_> {
         let mut seconds = BTreeMap::new();
         let start = Instant::now();
         if let Some(esdf) = &self.derived.esdf {
-            let status = self.derived.esdf_status.as_deref();
-            write_esdf(folder.join("esdf.bin"), esdf.grid(), esdf.samples(), status)?;
+            let status = status_plane(esdf);
+            write_esdf(folder.join("esdf.bin"), esdf.grid(), esdf.samples(), status.as_deref())?;
             written.push("esdf.bin");
         }
         if let Some(contour) = &self.derived.contour {

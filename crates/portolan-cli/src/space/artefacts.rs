@@ -88,7 +88,7 @@ impl Artefacts<'_> {
         match dense_esdf(esdf, self.dense.as_ref()) {
             Ok(dense) => {
                 let path = folder.join("esdf.bin");
-                write_esdf(path, &dense.grid, &dense.distances, Some(&dense.status))?;
+                write_esdf(path, dense.grid(), dense.samples(), Some(&dense.status_bytes()))?;
                 written.files.push("esdf.bin");
             }
             Err(why) => written.notes.push(format!("esdf.bin was not written: {why}")),

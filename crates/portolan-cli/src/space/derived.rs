@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use portolan::cell::LogOdds8;
-use portolan::field::{SparseEsdf, SparseEsdfSettings};
+use portolan::field::{Esdf, EsdfSettings};
+use portolan::map::Thresholds;
 use portolan::store::{Store, Tree};
 use portolan::surface::{Mesh, MeshSettings, marching_cubes};
 use portolan::sweep::WeightModel;
@@ -19,7 +20,7 @@ use crate::mapping::MapKind;
 pub(crate) struct Derived {
     pub(crate) tree: Option<Tree<LogOdds8, 3>>,
     pub(crate) mesh: Option<Mesh>,
-    pub(crate) esdf: Option<SparseEsdf<3>>,
+    pub(crate) esdf: Option<Esdf<3>>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
     /// What was not made, and why.
     pub(crate) notes: Vec<String>,
@@ -59,7 +60,7 @@ impl Derived {
             }
             let mut how = esdf_settings(settings.weights, settings.carve_weight, settings.max_distance);
             how.method = settings.esdf.method();
-            derived.esdf = Some(SparseEsdf::of(&tsdf.store, &how));
+            derived.esdf = Some(Esdf::of(&tsdf.store, &how));
             derived.seconds.insert("esdf", start.elapsed().as_secs_f64());
         }
         derived
@@ -75,15 +76,12 @@ impl Derived {
 
 /// A `W_min` of half of what one ordinary ray weighs: what was seen once is a surface.
 pub(crate) fn mesh_settings(weights: WeightModel) -> MeshSettings {
-    MeshSettings { min_weight: 0.5 * weights.typical_low(), ..MeshSettings::default() }
+    let min_weight = Some(Thresholds::of(weights, 1.0).surface);
+    MeshSettings { min_weight, ..MeshSettings::default() }
 }
 
 /// A `W_min` of half of what one ordinary observation of free space weighs: what was seen free once is known.
-pub(crate) fn esdf_settings(
-    weights: WeightModel,
-    carve_weight: f32,
-    max_distance: f64,
-) -> SparseEsdfSettings {
-    let min_weight = 0.5 * weights.typical_low() * carve_weight;
-    SparseEsdfSettings { min_weight, max_distance, ..SparseEsdfSettings::default() }
+pub(crate) fn esdf_settings(weights: WeightModel, carve_weight: f32, max_distance: f64) -> EsdfSettings {
+    let min_weight = Some(Thresholds::of(weights, carve_weight).observed);
+    EsdfSettings { min_weight, max_distance, ..EsdfSettings::default() }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use portolan::field::{DenseEsdf, SparseEsdf};
+use portolan::field::{Esdf, EsdfGrid};
 use portolan::geom::{Aabb, Grid};
 use portolan::surface::Mesh;
 use portolan_io::{write_glb, write_obj, write_ply_mesh};
@@ -24,7 +24,7 @@ pub(crate) fn write_mesh(path: &Path, mesh: &Mesh) -> anyhow::Result<bool> {
 }
 
 /// The field, or the asked box of it, as arrays; else why there is none that `esdf.bin` should hold.
-pub(crate) fn dense_esdf(esdf: &SparseEsdf<3>, bounds: Option<&Aabb<3>>) -> Result<DenseEsdf<3>, String> {
+pub(crate) fn dense_esdf(esdf: &Esdf<3>, bounds: Option<&Aabb<3>>) -> Result<EsdfGrid<3>, String> {
     let asked = bounds.map_or_else(|| esdf.grid(), |bounds| esdf.grid_within(bounds));
     let grid = asked.ok_or("nothing was observed there")?;
     let most = (LARGEST_DENSE - 64) / DENSE_CELL;

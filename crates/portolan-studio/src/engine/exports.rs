@@ -1,6 +1,6 @@
 //! Files made in memory, for the page to save: the same bytes that the command line writes.
 
-use portolan::field::{EsdfMethod, EsdfSettings, SparseEsdf, SparseEsdfSettings};
+use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::vector::norm;
 use portolan::map::Tsdf2;
 use portolan::surface::{ContourSettings, Polyline, marching_squares};
@@ -19,15 +19,14 @@ pub(super) fn file(name: &str, bytes: Vec<u8>) -> Result<Reply, Refusal> {
 }
 
 /// The Euclidean field of a map, as `query` and `map` make it: accurate, over the whole map.
-pub(super) fn field(tsdf: &Tsdf2, unknown: bool) -> SparseEsdf<2> {
+pub(super) fn field(tsdf: &Tsdf2, unknown: bool) -> Esdf<2> {
     let grid = tsdf.grid();
-    SparseEsdf::of_tsdf(
+    Esdf::of(
         tsdf,
-        &SparseEsdfSettings {
-            min_weight: EsdfSettings::of(tsdf).min_weight,
+        &EsdfSettings {
             max_distance: norm(grid.aabb().extent()).max(grid.lattice.resolution),
-            method: EsdfMethod::Accurate,
             unknown,
+            ..EsdfSettings::default()
         },
     )
 }
@@ -35,8 +34,9 @@ pub(super) fn field(tsdf: &Tsdf2, unknown: bool) -> SparseEsdf<2> {
 /// `esdf.bin`
 pub(super) fn esdf(tsdf: &Tsdf2) -> Result<Reply, Refusal> {
     let dense = field(tsdf, false).dense(tsdf.grid());
-    let status = dense.status.contains(&2).then_some(&dense.status[..]);
-    file("esdf.bin", esdf_to_bytes(&dense.grid, &dense.distances, status).map_err(refused)?)
+    let status = dense.is_saturated().then(|| dense.status_bytes());
+    let bytes = esdf_to_bytes(dense.grid(), dense.samples(), status.as_deref());
+    file("esdf.bin", bytes.map_err(refused)?)
 }
 
 /// `contour.geojson`

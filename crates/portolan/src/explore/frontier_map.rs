@@ -5,22 +5,30 @@ use super::faces::BrickFrontier;
 use super::frontier::{Pieces, join};
 use crate::cell::SignedDistance;
 use crate::geom::{BlockKey, Lattice};
+use crate::map::DistanceMap;
 use crate::parallel;
 use crate::store::{Bricks, Store};
 
 /// Settings of a [`FrontierMap`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrontierSettings {
-    /// Cells of smaller weight count as never observed.
-    pub min_weight: f32,
+    /// Cells of smaller weight count as never observed. `None`: any weight above 0 counts.
+    pub min_weight: Option<f32>,
     /// Frontiers of fewer cells are left out.
     pub min_cells: usize,
 }
 
 impl Default for FrontierSettings {
-    /// Half an observation; ten cells.
+    /// Any weight; ten cells.
     fn default() -> Self {
-        Self { min_weight: 0.5, min_cells: 10 }
+        Self { min_weight: None, min_cells: 10 }
+    }
+}
+
+impl FrontierSettings {
+    /// The default, with the weight that fits a map ([`Thresholds::observed`](crate::map::Thresholds::observed)).
+    pub fn of<const D: usize>(map: &impl DistanceMap<D>) -> Self {
+        Self { min_weight: Some(map.thresholds().observed), ..Self::default() }
     }
 }
 
@@ -117,7 +125,7 @@ impl<const D: usize> FrontierMap<D> {
         dirty.sort_unstable();
         dirty.dedup();
         dirty.retain(|key| store.brick(*key).is_some());
-        let min_weight = self.settings.min_weight;
+        let min_weight = self.settings.min_weight.unwrap_or(0.0);
         let pieces = parallel::map(&dirty, 16, |key| BrickFrontier::of(store, *key, min_weight));
         for (key, piece) in dirty.iter().zip(pieces) {
             if piece.cells.is_empty() {
@@ -154,7 +162,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::{BTreeMap, BTreeSet};
 
-    const SETTINGS: FrontierSettings = FrontierSettings { min_weight: 0.5, min_cells: 2 };
+    const SETTINGS: FrontierSettings = FrontierSettings { min_weight: Some(0.5), min_cells: 2 };
 
     fn of_all<const D: usize>(store: &Bricks<SignedDistance, D>) -> Vec<Frontier<D>> {
         let mut map = FrontierMap::new(SETTINGS);
@@ -164,7 +172,7 @@ mod tests {
 
     /// Cell by cell, through the store's own interface.
     fn known<const D: usize>(store: &Bricks<SignedDistance, D>, cell: [i32; D]) -> Known {
-        match store.cell(cell).filter(|c| c.weight >= SETTINGS.min_weight) {
+        match store.cell(cell).filter(|c| Some(c.weight) >= SETTINGS.min_weight) {
             None => Known::Unknown,
             Some(c) if c.distance > 0.0 => Known::Free,
             Some(_) => Known::Occupied,

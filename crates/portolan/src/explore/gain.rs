@@ -4,6 +4,7 @@ use super::cells::{Known, Reader};
 use crate::cell::SignedDistance;
 use crate::geom::vector::unit;
 use crate::geom::{Aabb, BlockKey, Pose, RayWalk};
+use crate::map::DistanceMap;
 use crate::parallel;
 use crate::store::{Bricks, Store};
 use crate::sweep::clip;
@@ -12,8 +13,8 @@ use rustc_hash::FxHashMap;
 /// How far views reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GainSettings<const D: usize> {
-    /// Cells of smaller weight count as never observed.
-    pub min_weight: f32,
+    /// Cells of smaller weight count as never observed. `None`: any weight above 0 counts.
+    pub min_weight: Option<f32>,
     /// The sensor sees no further (metres). Infinite is the longest a ray may be at all: 100 000 cells.
     pub max_range: f64,
     /// A ray is expected to see so far into the unknown (metres, summed along the ray), and no further; infinite: to its
@@ -25,9 +26,16 @@ pub struct GainSettings<const D: usize> {
 }
 
 impl<const D: usize> Default for GainSettings<D> {
-    /// Half an observation; 5 m; a metre of the unknown; everywhere.
+    /// Any weight; 5 m; a metre of the unknown; everywhere.
     fn default() -> Self {
-        Self { min_weight: 0.5, max_range: 5.0, penetration: 1.0, bounds: None }
+        Self { min_weight: None, max_range: 5.0, penetration: 1.0, bounds: None }
+    }
+}
+
+impl<const D: usize> GainSettings<D> {
+    /// The default, with the weight that fits a map ([`Thresholds::observed`](crate::map::Thresholds::observed)).
+    pub fn of(map: &impl DistanceMap<D>) -> Self {
+        Self { min_weight: Some(map.thresholds().observed), ..Self::default() }
     }
 }
 
@@ -84,7 +92,7 @@ pub fn expected_gain<const D: usize>(
 ) -> ViewGain {
     let mut view = View {
         origin: world_from_sensor.translation,
-        reader: Reader::new(store, settings.min_weight),
+        reader: Reader::new(store, settings.min_weight.unwrap_or(0.0)),
         store,
         settings,
         seen: Seen::new(),
@@ -246,7 +254,7 @@ mod tests {
                 let p = along(pose.translation, d, s);
                 let cell = store.lattice().cell_of(p).unwrap();
                 let inside = settings.bounds.is_none_or(|b| b.contains(p));
-                match store.cell(cell).filter(|c| c.weight >= settings.min_weight) {
+                match store.cell(cell).filter(|c| Some(c.weight) >= settings.min_weight) {
                     Some(c) if c.distance <= 0.0 => end = Some(0),
                     _ if !inside => end = Some(2),
                     Some(_) => in_unknown = false,

@@ -158,7 +158,7 @@ impl CuroboGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{Esdf, UnknownSpace};
+    use crate::field::{EsdfGrid, UnknownSpace};
     use crate::geom::vector;
     use crate::handover::f32_from_f16;
 
@@ -175,7 +175,7 @@ mod tests {
 
     /// Points between the outermost centres, and our own answers there.
     fn probes<const D: usize>(field: &Filled<D>) -> Vec<([f64; D], f64)> {
-        let esdf = Esdf::from_samples(field.grid, field.values.clone()).unwrap();
+        let esdf = EsdfGrid::from_samples(field.grid, field.values.clone()).unwrap();
         let point = |i: usize| {
             std::array::from_fn(|k| {
                 let span = (field.grid.shape[k] - 1) as f64 * R * 0.999;

@@ -1,7 +1,7 @@
 //! Distance fields as the arrays that planners, optimisers and costmaps take.
 //!
 //! A field here is samples at the centres of the cells of a grid: metres, positive in free space, x fastest, NaN where
-//! nothing is known ([`crate::field::DenseEsdf`], [`crate::field::Esdf`]). Consumers differ in each of these, and most
+//! nothing is known ([`crate::field::EsdfGrid`], [`crate::field::EsdfGrid`]). Consumers differ in each of these, and most
 //! of them have no word for unknown: what it shall mean is decided first ([`Filled`]), by the caller and not here; then
 //! the layout.
 //!

@@ -7,13 +7,11 @@ mod occupancy_grid;
 mod sparse_fuse;
 mod sparse_occupancy;
 #[cfg(test)]
-mod occupancy_projective_tests;
-mod occupancy_rings;
-#[cfg(test)]
-mod occupancy_tests;
-mod occupancy_tree;
-mod repr;
-mod scan_kind;
+mod sparse_occupancy_tests;
+mod sparse_tsdf;
+mod sparse_tsdf_config;
+mod thresholds;
+mod tree_map;
 mod tsdf;
 mod tsdf_3d;
 mod tsdf_config;
@@ -27,7 +25,10 @@ pub use occupancy_grid::OccupancyGrid;
 pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
 pub use sparse_tsdf::SparseTsdf;
 pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
-pub use tree_map::{CoarseOccupancy, Octree, Quadtree, TreeMap};
+pub use thresholds::{DistanceMap, Thresholds};
+pub use tree_map::{
+    CoarseOccupancy, Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio,
+};
 pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
 
 use crate::cell::{LogOdds8, SignedDistance};

@@ -51,8 +51,8 @@ pub struct PathViolation {
 /// anywhere between the places looked at.
 ///
 /// ```
-/// use portolan::field::{SparseEsdf, SparseEsdfSettings};
-/// use portolan::map::{Tsdf2, TsdfConfig, Tsdf3, TsdfConfig};
+/// use portolan::field::{Esdf, EsdfSettings};
+/// use portolan::map::{Tsdf2, Tsdf2Config, Tsdf3, TsdfConfig};
 /// use portolan::plan::{Cause, Demand, PathCheck, Waypoints, check_path};
 ///
 /// // A wall at x = 4 m; the space before it was seen.
@@ -61,8 +61,8 @@ pub struct PathViolation {
 ///     let cell = tsdf.grid().cell(i);
 ///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
 /// }
-/// let settings = SparseEsdfSettings { unknown: true, ..Default::default() };
-/// let field = SparseEsdf::of_tsdf(&tsdf, &settings);
+/// let settings = EsdfSettings { unknown: true, ..Default::default() };
+/// let field = Esdf::of(&tsdf, &settings);
 ///
 /// // A robot of 30 cm may drive along it ...
 /// let path = Waypoints::new(vec![[1.0, 1.0], [3.5, 1.0], [3.5, 2.0]])?;
@@ -80,7 +80,7 @@ pub struct PathViolation {
 ///     let cell = tsdf.grid().cell(i);
 ///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
 /// }
-/// let field = SparseEsdf::of_tsdf(&tsdf, &settings);
+/// let field = Esdf::of(&tsdf, &settings);
 /// let path = Waypoints::new(vec![[1.0, 1.0, 0.5], [3.5, 1.0, 1.5]])?;
 /// assert!(check_path(&field, &path, &Demand::new(0.3)).is_certified());
 /// # Ok::<(), Box<dyn std::error::Error>>(())

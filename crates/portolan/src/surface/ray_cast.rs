@@ -3,7 +3,7 @@
 use crate::cell::{Planes, SignedDistance};
 use crate::geom::vector::{along, norm, unit};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, interpolate};
-use crate::map::DenseTsdf;
+use crate::map::{DistanceMap, Tsdf};
 use crate::store::{Bricks, Store};
 use crate::sweep::clip;
 
@@ -36,8 +36,9 @@ pub struct RayTrace<const D: usize> {
 /// How rays are cast.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayCastSettings {
-    /// Cells of smaller weight count as never observed.
-    pub min_weight: f32,
+    /// Cells of smaller weight count as never observed. `None`: what fits the map
+    /// ([`Thresholds::observed`](crate::map::Thresholds::observed)), and any weight above 0 where cells alone are given.
+    pub min_weight: Option<f32>,
     /// Follow rays no further (metres).
     pub max_range: f64,
     /// Pass over unknown space this long (metres) before calling it unknown: beams see past the gaps between
@@ -49,14 +50,23 @@ pub struct RayCastSettings {
 
 impl Default for RayCastSettings {
     fn default() -> Self {
-        Self { min_weight: 0.5, max_range: 100.0, unknown_tolerance: 0.0, blind: 0.0 }
+        Self { min_weight: None, max_range: 100.0, unknown_tolerance: 0.0, blind: 0.0 }
     }
 }
 
 impl RayCastSettings {
+    /// The default, with the weight that fits a map written out: for rays through its cells alone.
+    pub fn of<const D: usize>(map: &impl DistanceMap<D>) -> Self {
+        Self::default().fitted(map)
+    }
+
+    fn fitted<const D: usize>(self, map: &impl DistanceMap<D>) -> Self {
+        Self { min_weight: self.min_weight.or(Some(map.thresholds().observed)), ..self }
+    }
+
     #[inline(always)]
     fn observed(&self, weight: f32) -> bool {
-        weight > 0.0 && weight >= self.min_weight
+        weight > 0.0 && self.min_weight.is_none_or(|least| weight >= least)
     }
 }
 
@@ -69,7 +79,7 @@ pub fn cast_ray<const D: usize>(
     direction: [f64; D],
     settings: &RayCastSettings,
 ) -> RayCast {
-    cast_dense(tsdf, origin, direction, settings).0
+    cast_dense(tsdf, origin, direction, &settings.fitted(tsdf)).0
 }
 
 /// [`cast_ray`], with what the ray went through and the normal where it hits.
@@ -101,6 +111,7 @@ pub fn trace_ray<const D: usize>(
     direction: [f64; D],
     settings: &RayCastSettings,
 ) -> RayTrace<D> {
+    let settings = &settings.fitted(tsdf);
     let (end, unknown) = cast_dense(tsdf, origin, direction, settings);
     RayTrace {
         end,
@@ -221,7 +232,7 @@ pub struct RayCaster<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> RayCaster<'a, D> {
-    /// Rays through this field. O(bricks).
+    /// Rays through these cells. [`RayCastSettings::of`] are the settings that fit a map. O(bricks).
     pub fn new(store: &'a Bricks<SignedDistance, D>, settings: RayCastSettings) -> Self {
         let mut bounds = Aabb::EMPTY;
         for (key, _) in store.bricks_by_age() {

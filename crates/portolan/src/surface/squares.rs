@@ -2,7 +2,7 @@
 
 use super::Contour;
 use crate::geom::Grid;
-use crate::map::Tsdf2;
+use crate::map::{DistanceMap, Tsdf};
 
 /// What to do with a square whose diagonal corners agree and whose neighbours differ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,26 +16,19 @@ pub enum Ambiguity {
 }
 
 /// How a contour is extracted.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContourSettings {
-    /// A square with a corner of smaller weight has no sign and gets no segment: no geometry is invented.
-    pub min_weight: f32,
+    /// A square with a corner of smaller weight has no sign and gets no segment: no geometry is invented. `None`: what
+    /// fits the map ([`Thresholds::surface`](crate::map::Thresholds::surface)).
+    pub min_weight: Option<f32>,
     /// Ambiguous squares.
     pub ambiguity: Ambiguity,
 }
 
-impl Default for ContourSettings {
-    /// `W_min` 0.5.
-    fn default() -> Self {
-        Self { min_weight: 0.5, ambiguity: Ambiguity::Decide }
-    }
-}
-
 impl ContourSettings {
-    /// The default with a `W_min` of half of what one ordinary beam weighs in this map (0.5 where all
-    /// beams weigh 1).
-    pub fn of(tsdf: &Tsdf2) -> Self {
-        Self { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..Self::default() }
+    /// The default, with the weight that fits a map written out.
+    pub fn of(map: &impl DistanceMap<2>) -> Self {
+        Self { min_weight: Some(map.thresholds().surface), ..Self::default() }
     }
 }
 
@@ -58,7 +51,8 @@ struct RowEdges {
 pub fn marching_squares(tsdf: &Tsdf2, settings: &ContourSettings) -> Contour {
     let planes = tsdf.store().planes();
     let weight = planes.weights();
-    let observed = |i: usize| weight[i] > 0.0 && weight[i] >= settings.min_weight;
+    let min_weight = settings.min_weight.unwrap_or(tsdf.thresholds().surface);
+    let observed = |i: usize| weight[i] > 0.0 && weight[i] >= min_weight;
     level_set(tsdf.grid(), planes.distances(), observed, settings.ambiguity)
 }
 
@@ -214,7 +208,7 @@ mod tests {
         let contour = marching_squares(&tsdf, &ContourSettings::default());
         assert_eq!(contour.segments.len(), 9);
         assert!(!contour.polylines()[0].closed);
-        let strict = ContourSettings { min_weight: 1.5, ..Default::default() };
+        let strict = ContourSettings { min_weight: Some(1.5), ..Default::default() };
         assert!(marching_squares(&tsdf, &strict).segments.is_empty());
     }
 

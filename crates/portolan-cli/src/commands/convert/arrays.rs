@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::bail;
-use portolan::field::{DenseEsdf, UnknownSpace};
+use portolan::field::{EsdfGrid, UnknownSpace};
 use portolan::handover::{CuroboGrid, CuroboVersion, Filled, Gpmp2Field, KnotGrid, c_order, f16_from_f32};
 use portolan_io::{NpyArray, NpyValues, write_npy, write_npz};
 
@@ -113,7 +113,7 @@ impl ArrayArgs {
     }
 
     /// The arrays with their names, the main one first.
-    fn arrays<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
+    fn arrays<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
         if self.order.is_some() && self.layout != Layout::Plain {
             return Err(bad_call("--order is for --layout plain; the others have theirs"));
         }
@@ -145,31 +145,31 @@ impl ArrayArgs {
         Ok(arrays)
     }
 
-    fn plain<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
+    fn plain<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
         let distances = match self.unknown {
             None => {
                 let far = self.far.map_or(f32::INFINITY, |far| far as f32);
-                field.distances.iter().map(|d| d.clamp(-far, far)).collect()
+                field.samples().iter().map(|d| d.clamp(-far, far)).collect()
             }
             Some(_) => self.filled(field)?.values,
         };
-        let shape = field.grid.shape;
+        let shape = field.grid().shape;
         let as_doubles = |values: &[f32]| values.iter().map(|d| f64::from(*d)).collect::<Vec<_>>();
         let (distance, status) = match self.order.unwrap_or_default() {
             Order::C => (
                 NpyArray::c(shape, self.distances(&as_doubles(&c_order(&distances, shape)), Precision::F32)),
-                NpyArray::c(shape, NpyValues::U8(c_order(&field.status, shape))),
+                NpyArray::c(shape, NpyValues::U8(c_order(&field.status_bytes(), shape))),
             ),
             Order::F => (
                 NpyArray::fortran(shape, self.distances(&as_doubles(&distances), Precision::F32)),
-                NpyArray::fortran(shape, NpyValues::U8(field.status.clone())),
+                NpyArray::fortran(shape, NpyValues::U8(field.status_bytes())),
             ),
         };
         let mut arrays = vec![
             ("distance", distance),
             ("status", status),
-            ("origin", NpyArray::vector(&field.grid.lattice.origin)),
-            ("resolution", NpyArray::number(field.grid.lattice.resolution)),
+            ("origin", NpyArray::vector(&field.grid().lattice.origin)),
+            ("resolution", NpyArray::number(field.grid().lattice.resolution)),
             ("shape", NpyArray::c([D], NpyValues::I64(shape.iter().map(|n| *n as i64).collect()))),
             ("order", NpyArray::text(if self.order == Some(Order::F) { "F" } else { "C" })),
         ];
@@ -210,8 +210,8 @@ impl ArrayArgs {
     }
 
     /// The field without unknown. What unknown is has to be said where there is any.
-    fn filled<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Filled<D>> {
-        let unknown = field.distances.iter().filter(|d| d.is_nan()).count();
+    fn filled<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Filled<D>> {
+        let unknown = field.samples().iter().filter(|d| d.is_nan()).count();
         let space = match self.unknown {
             Some(unknown) => unknown.space(),
             None if unknown == 0 => UnknownSpace::Pessimistic,
@@ -222,9 +222,9 @@ impl ArrayArgs {
                 )));
             }
         };
-        let largest = field.distances.iter().filter(|d| d.is_finite()).fold(0.0f32, |m, d| m.max(d.abs()));
-        let far = self.far.unwrap_or(f64::from(largest).max(field.grid.lattice.resolution));
-        Ok(Filled::new(&field.grid, &field.distances, space, far)?)
+        let largest = field.samples().iter().filter(|d| d.is_finite()).fold(0.0f32, |m, d| m.max(d.abs()));
+        let far = self.far.unwrap_or(f64::from(largest).max(field.grid().lattice.resolution));
+        Ok(Filled::new(field.grid(), field.samples(), space, far)?)
     }
 
     fn distances(&self, values: &[f64], usual: Precision) -> NpyValues {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::bail;
 use portolan::cell::DistancePlanes;
-use portolan::field::{DenseEsdf, UnknownSpace};
+use portolan::field::{EsdfGrid, UnknownSpace};
 use portolan::geom::Grid;
 use portolan::handover::{Inflation, lowest_between};
 use portolan::map::{Tsdf, TsdfConfig};
@@ -72,7 +72,7 @@ impl CostArgs {
             (Field::Three(_), None) => {
                 return Err(bad_call("a costmap is in the plane: say with --z LOW:HIGH which heights count"));
             }
-            (Field::Two(field), None) => (field.grid, how.costs(&field.distances)),
+            (Field::Two(field), None) => (*field.grid(), how.costs(field.samples())),
             (Field::Three(field), Some(heights)) => {
                 let Some(unknown) = unknown else {
                     return Err(bad_call(
@@ -81,7 +81,7 @@ impl CostArgs {
                     ));
                 };
                 let layer = in_the_plane(field, heights, unknown)?;
-                (layer.grid, how.costs(&layer.distances))
+                (*layer.grid(), how.costs(layer.samples()))
             }
         };
         let mode = match self.mode {
@@ -97,11 +97,11 @@ impl CostArgs {
 
 /// Distances in the plane to what stands between two heights.
 fn in_the_plane(
-    field: &DenseEsdf<3>,
+    field: &EsdfGrid<3>,
     heights: [f64; 2],
     unknown: UnknownSpace,
-) -> anyhow::Result<DenseEsdf<2>> {
-    let (grid, lowest): (Grid<2>, _) = lowest_between(&field.grid, &field.distances, heights, unknown)?;
+) -> anyhow::Result<EsdfGrid<2>> {
+    let (grid, lowest): (Grid<2>, _) = lowest_between(field.grid(), field.samples(), heights, unknown)?;
     let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
     let (distances, weights) = lowest.iter().map(known).unzip();
     let planes = DistancePlanes::from_parts(distances, weights);

@@ -1,23 +1,23 @@
 //! The distance field of anything that has one, as arrays.
 
 use anyhow::bail;
-use portolan::field::{DenseEsdf, Esdf, SparseEsdf};
+use portolan::field::{Esdf, EsdfGrid};
 use portolan::geom::{Aabb, Grid};
-use portolan_io::{EsdfBin, EsdfFile};
+use portolan_io::EsdfFile;
 use serde_json::Value;
 
 use super::{Args, esdf_of_cells, esdf_of_server};
 use crate::arguments::Bounds;
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, dense_plane_esdf, known_where_finite};
+use crate::esdf::{EsdfArg, dense_plane_esdf};
 use crate::mapping::cells_for_map_server;
 use crate::source::Source;
 use crate::space::{dense_esdf, esdf_settings};
 
 /// A field in the plane or in space.
 pub(super) enum Field {
-    Two(DenseEsdf<2>),
-    Three(DenseEsdf<3>),
+    Two(EsdfGrid<2>),
+    Three(EsdfGrid<3>),
 }
 
 impl Field {
@@ -32,7 +32,7 @@ impl Field {
                 }
                 None => {
                     let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(None) };
-                    Self::Two(in_plane(of_samples(esdf_of_cells(grid, &cells)), args)?)
+                    Self::Two(in_plane(esdf_of_cells(grid, &cells), args)?)
                 }
             },
             Source::Server(map) => {
@@ -44,11 +44,11 @@ impl Field {
                         args.out.display()
                     );
                 }
-                Self::Two(in_plane(of_samples(esdf_of_server(map)), args)?)
+                Self::Two(in_plane(esdf_of_server(map), args)?)
             }
-            Source::Esdf(EsdfFile::Two(field)) => Self::Two(in_plane(of_file(field), args)?),
+            Source::Esdf(EsdfFile::Two(field)) => Self::Two(in_plane(field.clone(), args)?),
             Source::Esdf(EsdfFile::Three(field)) => {
-                let dense = of_file(field);
+                let dense = field.clone();
                 Self::Three(match space_bounds(args)? {
                     Some(bounds) => cropped(dense, &bounds, args)?,
                     None => dense,
@@ -61,7 +61,7 @@ impl Field {
                 let mut how =
                     esdf_settings(map.weights, map.carve_weight, args.max_distance.or(saved).unwrap_or(1.0));
                 how.method = args.esdf.or(EsdfArg::of_settings(settings)).unwrap_or_default().method();
-                match dense_esdf(&SparseEsdf::of(&map.store, &how), space_bounds(args)?.as_ref()) {
+                match dense_esdf(&Esdf::of(&map.store, &how), space_bounds(args)?.as_ref()) {
                     Ok(dense) => Self::Three(dense),
                     Err(why) => {
                         bail!("{}: {}", args.input.display(), why.replace("--dense", "--bounds"))
@@ -73,23 +73,7 @@ impl Field {
     }
 }
 
-fn of_samples(esdf: Esdf<2>) -> DenseEsdf<2> {
-    known_where_finite(*esdf.grid(), esdf.samples().to_vec())
-}
-
-/// A file's field: what its status calls unknown is.
-fn of_file<const D: usize>(file: &EsdfBin<D>) -> DenseEsdf<D> {
-    let mut dense = known_where_finite(file.grid, file.distances.clone());
-    for (i, &status) in file.status.iter().flatten().enumerate() {
-        if status == EsdfBin::<D>::UNKNOWN {
-            dense.distances[i] = f32::NAN;
-        }
-        dense.status[i] = if dense.distances[i].is_nan() { EsdfBin::<D>::UNKNOWN } else { status };
-    }
-    dense
-}
-
-fn in_plane(dense: DenseEsdf<2>, args: &Args) -> anyhow::Result<DenseEsdf<2>> {
+fn in_plane(dense: EsdfGrid<2>, args: &Args) -> anyhow::Result<EsdfGrid<2>> {
     match args.bounds {
         None => Ok(dense),
         Some(Bounds::Plane(bounds)) => cropped(dense, &bounds, args),
@@ -110,12 +94,8 @@ fn space_bounds(args: &Args) -> anyhow::Result<Option<Aabb<3>>> {
 }
 
 /// The cells that a box touches, not those that only begin where it ends.
-fn cropped<const D: usize>(
-    dense: DenseEsdf<D>,
-    bounds: &Aabb<D>,
-    args: &Args,
-) -> anyhow::Result<DenseEsdf<D>> {
-    let Grid { lattice, shape } = dense.grid;
+fn cropped<const D: usize>(dense: EsdfGrid<D>, bounds: &Aabb<D>, args: &Args) -> anyhow::Result<EsdfGrid<D>> {
+    let Grid { lattice, shape } = *dense.grid();
     let cells = |v: f64, k: usize| (v - lattice.origin[k]) / lattice.resolution;
     // A millionth of a cell: a box of multiples of the resolution shall not gain a cell by rounding.
     let first: [usize; D] = std::array::from_fn(|k| {
@@ -131,12 +111,12 @@ fn cropped<const D: usize>(
         lattice.resolution,
         std::array::from_fn(|k| end[k] - first[k]),
     );
-    let strides = dense.grid.strides();
+    let strides = dense.grid().strides();
     let from = |i: usize| {
         let cell = grid.cell(i);
         (0..D).map(|k| (first[k] + cell[k] as usize) * strides[k]).sum::<usize>()
     };
     let (distances, status) =
-        (0..grid.len()).map(from).map(|i| (dense.distances[i], dense.status[i])).unzip();
-    Ok(DenseEsdf { grid, distances, status })
+        (0..grid.len()).map(from).map(|i| (dense.samples()[i], dense.status(i))).unzip();
+    Ok(EsdfGrid::with_status(grid, distances, status)?)
 }

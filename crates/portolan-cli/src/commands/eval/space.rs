@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::bail;
+use portolan::map::Thresholds;
 use portolan::scan::FrameFilter;
 use portolan::store::Store;
 use portolan::surface::{
@@ -46,7 +47,7 @@ pub(super) fn run(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
         let reference = Owned::read(path)?;
         let keep = |p: [f64; 3]| {
             let cell = tsdf.store.lattice().cell_of(p).and_then(|cell| tsdf.store.cell(cell));
-            !args.crop || cell.is_some_and(|c| c.weight >= settings.min_weight)
+            !args.crop || cell.is_some_and(|c| Some(c.weight) >= settings.min_weight)
         };
         let how = CompareSettings::default();
         let Some(comparison) = compare_surfaces(&mesh, reference.borrow(), &how, keep) else {
@@ -131,7 +132,7 @@ fn predict(args: &Args, file: &MapFile<3>, tsdf: &TsdfBricks<3>, path: &Path) ->
     let resolution = tsdf.store.lattice().resolution;
     let carved = saved("carve").and_then(Value::as_bool).unwrap_or(true);
     let settings = RayCastSettings {
-        min_weight: 0.5 * tsdf.weights.typical_low() * tsdf.carve_weight,
+        min_weight: Some(Thresholds::of(tsdf.weights, tsdf.carve_weight).observed),
         max_range: filter.max_range.min(FURTHEST),
         // Where free space was not fused, all of it is unknown.
         unknown_tolerance: if carved { 2.0 * resolution } else { f64::INFINITY },

@@ -1,10 +1,10 @@
 //! The two fields of one map.
 
-use portolan::field::{DenseEsdf, Esdf, EsdfSettings, FieldSlots, Interpolation, SparseEsdf, Status};
+use portolan::field::{Esdf, EsdfError, EsdfGrid, FieldSlots, Interpolation};
 use portolan::geom::vector::norm;
 use portolan::geom::{Aabb, Grid};
 use portolan::map::Tsdf2;
-use portolan::{Answer, field::EsdfError};
+use portolan::{Answer, Status};
 
 use super::ask::Which;
 use crate::engine::exports;
@@ -15,12 +15,12 @@ pub(super) type Sample = (f64, [f64; 2]);
 /// Both fields, over the cells of the map.
 pub(super) struct Fields {
     /// As `query` makes it, with distances to unknown cells.
-    pub(super) euclidean: SparseEsdf<2>,
+    pub(super) euclidean: Esdf<2>,
     /// The same at the cells' centres.
-    pub(super) dense: DenseEsdf<2>,
+    pub(super) dense: EsdfGrid<2>,
     /// What the filter keeps, read as if it were a distance field: bilinear between the centres of the same cells that the
     /// Euclidean field knows.
-    truncated: Esdf<2>,
+    truncated: EsdfGrid<2>,
     /// From here on (metres) the truncated field is a constant.
     pub(super) limit: f64,
 }
@@ -32,13 +32,13 @@ impl Fields {
         euclidean.measure();
         let dense = euclidean.dense(tsdf.grid());
         let planes = tsdf.store().planes();
-        let least = EsdfSettings::of(tsdf).min_weight;
+        let least = tsdf.thresholds().observed;
         let cells = planes.distances().iter().zip(planes.weights());
         let kept = cells.map(|(&d, &w)| if w > 0.0 && w >= least { d } else { f32::NAN });
         Ok(Self {
             euclidean,
             dense,
-            truncated: Esdf::from_samples(*tsdf.grid(), kept.collect())?,
+            truncated: EsdfGrid::from_samples(*tsdf.grid(), kept.collect())?,
             // As the map itself tells its saturated cells from others.
             limit: f64::from(tsdf.rule().truncation) * (1.0 - 1e-4),
         })
@@ -56,7 +56,7 @@ impl Fields {
     pub(super) fn samples(&self, which: Which) -> &[f32] {
         match which {
             Which::Truncated => self.truncated.samples(),
-            Which::Euclidean => &self.dense.distances,
+            Which::Euclidean => self.dense.samples(),
         }
     }
 
@@ -64,7 +64,7 @@ impl Fields {
     pub(super) fn is_known(&self, which: Which, i: usize) -> bool {
         match which {
             Which::Truncated => self.truncated.samples()[i].abs() < self.limit as f32,
-            Which::Euclidean => self.dense.status[i] == 1,
+            Which::Euclidean => self.dense.status(i) == Status::Known,
         }
     }
 
@@ -86,15 +86,15 @@ impl Fields {
             Which::Truncated => self.truncated.distances_and_gradients(points, Interpolation::Linear, out),
             Which::Euclidean => self.euclidean.distances_and_gradients(points, Interpolation::Linear, out),
         }
-        let answered = |s: Status| matches!(s, Status::Known | Status::Saturated);
-        gradient.into_iter().zip(status).map(|(g, s)| answered(s).then_some(g)).collect()
+        gradient.into_iter().zip(status).map(|(g, s)| s.has_value().then_some(g)).collect()
     }
 
     /// The length (metres) that all but the longest hundredth of the known distances stay within, the sign aside: what a
     /// ramp should show, though some beam saw far through a window. 0 where nothing is known.
     pub(super) fn usual_length(&self) -> f32 {
-        let known = self.dense.distances.iter().zip(&self.dense.status).filter(|(_, s)| **s == 1);
-        let mut lengths: Vec<f32> = known.map(|(d, _)| d.abs()).collect();
+        let known =
+            self.dense.samples().iter().enumerate().filter(|(i, _)| self.dense.status(*i) == Status::Known);
+        let mut lengths: Vec<f32> = known.map(|(_, d)| d.abs()).collect();
         let at = lengths.len() * 99 / 100;
         if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(at, f32::total_cmp).1 }
     }

@@ -1,7 +1,7 @@
 //! Where a path is certified, and what the field knows along it.
 
 use portolan::Answer;
-use portolan::field::{Clearance, SparseEsdf, UnknownSpace};
+use portolan::field::{Clearance, Esdf, UnknownSpace};
 use portolan::plan::{Cause, Curve, Demand, PathCheck, Waypoints, check_path, clearance_profile};
 use serde_json::{Value, json};
 
@@ -28,7 +28,7 @@ pub(super) struct Piece {
 
 /// All about a path: the check of the library, the parts beyond its first refusal, the profile.
 pub(super) fn check(
-    field: &SparseEsdf<2>,
+    field: &Esdf<2>,
     points: Vec<[f64; 2]>,
     clearance: f64,
     unknown: UnknownSpace,
@@ -82,7 +82,7 @@ pub(super) fn demand(clearance: f64, unknown: UnknownSpace, length: f64) -> Dema
 }
 
 /// The library's check of the whole path, and from where that ends the check of the rest, and so on.
-pub(super) fn pieces(field: &SparseEsdf<2>, path: &Waypoints<2>, demand: &Demand) -> (PathCheck, Vec<Piece>) {
+pub(super) fn pieces(field: &Esdf<2>, path: &Waypoints<2>, demand: &Demand) -> (PathCheck, Vec<Piece>) {
     let whole = check_path(field, path, demand);
     let (mut check, mut from, mut found) = (whole, 0.0, Vec::new());
     loop {
@@ -117,13 +117,7 @@ fn rest(path: &Waypoints<2>, from: f64) -> Waypoints<2> {
 }
 
 /// Tells the parts of what is not certified apart by their causes, half a cell at a time.
-fn name(
-    field: &SparseEsdf<2>,
-    path: &Waypoints<2>,
-    demand: &Demand,
-    [from, to]: [f64; 2],
-    found: &mut Vec<Piece>,
-) {
+fn name(field: &Esdf<2>, path: &Waypoints<2>, demand: &Demand, [from, to]: [f64; 2], found: &mut Vec<Piece>) {
     let step = (0.5 * field.lattice().resolution).max(path.length() / SAMPLES);
     let steps = ((to - from) / step).ceil().max(1.0);
     let at = |i: usize| if i as f64 >= steps { to } else { from + (to - from) * i as f64 / steps };

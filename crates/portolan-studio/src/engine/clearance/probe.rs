@@ -1,8 +1,8 @@
 //! What both fields say of one point: of the Euclidean one exactly what `query` prints.
 
 use portolan::Answer;
-use portolan::field::{SparseEsdf, UnknownSpace};
-use portolan::map::Tsdf2;
+use portolan::field::{Esdf, UnknownSpace};
+use portolan::map::{MapRepr, Tsdf2};
 use portolan_io::{AnswerRow, certified_reach, write_answer};
 use serde_json::{Value, json};
 
@@ -20,10 +20,7 @@ pub(super) fn tell(
     let mut line = Vec::new();
     write_answer(&mut line, &row).map_err(Refusal::new)?;
     let kept = fields.truncated(p);
-    let sample = match kept {
-        Answer::Known(s) | Answer::Saturated(s) => Some(s),
-        Answer::Unknown | Answer::Outside => None,
-    };
+    let sample = kept.value();
     Ok(json!({
         "at": p,
         "cell": tsdf.grid().lattice.cell_of(p),
@@ -39,7 +36,7 @@ pub(super) fn tell(
         },
         // It certifies nothing: what it keeps is measured along beams, not to the nearest surface.
         "truncated": {
-            "status": kept.status(),
+            "status": kept.status().word(),
             "distance": sample.map(|s| s.0),
             "gradient": sample.map(|s| s.1),
             "norm": length(sample.map(|s| s.1)),
@@ -48,14 +45,14 @@ pub(super) fn tell(
 }
 
 /// The row that `query` prints for a `map.portolan` of this map, with `--unknown` as given.
-pub(super) fn row(tsdf: &Tsdf2, field: &SparseEsdf<2>, p: [f64; 2], unknown: UnknownSpace) -> AnswerRow<2> {
+pub(super) fn row(tsdf: &Tsdf2, field: &Esdf<2>, p: [f64; 2], unknown: UnknownSpace) -> AnswerRow<2> {
     let mut row = AnswerRow::of(p, tsdf.occupancy(p), in_box(tsdf, field, p));
     row.certify(field, p, unknown, certified_reach(field));
     row
 }
 
 /// A map of the plane is a box: what lies outside does not depend on where something was seen.
-fn in_box(tsdf: &Tsdf2, field: &SparseEsdf<2>, p: [f64; 2]) -> Answer<Sample> {
+fn in_box(tsdf: &Tsdf2, field: &Esdf<2>, p: [f64; 2]) -> Answer<Sample> {
     match field.distance_and_gradient(p) {
         _ if !tsdf.grid().aabb().contains(p) => Answer::Outside,
         Answer::Outside => Answer::Unknown,

@@ -4,9 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use portolan::Answer;
-use portolan::field::{
-    Clearance, ClearanceField, EsdfSettings, SparseEsdf, SparseEsdfSettings, UnknownSpace,
-};
+use portolan::field::{ClearanceField, Esdf, EsdfSettings, UnknownSpace};
 use portolan::geom::{Pose, vector};
 use portolan::map::Tsdf2;
 use portolan::plan::{Cause, PathCheck, Waypoints, check_path};
@@ -87,21 +85,13 @@ fn points(tsdf: &Tsdf2, n: usize) -> Vec<[f64; 2]> {
 }
 
 /// The field that `query` makes of a `map.portolan`.
-fn field_of_query(tsdf: &Tsdf2, unknown: bool) -> SparseEsdf<2> {
-    let settings = SparseEsdfSettings {
-        min_weight: EsdfSettings::of(tsdf).min_weight,
+fn field_of_query(tsdf: &Tsdf2, unknown: bool) -> Esdf<2> {
+    let settings = EsdfSettings {
         max_distance: vector::norm(tsdf.grid().aabb().extent()).max(tsdf.grid().lattice.resolution),
         unknown,
-        ..SparseEsdfSettings::default()
+        ..EsdfSettings::default()
     };
-    SparseEsdf::of_tsdf(tsdf, &settings)
-}
-
-fn some(answer: Answer<Clearance>) -> Option<Clearance> {
-    match answer {
-        Answer::Known(c) | Answer::Saturated(c) => Some(c),
-        Answer::Unknown | Answer::Outside => None,
-    }
+    Esdf::of(tsdf, &settings)
 }
 
 /// The probe against the library's own answers, through the page's JSON; which statuses there were.
@@ -120,25 +110,22 @@ fn agrees(studio: &mut Studio, n: usize) -> Vec<String> {
             let number = |name: &str| told[name].as_f64().map(f64::to_bits);
             let inside = tsdf.grid().aabb().contains(p);
             let answer = if inside { field.distance_and_gradient(p) } else { Answer::Outside };
-            let surface = some(field.clearance(p, UnknownSpace::Optimistic));
+            let surface = field.clearance(p, UnknownSpace::Optimistic).value();
             let far = surface.is_some_and(|c| c.lower >= limit);
             let status = match answer {
                 Answer::Known(_) | Answer::Saturated(_) if far => "saturated",
                 Answer::Outside if inside => "unknown",
-                answer => answer.status(),
+                answer => answer.status().word(),
             };
             assert_eq!(told["status"], status, "{p:?}");
-            let sample = match answer {
-                Answer::Known(s) | Answer::Saturated(s) => Some(s),
-                Answer::Unknown | Answer::Outside => None,
-            };
+            let sample = answer.value();
             let distance = sample.map(|(d, _)| if far { limit.copysign(d) } else { d });
             assert_eq!(number("distance"), distance.map(f64::to_bits), "{p:?}");
             let slope = sample.filter(|_| status == "known").map(|s| s.1);
             let gradient = told["gradient"].as_array().map(|g| [0, 1].map(|k| g[k].as_f64().unwrap()));
             assert_eq!(gradient, slope, "{p:?}");
             assert_eq!(told["norm"].as_f64(), slope.map(vector::norm));
-            let asked = sample.and_then(|_| some(field.clearance(p, unknown)));
+            let asked = sample.and_then(|_| field.clearance(p, unknown).value());
             let lower = asked.map(|c| if far { c.lower.min(limit) } else { c.lower });
             assert_eq!(number("lower"), lower.map(f64::to_bits), "{p:?}");
             let says_more = !(far && unknown == UnknownSpace::Optimistic);

@@ -18,7 +18,7 @@ pub(super) fn at(made: &Made, p: [f64; 2]) -> Value {
         "grid": { "occupied": m.occupancy.occupancy(p), "searched": m.occupancy.search_distance_by_rings(p, limit) },
         "tree": { "occupied": m.tree.occupancy(p) },
         "tsdf": { "distance": cell.map(|c| c.distance), "weight": cell.map(|c| c.weight) },
-        "esdf": { "distance": m.distance().distance(p).known(), "status": m.distance().distance(p).status() },
+        "esdf": { "distance": m.distance().distance(p).known(), "status": m.distance().distance(p).status().word() },
         "contour": {
             "distance": m.contour.nearest_distance(p),
             "inside": m.contour.is_inside(p),

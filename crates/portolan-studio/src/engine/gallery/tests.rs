@@ -167,7 +167,7 @@ fn answers_are_the_librarys() {
     for p in [[2.0, 2.0], [6.03, 4.51], [0.02, 8.9], [-3.0, 1.0]] {
         let told = ask(&mut session, json!({ "op": "answers", "at": p }));
         assert_eq!(told["esdf"]["distance"].as_f64(), gallery.distance().distance(p).known());
-        assert_eq!(told["esdf"]["status"], gallery.distance().distance(p).status());
+        assert_eq!(told["esdf"]["status"], gallery.distance().distance(p).status().word());
         assert_eq!(told["contour"]["distance"].as_f64(), gallery.contour.nearest_distance(p));
         assert_eq!(told["cloud"]["distance"].as_f64(), gallery.cloud.nearest_distance(p));
         assert_eq!(told["grid"]["occupied"].as_f64(), gallery.occupancy.probability(p).known());

@@ -1,6 +1,6 @@
 //! Files of a map of space, in memory: the same bytes that the command line writes.
 
-use portolan::field::SparseEsdf;
+use portolan::field::Esdf;
 use portolan::store::Tree;
 use portolan_io::{esdf_to_bytes, glb_to_bytes, octomap_bt_to_bytes, ply_mesh_to_bytes};
 
@@ -36,7 +36,7 @@ pub(super) fn file(made: &Made, file: ExportFile) -> Result<Reply, Refusal> {
     }
 }
 
-fn dense(esdf: &SparseEsdf<3>) -> Result<Reply, Refusal> {
+fn dense(esdf: &Esdf<3>) -> Result<Reply, Refusal> {
     let grid = esdf.grid().ok_or_else(|| Refusal::new("nothing was observed yet"))?;
     let most = (LARGEST_DENSE - 64) / DENSE_CELL;
     if grid.checked_len().is_none_or(|cells| cells > most) {
@@ -48,6 +48,6 @@ fn dense(esdf: &SparseEsdf<3>) -> Result<Reply, Refusal> {
     let dense = esdf.dense(&grid);
     answer(
         "esdf.bin",
-        esdf_to_bytes(&dense.grid, &dense.distances, Some(&dense.status)).map_err(Refusal::new)?,
+        esdf_to_bytes(dense.grid(), dense.samples(), Some(&dense.status_bytes())).map_err(Refusal::new)?,
     )
 }

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
-use portolan::field::SparseEsdf;
+use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::vector::sub;
 use portolan::geom::{BlockKey, Pose};
 use portolan::map::{MapError, Occupancy, Tsdf3};
 use portolan::scan::{Frame, ScanStats};
-use portolan::surface::IncrementalMesh;
+use portolan::surface::{IncrementalMesh, MeshSettings};
 
 use super::drawn::Drawn;
 use super::history::Watched;
-use super::settings::{Settings, esdf_settings, mesh_settings};
+use super::settings::Settings;
 use super::source::Source;
 use crate::engine::{Clock, Refusal};
 
@@ -37,9 +37,9 @@ pub(super) struct Seconds {
 pub(super) struct Made {
     /// Frames that are fused.
     pub(super) at: usize,
-    pub(super) tsdf: Tsdf3,
-    pub(super) occupancy: Option<Occupancy<3>>,
-    pub(super) esdf: Option<SparseEsdf<3>>,
+    pub(super) tsdf: SparseTsdf,
+    pub(super) occupancy: Option<SparseOccupancy>,
+    pub(super) esdf: Option<Esdf<3>>,
     /// The map's epoch when the Euclidean field was made.
     measured: u64,
     pub(super) mesh: IncrementalMesh,
@@ -82,7 +82,7 @@ impl Made {
             at: 0,
             origin: tsdf.lattice().corner(near.first_cell()),
             first: near,
-            mesh: IncrementalMesh::new(mesh_settings(&tsdf)),
+            mesh: IncrementalMesh::new(MeshSettings::of(&tsdf)),
             drawn: Drawn::nothing(source.up()),
             tsdf,
             occupancy,
@@ -169,20 +169,19 @@ impl Made {
                 (needed - memory).div_ceil(1 << 20)
             )));
         }
-        let settings = esdf_settings(&self.tsdf);
         let store = self.tsdf.store();
         let ((), seconds) = clock.time(|| match &mut self.esdf {
             Some(esdf) => {
                 esdf.update(store);
             }
-            None => self.esdf = Some(SparseEsdf::of(store, &settings)),
+            None => self.esdf = Some(Esdf::of(&self.tsdf, &EsdfSettings::default())),
         });
         self.measured = store.epoch();
         Ok(seconds)
     }
 
     /// The Euclidean field, where it is that of the map as it is now.
-    pub(super) fn esdf_now(&self) -> Option<&SparseEsdf<3>> {
+    pub(super) fn esdf_now(&self) -> Option<&Esdf<3>> {
         self.esdf.as_ref().filter(|_| self.measured == self.tsdf.store().epoch())
     }
 
@@ -207,8 +206,8 @@ impl Made {
 
     pub(super) fn memory_bytes(&self) -> usize {
         self.tsdf.memory_bytes()
-            + self.occupancy.as_ref().map_or(0, Occupancy::<3>::memory_bytes)
-            + self.esdf.as_ref().map_or(0, SparseEsdf::memory_bytes)
+            + self.occupancy.as_ref().map_or(0, SparseOccupancy::memory_bytes)
+            + self.esdf.as_ref().map_or(0, Esdf::memory_bytes)
             + self.mesh.memory_bytes()
             + self.drawn.memory_bytes()
     }

@@ -1,10 +1,8 @@
 //! What the page's sliders set.
 
 use portolan::cell::OccupancyModel;
-use portolan::field::SparseEsdfSettings;
 use portolan::geom::Lattice;
-use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
-use portolan::surface::MeshSettings;
+use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdfConfig};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
@@ -88,16 +86,4 @@ impl Settings {
     pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<Occupancy<3>, Refusal> {
         Occupancy::<3>::new(lattice, OccupancyModel::default()).map_err(Refusal::new)
     }
-}
-
-/// As `map` does: half of what one ordinary ray weighs; what was seen once is a surface.
-pub(super) fn mesh_settings(tsdf: &Tsdf3) -> MeshSettings {
-    MeshSettings { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..MeshSettings::default() }
-}
-
-/// As `map` does: half of what one ordinary observation of free space weighs; what was seen free once is known.
-pub(super) fn esdf_settings(tsdf: &Tsdf3) -> SparseEsdfSettings {
-    let config = tsdf.config();
-    let min_weight = 0.5 * config.weights.typical_low() * config.carve_weight;
-    SparseEsdfSettings { min_weight, ..SparseEsdfSettings::default() }
 }

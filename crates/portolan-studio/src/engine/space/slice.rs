@@ -1,6 +1,6 @@
 //! A layer of cells of a field, as an image.
 
-use portolan::field::SparseEsdf;
+use portolan::field::Esdf;
 use portolan::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
 use portolan::map::{Occupancy, Tsdf3};
 use portolan::store::Store;
@@ -76,33 +76,19 @@ pub(super) fn layer_index(
 /// What a field says of a cell; NaN: nothing.
 pub(super) fn value_of<'a>(
     field: Field,
-    tsdf: &'a Tsdf3,
-    occupancy: Option<&'a Occupancy<3>>,
-    esdf: Option<&'a SparseEsdf<3>>,
+    tsdf: &'a SparseTsdf,
+    occupancy: Option<&'a SparseOccupancy>,
+    esdf: Option<&'a Esdf<3>>,
 ) -> impl Fn([i32; 3]) -> f32 + 'a {
     move |cell| {
         let value = match field {
             Field::Tsdf => tsdf.store().cell(cell).map(|c| c.distance),
-            Field::Esdf => esdf.and_then(|esdf| esdf.cell(cell).known_or_saturated()),
+            Field::Esdf => esdf.and_then(|esdf| esdf.cell(cell).value()),
             Field::Occupancy => occupancy
                 .and_then(|map| map.probability(map.store().lattice().center(cell)).known())
                 .map(|p| p as f32),
         };
         value.unwrap_or(f32::NAN)
-    }
-}
-
-/// What is said with a number, be it as far as is maintained.
-pub(super) trait KnownOrSaturated<T> {
-    fn known_or_saturated(self) -> Option<T>;
-}
-
-impl<T> KnownOrSaturated<T> for portolan::Answer<T> {
-    fn known_or_saturated(self) -> Option<T> {
-        match self {
-            Self::Known(v) | Self::Saturated(v) => Some(v),
-            Self::Unknown | Self::Outside => None,
-        }
     }
 }
 

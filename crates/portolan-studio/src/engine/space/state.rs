@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use portolan::field::SparseEsdf;
+use portolan::field::Esdf;
 use portolan::geom::BLOCK_EDGE;
 use portolan::geom::vector::{add, dot, sub};
 use portolan::map::Occupancy;
@@ -217,8 +217,8 @@ impl Space {
             "bricks": tsdf.store().len(),
             "bytes": {
                 "tsdf": tsdf.memory_bytes(),
-                "occupancy": made.occupancy.as_ref().map(Occupancy::memory_bytes),
-                "esdf": made.esdf.as_ref().map(SparseEsdf::memory_bytes),
+                "occupancy": made.occupancy.as_ref().map(SparseOccupancy::memory_bytes),
+                "esdf": made.esdf.as_ref().map(Esdf::memory_bytes),
                 "mesh": made.mesh.memory_bytes(),
             },
             "surface": surface,

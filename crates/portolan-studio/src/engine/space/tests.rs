@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use portolan::surface::marching_cubes;
+use portolan::surface::{MeshSettings, marching_cubes};
 use serde_json::{Value, json};
 
-use super::settings::mesh_settings;
 use super::state::Space;
 use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Session, Values, Wire};
 
@@ -88,7 +87,7 @@ fn drain(space: &mut Space, page: &mut Page, first: Reply) -> Reply {
 
 fn whole(space: &Space) -> Vec<[[u32; 3]; 3]> {
     let made = space.made_for_tests();
-    let mesh = marching_cubes(made.tsdf.store(), None, &mesh_settings(&made.tsdf));
+    let mesh = marching_cubes(&made.tsdf, None, &MeshSettings::default());
     // The same operations with another corner: places differ by rounding only where the corner does.
     let shift: [f64; 3] = std::array::from_fn(|k| mesh.origin[k] - made.origin[k]);
     assert!(shift.iter().all(|s| s.is_finite()));

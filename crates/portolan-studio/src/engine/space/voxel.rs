@@ -8,8 +8,7 @@ use serde_json::{Value, json};
 
 use super::ask::Slice;
 use super::made::Made;
-use super::settings::mesh_settings;
-use super::slice::{AXES, Extent, KnownOrSaturated, layer_index, value_of};
+use super::slice::{AXES, Extent, layer_index, value_of};
 use super::source::Source;
 use crate::engine::Refusal;
 
@@ -37,7 +36,7 @@ pub(super) fn pick(
     }
     let direction = scale(direction, 1.0 / length);
     let settings = RayCastSettings {
-        min_weight: mesh_settings(&made.tsdf).min_weight,
+        min_weight: Some(made.tsdf.thresholds().surface),
         max_range: FARTHEST,
         // The eye is outside of the map: whatever lies between was not observed.
         unknown_tolerance: FARTHEST,
@@ -88,13 +87,13 @@ pub(super) fn tell(made: &Made, source: &Source, cell: [i32; 3], origin: [f64; 3
     let esdf = made.esdf_now().map(|esdf| {
         let distance = esdf.cell(cell);
         let interval = esdf.clearance(center, UnknownSpace::Optimistic);
-        let bounds = interval.known_or_saturated().map(|c| [c.lower, c.upper]);
+        let bounds = interval.value().map(|c| [c.lower, c.upper]);
         json!({
-            "status": distance.status(),
-            "distance": distance.known_or_saturated(),
+            "status": distance.status().word(),
+            "distance": distance.value(),
             "lower": bounds.map(|b| b[0]),
             "upper": bounds.map(|b| b[1]),
-            "interval": interval.status(),
+            "interval": interval.status().word(),
         })
     });
     let color = made.tsdf.color(center).filter(|c| c.weight > 0);
@@ -104,7 +103,7 @@ pub(super) fn tell(made: &Made, source: &Source, cell: [i32; 3], origin: [f64; 3
         "corner": std::array::from_fn::<_, 3, _>(|k| lattice.corner(cell)[k] - origin[k]),
         "distance": state.map(|s| s.distance),
         "weight": state.map(|s| s.weight),
-        "status": made.tsdf.signed_distance(center).status(),
+        "status": made.tsdf.signed_distance(center).status().word(),
         "occupancy": occupancy,
         "esdf": esdf,
         "color": color.map(|c| json!({ "rgb": c.rgb8(), "weight": c.weight() })),

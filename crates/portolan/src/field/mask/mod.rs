@@ -7,7 +7,7 @@
 //! neighbours found: minima of parabolas of one width are ordered as the rows are *(the total monotonicity of Aggarwal
 //! et al. 1987)*.
 
-mod level;
+mod integer;
 mod panel;
 mod passes;
 mod scan;

@@ -1,6 +1,6 @@
 //! The passes along the axes, slab by slab.
 
-use super::level::Level;
+use super::integer::Integer;
 use super::panel::{Panel, solve};
 use super::scan::scan;
 use super::transform::MaskCell;
@@ -43,7 +43,7 @@ struct Scratch<L, const N: usize> {
     nearest: Vec<u32>,
 }
 
-impl<L: Level, const D: usize> Plan<L, D> {
+impl<L: Integer, const D: usize> Plan<L, D> {
     /// Squared distances, changed by `last`, and cells; `nearest` may be empty.
     pub(super) fn run<M: MaskCell, const N: usize>(
         &self,

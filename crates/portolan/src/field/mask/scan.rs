@@ -1,13 +1,13 @@
 //! The pass along x, straight from the mask.
 
-use super::level::Level;
+use super::integer::Integer;
 use super::transform::MaskCell;
 
 /// Squared distances along one line to its nearest cell that is set, and where that one is (the lower of two).
 ///
 /// `squares[k]` is `k^2` for every offset in the line. Runs are found and filled as a whole: ramps between two cells
 /// that are set are copied from the table.
-pub(super) fn scan<M: MaskCell, L: Level>(mask: &[M], squares: &[L], out: &mut [L], nearest: &mut [u32]) {
+pub(super) fn scan<M: MaskCell, L: Integer>(mask: &[M], squares: &[L], out: &mut [L], nearest: &mut [u32]) {
     let n = mask.len();
     let with_nearest = !nearest.is_empty();
     let mut at = 0;

@@ -1,6 +1,6 @@
 //! What is asked for, and the choice of the numbers to compute it with.
 
-use super::level::Level;
+use super::integer::Integer;
 use super::panel::PLAIN;
 use super::passes::Plan;
 
@@ -169,7 +169,7 @@ impl<const D: usize> MaskTransform<D> {
         Ok(())
     }
 
-    fn plan<L: Level>(&self) -> Plan<L, D> {
+    fn plan<L: Integer>(&self) -> Plan<L, D> {
         let longest = self.shape.iter().copied().max().unwrap_or(0);
         Plan {
             shape: self.shape,

@@ -4,5 +4,5 @@ mod batch;
 mod cubic;
 mod neighbourhood;
 
-pub use batch::{FieldSlots, Interpolation, Status};
+pub use batch::{FieldSlots, Interpolation};
 pub use cubic::Smooth;

@@ -2,33 +2,46 @@
 
 use super::cubic::{Neighbourhood, Smooth, complete, cubic};
 use crate::answer::Answer;
-use crate::field::{Esdf, SparseEsdf};
+use crate::field::{Esdf, EsdfGrid};
 use crate::geom::{BLOCK_EDGE, BlockKey, vector};
 
-/// The point's cell (the lower one of the two centres beside it, along every axis) and its place in it, or why there is
-/// none.
-type Place<const D: usize> = Answer<([i32; D], [f64; D])>;
-
-impl<const D: usize> Esdf<D> {
+impl<const D: usize> EsdfGrid<D> {
     /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centres around a point, for
-    /// optimisers that take the jumps of [`Esdf::gradient`] ill. O(1).
+    /// optimisers that take the jumps of [`EsdfGrid::gradient`] ill. O(1).
     ///
     /// Cubic through the samples; linear and quadratic fields are reproduced, and between samples it may pass them by an
-    /// eighth of their second difference. Unknown where [`Esdf::distance`] is: where one of the `2^D` centres next to the
+    /// eighth of their second difference. Unknown where [`EsdfGrid::distance`] is: where one of the `2^D` centres next to the
     /// point is. Others that are missing, at the border of the map or of what is known, are replaced by the straight line
     /// through the two next to them: within a cell of what is unknown, and only there, value and gradient may jump, by
     /// less than the second difference of the samples.
     pub fn smooth(&self, p_world: impl Into<[f64; D]>) -> Answer<Smooth<D>> {
         let p = p_world.into();
-        let Some((base, fraction)) = self.grid().interpolation(p) else {
-            return if self.grid().aabb().contains(p) { Answer::Unknown } else { Answer::Outside };
-        };
+        let Some((base, fraction)) = self.grid().interpolation(p) else { return self.nothing_at(p) };
         self.cubic::<true>(base, &fraction).unwrap_or(Answer::Unknown)
     }
 
     /// The answer in a cell; `None`: unknown.
     #[inline(always)]
     pub(super) fn cubic<const HESSIAN: bool>(
+        &self,
+        base: [i32; D],
+        fraction: &[f64; D],
+    ) -> Option<Answer<Smooth<D>>> {
+        let answer = self.cubic_of_samples::<HESSIAN>(base, fraction)?;
+        match answer {
+            Answer::Known(smooth) if self.has_status() => {
+                // Any of the 4^D that stands for more.
+                let saturated = (0..1usize << D).any(|c| {
+                    self.saturated_beside(std::array::from_fn(|k| base[k] - 1 + 2 * (c >> k & 1) as i32))
+                });
+                Some(if saturated { Answer::Saturated(smooth) } else { answer })
+            }
+            _ => Some(answer),
+        }
+    }
+
+    #[inline(always)]
+    fn cubic_of_samples<const HESSIAN: bool>(
         &self,
         base: [i32; D],
         fraction: &[f64; D],
@@ -60,37 +73,15 @@ impl<const D: usize> Esdf<D> {
     }
 }
 
-impl<const D: usize> SparseEsdf<D> {
+impl<const D: usize> Esdf<D> {
     /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centres around a point, for
-    /// optimisers that take the jumps of [`SparseEsdf::gradient`] ill. O(1): a look into up to `2^D` bricks.
+    /// optimisers that take the jumps of [`Esdf::gradient`] ill. O(1): a look into up to `2^D` bricks.
     ///
-    /// As [`Esdf::smooth`]. Saturated where one of the `4^D` is beyond the largest distance, which it then stands for.
+    /// As [`EsdfGrid::smooth`]. Saturated where one of the `4^D` is beyond the largest distance, which it then stands for.
     pub fn smooth(&self, p_world: impl Into<[f64; D]>) -> Answer<Smooth<D>> {
         let p = p_world.into();
-        match self.place(p) {
-            Answer::Known((base, fraction)) => {
-                self.cubic::<true>(base, &fraction).unwrap_or_else(|| self.nothing(p))
-            }
-            _ => Answer::Outside,
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn place(&self, p: [f64; D]) -> Place<D> {
-        let lattice = self.lattice();
-        let shifted: [f64; D] = std::array::from_fn(|k| p[k] - 0.5 * lattice.resolution);
-        let Some(base) = lattice.cell_of(shifted) else { return Answer::Outside };
-        let cells = lattice.to_cells(p);
-        let fraction = std::array::from_fn(|k| (cells[k] - 0.5 - f64::from(base[k])).clamp(0.0, 1.0));
-        Answer::Known((base, fraction))
-    }
-
-    /// What there is to say about a point that cannot be interpolated: it belongs to the cell that holds it.
-    pub(super) fn nothing<T>(&self, p: [f64; D]) -> Answer<T> {
-        self.lattice().cell_of(p).map_or(Answer::Outside, |cell| match self.cell(cell) {
-            Answer::Outside => Answer::Outside,
-            _ => Answer::Unknown,
-        })
+        let Some((base, fraction)) = self.place(p) else { return Answer::Outside };
+        self.cubic::<true>(base, &fraction).unwrap_or_else(|| self.nothing(p))
     }
 
     /// The answer in a cell; `None`: unknown.

@@ -6,6 +6,7 @@ use super::samples::{BrickSamples, MIDDLE, threshold};
 use super::signs::{Layers, Signs, signs_of_brick};
 use crate::cell::{Color, DistanceBrick, SignedDistance};
 use crate::geom::BlockKey;
+use crate::map::DistanceMap;
 use crate::parallel;
 use crate::store::{Bricks, Store};
 use crate::surface::Mesh;
@@ -13,8 +14,9 @@ use crate::surface::Mesh;
 /// How a mesh is extracted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshSettings {
-    /// A cube with a corner of smaller weight has no sign and gets no triangle: no geometry is invented.
-    pub min_weight: f32,
+    /// A cube with a corner of smaller weight has no sign and gets no triangle: no geometry is invented. `None`: what fits
+    /// the map ([`Thresholds::surface`](crate::map::Thresholds::surface)), and any weight above 0 where cells alone are given.
+    pub min_weight: Option<f32>,
     /// Whether vertices get normals.
     pub normals: bool,
     /// Whether vertices get colours, where there are any.
@@ -22,13 +24,18 @@ pub struct MeshSettings {
 }
 
 impl Default for MeshSettings {
-    /// The `W_min` 0.5 of contours; normals and colours.
+    /// The weight that fits the map; normals and colors.
     fn default() -> Self {
-        Self { min_weight: 0.5, normals: true, colors: true }
+        Self { min_weight: None, normals: true, colors: true }
     }
 }
 
 impl MeshSettings {
+    /// The default, with the weight that fits a map written out: for meshes of its cells alone.
+    pub fn of(map: &impl DistanceMap<3>) -> Self {
+        Self { min_weight: Some(map.thresholds().surface), ..Self::default() }
+    }
+
     pub(super) fn attributes(&self, colors: bool) -> Attributes {
         Attributes { normals: self.normals, colors: self.colors && colors }
     }
@@ -56,17 +63,27 @@ const TOGETHER: usize = 64;
 ///
 /// The mesh is a manifold: every edge lies between two triangles, or between one and what was not observed. It has no
 /// cracks between bricks: a vertex belongs to its edge. The order of everything is that of the bricks' keys and the same
-/// for any number of threads. O(cells), a few nanoseconds each where no surface is near; see the bench `mesh`.
+/// for any number of threads. `map` is a [`SparseTsdf`](crate::map::SparseTsdf), or the cells of one. O(cells), a few nanoseconds each where no surface is near; see the bench `mesh`.
 pub fn marching_cubes(
+    map: &impl DistanceMap<3>,
+    colors: Option<&Bricks<Color, 3>>,
+    settings: &MeshSettings,
+) -> Mesh {
+    let min_weight = settings.min_weight.unwrap_or(map.thresholds().surface);
+    mesh_of(&map.bricks(), colors, settings, min_weight)
+}
+
+fn mesh_of(
     store: &Bricks<SignedDistance, 3>,
     colors: Option<&Bricks<Color, 3>>,
     settings: &MeshSettings,
+    min_weight: f32,
 ) -> Mesh {
     let mut bricks: Vec<_> = store.bricks_by_age().collect();
     bricks.sort_unstable_by_key(|(key, _)| order(*key));
     let want = settings.attributes(colors.is_some());
     let colors = colors.filter(|_| want.colors);
-    let threshold = threshold(settings.min_weight);
+    let threshold = threshold(min_weight);
     let chunks = bricks.len().div_ceil(TOGETHER);
     let range = |chunk: usize| chunk * TOGETHER..((chunk + 1) * TOGETHER).min(bricks.len());
     let signs = parallel::map(&bricks, TOGETHER, |(_, brick)| signs_of_brick(brick, threshold));
@@ -185,7 +202,7 @@ mod tests {
         assert_eq!(mesh.triangles.len(), 2 * 17 * 29);
         assert_eq!(mesh.vertices.len(), 18 * 30);
         assert!(mesh.normals.iter().all(|n| *n == [0.0, 0.0, 1.0]));
-        let strict = MeshSettings { min_weight: 1.5, ..MeshSettings::default() };
+        let strict = MeshSettings { min_weight: Some(1.5), ..MeshSettings::default() };
         assert!(marching_cubes(&store, None, &strict).triangles.is_empty());
         assert_eq!(marching_cubes(&Bricks::new(Lattice::new([0.0; 3], 1.0)), None, &strict), Mesh::default());
     }

@@ -28,7 +28,7 @@ pub struct IncrementalMesh {
 }
 
 impl IncrementalMesh {
-    /// A mesh of nothing yet.
+    /// A mesh of nothing yet. [`MeshSettings::of`] are the settings that fit a map; without a weight any above 0 counts.
     pub fn new(settings: MeshSettings) -> Self {
         Self { settings, colored: false, pieces: FxHashMap::default(), seen: [0; 2], placement: None }
     }
@@ -67,7 +67,7 @@ impl IncrementalMesh {
         dirty.dedup();
         dirty.retain(|key| store.brick(*key).is_some());
         let parts = parallel::map_numbers(dirty.len(), Numbers::new, |i, numbers| {
-            mesh_brick(store, colors, self.settings.min_weight, want, dirty[i], numbers)
+            mesh_brick(store, colors, self.settings.min_weight.unwrap_or(0.0), want, dirty[i], numbers)
         });
         for (key, part) in dirty.iter().zip(parts) {
             if part.pieces.is_empty() {
@@ -254,7 +254,7 @@ mod tests {
             let mut random = Random(seed);
             let lattice = Lattice::new([500_000.0, 4_000_000.0, -3.0], 0.05);
             let (mut store, mut colors) = (Bricks::new(lattice), Bricks::new(lattice));
-            let settings = MeshSettings { min_weight: 0.5, normals, colors: true };
+            let settings = MeshSettings { min_weight: Some(0.5), normals, colors: true };
             let mut incremental = IncrementalMesh::new(settings);
             for round in 0..6 {
                 for _ in 0..1 + random.next() % 4 {
