@@ -5,7 +5,6 @@ mod error;
 mod integrate;
 mod occupancy_grid;
 mod repr;
-mod sparse_fuse;
 mod sparse_occupancy;
 #[cfg(test)]
 mod sparse_occupancy_tests;
@@ -14,11 +13,12 @@ mod sparse_tsdf_config;
 mod tree_map;
 mod tsdf;
 
+pub use crate::sweep::OccupancySweep;
 pub use cloud::Cloud;
 pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
 pub use repr::{Abilities, Derived, DerivedField, MapRepr};
-pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
+pub use sparse_occupancy::SparseOccupancy;
 pub use sparse_tsdf::SparseTsdf;
 pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
 pub use tree_map::{

@@ -1,32 +1,13 @@
 //! Occupancy of space in bricks: memory only where something was seen.
 
 use super::error::{most_bricks, too_many};
-use super::sparse_fuse::{free_reach, fuse, stats, union};
 use super::{Abilities, MapError, MapRepr};
 use crate::answer::Answer;
-use crate::cell::{LogOdds8, LogOddsValue, OccupancyModel, Planes};
+use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsValue, OccupancyModel, Planes};
 use crate::geom::{Aabb, Lattice, Pose, block_cells};
-use crate::parallel;
-use crate::scan::{Frame, LayoutFinder, Origin, PointScan, RangeImage, Scan, ScanStats, SphericalLayout};
+use crate::scan::{Frame, Scan, ScanStats, SphericalLayout};
 use crate::store::{Bricks, BricksFull, Store};
-use crate::sweep::occupancy::{Bits, CellBox, ExactRays, Guard, LONGEST_RAY, Projective, Ray};
-use std::borrow::Cow;
-
-/// Boxes of more bricks than this are not searched for free space: single readings from far away are cheaper as rays.
-const PROJECTIVE_BRICKS: u64 = 1 << 27;
-
-/// How a scan becomes evidence of hits and misses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum OccupancySweep {
-    /// Projective where a scan has rows and columns or gets them, exact otherwise.
-    #[default]
-    Auto,
-    /// Every cell that a beam passes, exactly: the map that OctoMap makes.
-    Exact,
-    /// Misses through a range image, hits exact: faster, frees the space between beams, and carves grazing surfaces less.
-    /// As `Auto`, said by name.
-    Projective,
-}
+use crate::sweep::{HitMissSweep, OccupancySweep, PlanError, PlanLimits, PlannedScan};
 
 /// Clamped log odds in hashed bricks of `8^3` cells; the map of space for lidars and depth cameras.
 ///
@@ -51,11 +32,8 @@ pub struct SparseOccupancy<V: LogOddsValue = LogOdds8> {
     rule: V::Rule,
     lookup: V::Lookup,
     model: OccupancyModel,
-    sweep: OccupancySweep,
-    bounds: Option<(Aabb<3>, CellBox)>,
-    exact: ExactRays,
-    guard: Guard,
-    layout: LayoutFinder,
+    bounds: Option<Aabb<3>>,
+    sweep: HitMissSweep,
 }
 
 impl<V: LogOddsValue> SparseOccupancy<V> {
@@ -79,17 +57,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         super::error::check_lattice(store.lattice())?;
         let rule = V::rule(&model)?;
         let lookup = V::lookup(&rule);
-        Ok(Self {
-            store,
-            rule,
-            lookup,
-            model,
-            sweep,
-            bounds: None,
-            exact: ExactRays::default(),
-            guard: Guard::default(),
-            layout: LayoutFinder::default(),
-        })
+        Ok(Self { store, rule, lookup, model, bounds: None, sweep: HitMissSweep::new(sweep) })
     }
 
     /// Allows no more than `bytes` for the store from now on.
@@ -99,13 +67,12 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
 
     /// Changes only cells in this box (world) from now on; `None`: everywhere. Snapped outwards to cells.
     pub fn set_bounds(&mut self, bounds: Option<Aabb<3>>) {
-        let lattice = self.store.lattice();
-        self.bounds = bounds.map(|b| CellBox::of(&b, lattice)).map(|cells| (cells.aabb(lattice), cells));
+        self.bounds = bounds;
     }
 
-    /// Rows and columns for scans of points that come without them; otherwise found in the first scan.
+    /// Rows and columns for scans of points that come without them; otherwise they are found.
     pub fn set_layout(&mut self, layout: SphericalLayout) {
-        self.layout = LayoutFinder::of(layout);
+        self.sweep.set_layout(layout);
     }
 
     /// Fuses what a sensor delivered at a known pose. A pose that is not rigid is refused and counted, and so is a ray that
@@ -119,14 +86,7 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         if !self.has_place(world_from_sensor) {
             return Ok(ScanStats { refused_poses: 1, ..Default::default() });
         }
-        let stats = match frame {
-            Frame::Points(scan) => self.points(world_from_sensor, scan)?,
-            Frame::Image(image) => {
-                image.check().map_err(MapError::Image)?;
-                self.image(world_from_sensor, image)?
-            }
-        };
-        Ok(ScanStats { refused: stats.refused + frame.refused(), ..stats })
+        self.fuse(|sweep, lattice, limits| sweep.plan(frame, world_from_sensor, lattice, limits))
     }
 
     /// Fuses surfaces seen from `origin` (both world, metres), in one call, with exact rays. Points that are not finite are refused and
@@ -143,120 +103,43 @@ impl<V: LogOddsValue> SparseOccupancy<V> {
         if self.store.lattice().cell_of(origin).is_none() {
             return Ok(ScanStats { refused_poses: 1, ..Default::default() });
         }
-        let n = points_world.len();
-        self.rays(n, n, None, |i| Ray { origin, end: points_world[i].into(), hit: true, passes: true })
+        self.fuse(|sweep, lattice, limits| sweep.plan_points(points_world, origin, lattice, limits))
     }
 
     fn has_place(&self, world_from_sensor: &Pose<3>) -> bool {
         world_from_sensor.is_rigid() && self.store.lattice().cell_of(world_from_sensor.translation).is_some()
     }
 
-    fn points(&mut self, world_from_sensor: &Pose<3>, scan: &PointScan) -> Result<ScanStats, MapError> {
-        let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
-        let hits = scan.points.len();
-        let (common, image) = match &scan.origin {
-            Origin::Common(o) => (world_from_sensor.transform_point(*o), self.organised(scan, *o)?),
-            Origin::PerPoint(_) => (world_from_sensor.translation, None),
-        };
-        let world_from_image = Pose { translation: common, ..*world_from_sensor };
-        let view = image.as_deref().map(|image| (&world_from_image, image));
-        let passes = view.is_none();
-        self.rays(hits, hits + scan.free_ends.len(), view, |i| match i.checked_sub(hits) {
-            Some(free) => {
-                Ray { origin: common, end: to_world(scan.free_ends[free]), hit: false, passes: true }
-            }
-            None => {
-                let origin = match &scan.origin {
-                    Origin::Common(_) => common,
-                    Origin::PerPoint(all) => all.get(i).map_or([f64::NAN; 3], |o| to_world(*o)),
-                };
-                Ray { origin, end: to_world(scan.points[i]), hit: true, passes }
-            }
-        })
-    }
-
-    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them.
-    fn organised<'a>(
+    /// Plans a scan, and fuses its evidence block by block.
+    fn fuse(
         &mut self,
-        scan: &'a PointScan,
-        origin: [f64; 3],
-    ) -> Result<Option<Cow<'a, RangeImage>>, MapError> {
-        if self.sweep == OccupancySweep::Exact {
-            return Ok(None);
-        }
-        if let Some(image) = &scan.image {
-            image.check().map_err(MapError::Image)?;
-            return Ok(Some(Cow::Borrowed(image)));
-        }
-        Ok(self.layout.image(&scan.points, origin).map(Cow::Owned))
-    }
-
-    fn image(&mut self, world_from_sensor: &Pose<3>, image: &RangeImage) -> Result<ScanStats, MapError> {
-        let passes = self.sweep == OccupancySweep::Exact;
-        let rays: Vec<Ray> = image
-            .readings()
-            .map(|(origin, end, hit)| Ray {
-                origin: world_from_sensor.transform_point(origin),
-                end: world_from_sensor.transform_point(end),
-                hit,
-                passes,
-            })
-            .collect();
-        let hits = rays.iter().filter(|r| r.hit).count();
-        let view = (!passes).then_some((world_from_sensor, image));
-        self.rays(hits, rays.len(), view, |i| rays[i])
-    }
-
-    /// Fuses `count` rays, `hits` of which end on surfaces, and what the range image of a view sees.
-    fn rays(
-        &mut self,
-        hits: usize,
-        count: usize,
-        view: Option<(&Pose<3>, &RangeImage)>,
-        ray: impl Fn(usize) -> Ray + Sync,
+        plan: impl FnOnce(&mut HitMissSweep, &Lattice<3>, &PlanLimits<3>) -> Result<PlannedScan, PlanError>,
     ) -> Result<ScanStats, MapError> {
-        let bounds = self.bounds.as_ref().map(|b| &b.0);
-        let passes_by_view = view.is_some();
-        let lattice = self.store.lattice();
-        let longest = LONGEST_RAY * lattice.resolution;
-        let further = view.map(|(pose, image)| free_reach(pose, image, longest)).unwrap_or_default();
         let limit = self.store.limit();
         let most = most_bricks(limit, size_of::<V>() * block_cells::<3>());
-        let full = BricksFull { limit, bricks: self.store.len(), bytes: self.store.memory_bytes() };
-        let guard = std::mem::take(&mut self.guard);
-        let exact = &mut self.exact;
-        let (planned, view) = parallel::join(
-            || exact.plan(lattice, bounds, count, &ray, &further, most),
-            || view.map(|(pose, image)| Projective::new(image, pose, lattice, guard)),
-        );
-        let mut tally = planned.map_err(|_| too_many(most, full))?;
-        let view = view.filter(|_| self.exact.reach_bricks() <= PROJECTIVE_BRICKS);
-        if view.is_none() && passes_by_view {
-            let planned =
-                self.exact.plan(lattice, bounds, count, |i| Ray { passes: true, ..ray(i) }, &[], most);
-            tally = planned.map_err(|_| too_many(most, full))?;
-        }
-        let seen = match (&view, self.exact.reach()) {
-            (Some(view), Some((first, last))) => view.bricks(first, last),
-            _ => Vec::new(),
-        };
-        let (keys, parts) = union(self.exact.keys(), &seen);
-        let exact = &self.exact;
-        let bits = |i: usize| {
-            let (marked, free): (Option<u32>, Option<bool>) = parts[i];
-            let mut bits = marked.map_or_else(Bits::default, |slot| *exact.bits(slot as usize));
-            let free = match (free, &view) {
-                (Some(true), _) => [u64::MAX; 8],
-                (Some(false), Some(view)) => view.free_cells(keys[i]),
-                _ => return bits,
-            };
-            (0..8).for_each(|w| bits.miss[w] |= free[w]);
-            bits
-        };
-        let cells = fuse(&mut self.store, &self.rule, self.bounds.map(|b| b.1), &keys, bits);
-        self.guard = view.map(Projective::into_guard).unwrap_or_default();
-        let cells = cells?;
-        Ok(stats(hits, count, tally, cells))
+        let limits = PlanLimits { bounds: self.bounds, most_blocks: most, colors: false };
+        let planned = plan(&mut self.sweep, self.store.lattice(), &limits).map_err(|error| match error {
+            PlanError::BadImage(why) => MapError::Image(why),
+            PlanError::TooManyBlocks => {
+                let (bricks, bytes) = (self.store.len(), self.store.memory_bytes());
+                too_many(most, BricksFull { limit, bricks, bytes })
+            }
+        });
+        let PlannedScan { beams, refused, hits_outside } = planned?;
+        let (sweep, rule) = (&self.sweep, &self.rule);
+        let cells = self.store.update(
+            sweep.blocks(),
+            || HitMiss::silent(block_cells::<3>()),
+            |i, brick, evidence| {
+                let observed = sweep.evidence(i, evidence);
+                if observed > 0 {
+                    let brick = brick.get_or_insert_with(|| V::Brick::unobserved(block_cells::<3>()));
+                    V::fuse_brick(brick, evidence, rule);
+                }
+                observed
+            },
+        )?;
+        Ok(ScanStats { scans: 1, beams, refused, cells, hits_outside, ..Default::default() })
     }
 
     /// P(occupied) at a point. O(1).
@@ -325,26 +208,10 @@ impl<V: LogOddsValue> MapRepr<3> for SparseOccupancy<V> {
         if !self.has_place(world_from_sensor) {
             return ScanStats { refused_poses: 1, ..Default::default() };
         }
-        let origin = world_from_sensor.translation;
-        let rays: Vec<Ray> = scan
-            .beams()
-            .filter(|b| b.free_range() > 0.0)
-            .map(|b| {
-                let end = world_from_sensor.transform_point(b.direction.map(|d| d * b.range));
-                Ray { origin, end, hit: b.is_hit(), passes: true }
-            })
-            .collect();
-        let hits = rays.iter().filter(|r| r.hit).count();
-        let mut beams = scan.counts();
-        match self.rays(hits, rays.len(), None, |i| rays[i]) {
-            Ok(fused) => {
-                let refused_hits = (hits as u64).saturating_sub(fused.beams.hit);
-                beams.hit -= refused_hits.min(beams.hit);
-                beams.dropped += refused_hits;
-                ScanStats { beams, refused: scan.refused() + fused.refused, ..fused }
-            }
-            Err(_) => ScanStats { scans: 1, beams, refused: scan.refused(), ..Default::default() },
-        }
+        let fused =
+            self.fuse(|sweep, lattice, limits| sweep.plan_beams(scan, world_from_sensor, lattice, limits));
+        let (beams, refused) = (scan.counts(), scan.refused());
+        fused.unwrap_or(ScanStats { scans: 1, beams, refused, ..Default::default() })
     }
 
     fn occupancy(&self, p_world: [f64; 3]) -> Option<f64> {
@@ -369,7 +236,8 @@ mod tests {
     use super::*;
     use crate::cell::LogOdds32;
     use crate::geom::BlockKey;
-    use crate::scan::{Beam, BeamKind, Pinhole, Projection, RefusedBeams};
+    use crate::scan::{Beam, BeamKind, Origin, Pinhole, PointScan, Projection, RangeImage, RefusedBeams};
+    use crate::sweep::CellBox;
 
     type Map = SparseOccupancy<LogOdds8>;
 
@@ -584,7 +452,7 @@ mod tests {
         small.set_limit(60_000);
         let full = small.integrate_points(&ends, [0.0; 3]);
         assert!(matches!(full, Err(MapError::Full(_))));
-        assert!(small.store().is_empty() && small.exact.keys().is_empty());
+        assert!(small.store().is_empty() && small.sweep.blocks().is_empty());
     }
 
     #[test]

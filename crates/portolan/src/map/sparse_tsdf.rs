@@ -8,9 +8,9 @@ use crate::cell::{
     Cell, Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
 };
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
-use crate::scan::{BeamCounts, Frame, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{Frame, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
 use crate::store::{Bricks, BricksFull, Store};
-use crate::sweep::{PlanError, PointRays, Projective};
+use crate::sweep::{PlanError, PlanLimits, PlannedScan, PointRays, Projective};
 
 /// A truncated signed distance field of space: per cell a scalar information filter of the signed distance to the nearest
 /// surface (Curless & Levoy 1996), in bricks, which exist only where something was seen. Colours lie beside it in bricks of
@@ -27,20 +27,10 @@ pub struct SparseTsdf {
     colors: Option<Bricks<Color, 3>>,
     bounds: Option<Aabb<3>>,
     limit: usize,
-    layout: Layout,
+    layout: LayoutFinder,
     sweeps: Box<Sweeps>,
     watched: Vec<(BlockKey<3>, usize, [i32; 3])>,
     events: Vec<([i32; 3], FusionEvent)>,
-}
-
-/// Rows and columns of scans of points that come without them.
-#[derive(Clone, Debug)]
-enum Layout {
-    /// To be found in the first scan.
-    Unknown,
-    /// There are none.
-    None,
-    Found(Box<SphericalLayout>),
 }
 
 /// The sweeps with their memory, which is kept from scan to scan.
@@ -122,7 +112,7 @@ impl SparseTsdf {
             colors,
             bounds: None,
             limit: usize::MAX,
-            layout: Layout::Unknown,
+            layout: LayoutFinder::default(),
             sweeps: Box::new(sweeps),
             watched: Vec::new(),
             events: Vec::new(),
@@ -186,13 +176,8 @@ impl SparseTsdf {
         if self.config.color && !scan.colors.is_empty() {
             return None;
         }
-        if matches!(self.layout, Layout::Unknown) {
-            let found = SphericalLayout::of(&scan.points, origin);
-            self.layout = found.map_or(Layout::None, |layout| Layout::Found(Box::new(layout)));
-        }
-        let Layout::Found(layout) = &self.layout else { return None };
-        let mut image = layout.image(&scan.points, origin);
-        if !scan.free_ends.is_empty() {
+        let mut image = self.layout.image(&scan.points, origin)?;
+        if let Some(layout) = self.layout.layout().filter(|_| !scan.free_ends.is_empty()) {
             let free = layout.image(&scan.free_ends, origin);
             for (value, free) in image.values.iter_mut().zip(free.values) {
                 *value = if *value == 0.0 { -free } else { *value };
@@ -230,34 +215,22 @@ impl SparseTsdf {
     ) -> Result<ScanStats, MapError> {
         // A key, its octants, and what the search keeps of them.
         let most = most_bricks(self.limit, 1024);
-        let (lattice, how) = (*self.lattice(), (self.config.color, most));
-        let sweep = &mut self.sweeps.projective;
-        let counted = sweep.plan(image, world_from_image, &lattice, self.bounds.as_ref(), how);
-        let (beams, cleaned) = counted.map_err(|e| self.plan_error(e, most))?;
-        let mut stats = self.fuse(|sweeps| Planned::Image(&sweeps.projective), beams)?;
-        stats.refused = image.refused;
-        stats.refused += cleaned;
-        if let Some(bounds) = &self.bounds {
-            let outside = |p: [f64; 3]| !bounds.contains(world_from_image.transform_point(p));
-            stats.hits_outside = image.points().filter(|(_, p)| outside(*p)).count() as u64;
-        }
-        Ok(stats)
+        let (lattice, limits) = (*self.lattice(), self.plan_limits(most));
+        let planned = self.sweeps.projective.plan(image, world_from_image, &lattice, &limits);
+        let planned = planned.map_err(|e| self.plan_error(e, most))?;
+        self.fuse(|sweeps| Planned::Image(&sweeps.projective), planned)
     }
 
     fn integrate_rays(&mut self, world_from_scan: &Pose<3>, scan: &PointScan) -> Result<ScanStats, MapError> {
         let most = most_bricks(self.limit, PointRays::BLOCK_BYTES);
-        let (lattice, how) = (*self.lattice(), (self.config.color, most));
-        let sweep = &mut self.sweeps.rays;
-        let counted = sweep.plan(scan, world_from_scan, &lattice, self.bounds.as_ref(), how);
-        let (beams, cleaned) = counted.map_err(|e| self.plan_error(e, most))?;
-        let mut stats = self.fuse(|sweeps| Planned::Rays(&sweeps.rays), beams)?;
-        stats.refused = scan.refused;
-        stats.refused += cleaned;
-        if let Some(bounds) = &self.bounds {
-            let outside = |p: &[f32; 3]| !bounds.contains(world_from_scan.transform_point(p.map(f64::from)));
-            stats.hits_outside = scan.points.iter().filter(|p| outside(p)).count() as u64;
-        }
-        Ok(stats)
+        let (lattice, limits) = (*self.lattice(), self.plan_limits(most));
+        let planned = self.sweeps.rays.plan(scan, world_from_scan, &lattice, &limits);
+        let planned = planned.map_err(|e| self.plan_error(e, most))?;
+        self.fuse(|sweeps| Planned::Rays(&sweeps.rays), planned)
+    }
+
+    fn plan_limits(&self, most_blocks: usize) -> PlanLimits<3> {
+        PlanLimits { bounds: self.bounds, most_blocks, colors: self.config.color }
     }
 
     fn plan_error(&self, error: PlanError, most: usize) -> MapError {
@@ -275,7 +248,7 @@ impl SparseTsdf {
     fn fuse(
         &mut self,
         planned: impl Fn(&Sweeps) -> Planned<'_>,
-        beams: BeamCounts,
+        plan: PlannedScan,
     ) -> Result<ScanStats, MapError> {
         let sweep = planned(&self.sweeps);
         if !self.watched.is_empty() {
@@ -320,7 +293,8 @@ impl SparseTsdf {
             );
             colored.map_err(|_| MapError::Full(self.full()))?;
         }
-        Ok(ScanStats { scans: 1, beams, cells: observed, ..Default::default() })
+        let PlannedScan { beams, refused, hits_outside } = plan;
+        Ok(ScanStats { scans: 1, beams, refused, cells: observed, hits_outside, ..Default::default() })
     }
 
     /// Watches these cells from now on, and no others: every scan leaves what it did to them in [`SparseTsdf::events`].
@@ -392,10 +366,9 @@ impl SparseTsdf {
         self.limit = bytes;
     }
 
-    /// Gives scans of points without rows and columns these from now on. Without this call they are looked for in the first
-    /// such scan, once: as for one sensor per map.
+    /// Rows and columns for scans of points that come without them; otherwise they are found: see [`LayoutFinder`].
     pub fn set_layout(&mut self, layout: SphericalLayout) {
-        self.layout = Layout::Found(Box::new(layout));
+        self.layout = LayoutFinder::of(layout);
     }
 
     /// Keeps to cells whose centre lies in a box (world) from now on; `None`: everywhere.

@@ -2,7 +2,7 @@
 
 use super::MapError;
 use crate::cell::{TsdfRule, TsdfRuleError};
-use crate::sweep::{ProjectiveSettings, WeightModel};
+use crate::sweep::{LONGEST_RAY_CELLS, ProjectiveSettings, WeightModel};
 
 /// How a scan of points becomes observations of cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,12 +76,10 @@ impl SparseTsdfConfig {
         if !(self.color_w_max > 0.0) {
             return Err(TsdfRuleError::WeightClamp(self.color_w_max).into());
         }
-        // Images are searched for blocks in a box of this many cells at most.
-        const REACH: f64 = (1u32 << 20) as f64;
+        let most = LONGEST_RAY_CELLS * self.resolution;
         let ranges = (self.min_range, self.max_range);
-        if !(ranges.0 >= 0.0 && ranges.1 > ranges.0 && ranges.1 + self.truncation <= REACH * self.resolution)
-        {
-            return Err(MapError::Ranges { min: ranges.0, max: ranges.1, most: REACH * self.resolution });
+        if !(ranges.0 >= 0.0 && ranges.1 > ranges.0 && ranges.1 + self.truncation <= most) {
+            return Err(MapError::Ranges { min: ranges.0, max: ranges.1, most });
         }
         Ok(rule)
     }

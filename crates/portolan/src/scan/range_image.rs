@@ -121,6 +121,14 @@ impl RangeImage {
         }
     }
 
+    /// Whether the columns of a turning sensor go once round, so that the last one is a neighbor of the first: where a full
+    /// turn has as many columns as the image to within half a column. One column less leaves a gap as wide as two steps, in
+    /// which nothing was measured; one more looks where the first one does. Both are no neighbors of the first.
+    pub fn is_full_turn(&self) -> bool {
+        let Projection::Spherical(s) = &self.projection else { return false };
+        (std::f64::consts::TAU / s.azimuth_step.abs() - self.columns as f64).abs() < 0.5
+    }
+
     /// The unit of a pixel's value in the sensor's frame: a surface of value `v` lies at `ray * v` (pinhole, spherical).
     /// Pixel coordinates may lie between pixels. For parallel rays use [`RangeImage::point`].
     #[inline]

@@ -1,21 +1,23 @@
-//! The sweep for organised scans of space: every cell's centre is looked up in the range image.
+//! The sweep for distances through a range image: every cell's center is looked up in it.
 
-use super::WeightModel;
-use super::lens::{BAD_IMAGE, LANES, Lens, Window};
-use super::observe::{Centres, Octants, View, cell_of, nearest, observe_block, places};
+use super::observe::{BlockCenters, ImageLookup, cell_of, nearest, observe_block, places};
 use super::padded_image::{Cleaning, PaddedImage};
+use super::project::LANES;
+use super::projector::Projector;
 use super::range_pyramid::RangePyramid;
+use super::search::{Class, Classify, Cube, LONGEST_EDGE, Octants, find_blocks};
+use super::window::Window;
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
-use crate::parallel;
-use crate::scan::{BeamCounts, RangeImage, RefusedBeams};
+use crate::scan::RangeImage;
+use crate::sweep::{PlanError, PlanLimits, PlannedScan, WeightModel};
 
 /// How a range image becomes distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectiveSettings {
-    /// Truncation tau (metres): nothing is said further behind a surface.
+    /// Truncation tau (metres): cells further behind a surface get nothing.
     pub truncation: f64,
-    /// Weight of free space before the truncation, times that of its ray; 0: nothing is said of it.
+    /// Weight of free space before the truncation, times that of its ray; 0: free space gets nothing.
     pub carve_weight: f32,
     /// How much each ray is trusted.
     pub weights: WeightModel,
@@ -25,20 +27,11 @@ pub struct ProjectiveSettings {
     pub max_range: f64,
 }
 
-/// Why an image cannot be swept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PlanError {
-    /// It contradicts itself.
-    BadImage(&'static str),
-    /// It sees more blocks than there may be.
-    TooManyBlocks,
-}
-
-/// Gives every cell the distance at its **centre**, measured along the ray through it.
+/// Gives every cell the distance at its **center**, measured along the ray through it.
 ///
-/// The centre is projected into the image. If the four pixels around it are of one surface, the range there is
+/// The center is projected into the image. If the four pixels around it are of one surface, the range there is
 /// interpolated between them: `1 / z` linearly, which is exact on a plane. (Along a steep surface linear depths would be
-/// off by centimetres.) Else the nearest pixel speaks, of its surface no further aside than half a cell, so that nothing is
+/// off by centimetres.) Else the nearest pixel counts, with its surface no further aside than half a cell, so that nothing is
 /// drawn across gaps and thin things stay. Depths become distances along the ray, so that weights and truncation mean the
 /// same in the image's corners as in its middle.
 ///
@@ -47,7 +40,7 @@ pub(crate) enum PlanError {
 #[derive(Clone, Debug)]
 pub struct Projective {
     settings: ProjectiveSettings,
-    lens: Option<Lens>,
+    projector: Option<Projector>,
     image: PaddedImage,
     pyramid: RangePyramid,
     lattice: Lattice<3>,
@@ -64,7 +57,7 @@ impl Projective {
     pub fn new(settings: ProjectiveSettings) -> Self {
         Self {
             settings,
-            lens: None,
+            projector: None,
             image: PaddedImage::default(),
             pyramid: RangePyramid::default(),
             lattice: Lattice::new([0.0; 3], 1.0),
@@ -76,36 +69,45 @@ impl Projective {
         }
     }
 
-    /// Looks at an image, taken at a rigid pose, and finds the blocks that it says something about: no more than `most`,
-    /// no cells but those whose centre lies in `bounds` (world). Says what became of the pixels.
-    pub(crate) fn plan(
+    /// Takes an image in, taken at a rigid pose, and finds the blocks that it says something about. Only cells whose center
+    /// lies in the bounds get anything. O(pixels + blocks), in parallel.
+    ///
+    /// # Errors
+    /// Where the image contradicts itself, or sees more blocks than it may. The plan is then empty.
+    pub fn plan(
         &mut self,
         image: &RangeImage,
         world_from_image: &Pose<3>,
         lattice: &Lattice<3>,
-        bounds: Option<&Aabb<3>>,
-        (colors, most): (bool, usize),
-    ) -> Result<(BeamCounts, RefusedBeams), PlanError> {
+        limits: &PlanLimits<3>,
+    ) -> Result<PlannedScan, PlanError> {
         self.keys.clear();
         self.octants.clear();
-        let lens = Lens::of(image).ok_or(PlanError::BadImage(BAD_IMAGE))?;
+        image.check().map_err(PlanError::BadImage)?;
+        let projector = self.projector.take().filter(|p| p.is_of(image));
+        let projector = projector.unwrap_or_else(|| Projector::of(image));
         let tau = self.settings.truncation;
         let cleaning = Cleaning {
             min_range: self.settings.min_range,
             max_range: self.settings.max_range,
             step: (0.5 * tau).min(0.03),
             weights: self.settings.weights,
-            colors,
+            colors: limits.colors,
         };
-        let counted = self.image.fill(image, &lens, &cleaning);
+        let mut planned = self.image.fill(image, &projector, &cleaning);
+        planned.refused += image.refused;
+        if let Some(bounds) = &limits.bounds {
+            let outside = |p: [f64; 3]| !bounds.contains(world_from_image.transform_point(p));
+            planned.hits_outside = image.points().filter(|(_, p)| outside(*p)).count() as u64;
+        }
         self.pyramid.build(self.image.stride, &self.image.value, !self.carves());
-        self.lens = Some(lens);
         self.lattice = *lattice;
         self.origin = world_from_image.translation;
         self.image_from_world = world_from_image.inverse().rotation;
-        self.bounds = bounds.copied();
-        self.find_blocks(world_from_image, most)?;
-        Ok(counted)
+        self.bounds = limits.bounds;
+        let found = self.find_blocks(&projector, world_from_image, limits.most_blocks);
+        self.projector = Some(projector);
+        found.map(|()| planned)
     }
 
     fn carves(&self) -> bool {
@@ -117,15 +119,33 @@ impl Projective {
         &self.keys
     }
 
-    fn find_blocks(&mut self, world_from_image: &Pose<3>, most: usize) -> Result<(), PlanError> {
-        let Some(lens) = &self.lens else { return Ok(()) };
+    fn find_blocks(
+        &mut self,
+        projector: &Projector,
+        world_from_image: &Pose<3>,
+        most: usize,
+    ) -> Result<(), PlanError> {
+        let Some((first, last)) = self.reach(projector, world_from_image) else { return Ok(()) };
+        if (0..3).any(|k| i64::from(last[k]) - i64::from(first[k]) >= LONGEST_EDGE) {
+            return Err(PlanError::TooManyBlocks);
+        }
+        let (mut keys, mut octants) = (std::mem::take(&mut self.keys), std::mem::take(&mut self.octants));
+        let spread = self.image_from_world.map(|row| row[0].abs() + row[1].abs() + row[2].abs());
+        let question = Question { sweep: self, projector, spread };
+        let fits = find_blocks(&question, (first, last), most, &mut keys, &mut octants);
+        (self.keys, self.octants) = (keys, octants);
+        if fits { Ok(()) } else { Err(PlanError::TooManyBlocks) }
+    }
+
+    /// The first and the last block of a box that holds all that the image sees.
+    fn reach(&self, projector: &Projector, world_from_image: &Pose<3>) -> Option<([i32; 3], [i32; 3])> {
         let whole = self.pyramid.extremes([0, self.image.columns + 2], [0, self.image.rows + 1]);
         let farthest = f64::from(whole[1]);
         if farthest <= 0.0 {
-            return Ok(());
+            return None;
         }
         let tau = self.settings.truncation;
-        let (low, high) = lens.reach(farthest + tau, tau);
+        let (low, high) = projector.reach(farthest + tau, tau);
         let mut seen = Aabb::EMPTY;
         for corner in 0..8 {
             let p = std::array::from_fn(|k| if corner >> k & 1 == 0 { low[k] } else { high[k] });
@@ -139,38 +159,20 @@ impl Projective {
             }
         }
         if seen.is_empty() {
-            return Ok(());
+            return None;
         }
         let edge = self.lattice.resolution * BLOCK_EDGE as f64;
         let block = |p: [f64; 3], k: usize| ((p[k] - self.lattice.origin[k]) / edge).floor();
-        // Indices that cells may have, with room for their neighbours.
+        // Indices that cells may have, with room for their neighbors.
         const LIMIT: f64 = (1u32 << 27) as f64;
-        let first: [i64; 3] = std::array::from_fn(|k| block(seen.min, k).max(-LIMIT) as i64);
-        let last: [i64; 3] = std::array::from_fn(|k| block(seen.max, k).min(LIMIT - 1.0) as i64);
-        let span = (0..3).map(|k| last[k] - first[k] + 1).fold(i64::MIN, i64::max);
-        if (0..3).any(|k| last[k] < first[k]) {
-            return Ok(());
-        }
-        if span > 1 << 20 {
-            return Err(PlanError::TooManyBlocks);
-        }
-        let spread = self.image_from_world.map(|row| row[0].abs() + row[1].abs() + row[2].abs());
-        let search = Search { sweep: self, lens, first, last, most, spread };
-        let found = search.run(span);
-        if found.len() > most {
-            return Err(PlanError::TooManyBlocks);
-        }
-        self.keys.extend(found.iter().map(|&(packed, _)| {
-            let index = |k: usize| ((packed >> (20 * k)) & 0xf_ffff) as i64;
-            BlockKey(std::array::from_fn(|k| (first[k] + index(k)) as i32))
-        }));
-        self.octants.extend(found.iter().map(|(_, octants)| *octants));
-        Ok(())
+        let first: [i32; 3] = std::array::from_fn(|k| block(seen.min, k).max(-LIMIT) as i32);
+        let last: [i32; 3] = std::array::from_fn(|k| block(seen.max, k).min(LIMIT - 1.0) as i32);
+        (0..3).all(|k| first[k] <= last[k]).then_some((first, last))
     }
 
-    fn view<'a>(&'a self, lens: &'a Lens) -> View<'a> {
-        View {
-            lens,
+    fn lookup<'a>(&'a self, projector: &'a Projector) -> ImageLookup<'a> {
+        ImageLookup {
+            projector,
             image: &self.image,
             truncation: self.settings.truncation as f32,
             carve_weight: self.settings.carve_weight,
@@ -180,11 +182,11 @@ impl Projective {
     }
 
     /// From the lattice to the sensor in f64, then f32: near a UTM origin nothing is lost.
-    fn centres(&self, key: BlockKey<3>) -> Centres {
-        let centre = self.lattice.center(key.first_cell());
-        let offset: [f64; 3] = std::array::from_fn(|k| centre[k] - self.origin[k]);
+    fn centers(&self, key: BlockKey<3>) -> BlockCenters {
+        let center = self.lattice.center(key.first_cell());
+        let offset: [f64; 3] = std::array::from_fn(|k| center[k] - self.origin[k]);
         let rows = &self.image_from_world;
-        Centres {
+        BlockCenters {
             first: rows.map(|row| (0..3).map(|k| row[k] * offset[k]).sum::<f64>() as f32),
             steps: std::array::from_fn(|axis| rows.map(|row| (row[axis] * self.lattice.resolution) as f32)),
         }
@@ -197,39 +199,41 @@ impl Projective {
 
     /// The evidence about the `i`-th planned block, into `evidence`; returns for how many cells there is some.
     pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
-        let Some(lens) = &self.lens else { return 0 };
+        let Some(projector) = &self.projector else { return 0 };
         let (distance, weight) = evidence.planes_mut();
         let mut octants = self.octants[i];
         if self.settings.weights != WeightModel::Constant {
             // What is free has weights of its own too.
-            octants = Octants { free: 0, mixed: octants.mixed | octants.free };
+            octants = Octants { mixed: octants.mixed | octants.free, ..Octants::default() };
         }
         let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight))
         else {
             return 0;
         };
         let observed =
-            observe_block(&self.view(lens), &self.centres(self.keys[i]), octants, distance, weight);
+            observe_block(&self.lookup(projector), &self.centers(self.keys[i]), octants, distance, weight);
         match &self.bounds {
             Some(bounds) if keep_inside(&self.lattice, bounds, self.keys[i], weight) => evidence.observed(),
             _ => observed,
         }
     }
 
-    /// The colours of the `i`-th planned block: those of the nearest pixels, for cells within `band` metres of the surface,
+    /// The colors of the `i`-th planned block: those of the nearest pixels, for cells within `band` metres of the surface,
     /// with the weight of their distances. `distances` is the block's evidence. Returns for how many cells there is one.
     pub fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) -> usize {
         colors.clear();
-        let Some(lens) = self.lens.as_ref().filter(|_| !self.image.colors.is_empty()) else { return 0 };
+        let Some(projector) = self.projector.as_ref().filter(|_| !self.image.colors.is_empty()) else {
+            return 0;
+        };
         let near = |cell: usize| distances.weights()[cell] > 0.0 && distances.distances()[cell].abs() <= band;
-        let centres = self.centres(self.keys[i]);
+        let centers = self.centers(self.keys[i]);
         let image = &self.image;
         let mut found = 0;
         for octant in 0..8 {
             if !(0..LANES).any(|l| near(cell_of(octant, l))) {
                 continue;
             }
-            let seen = lens.project(&centres.octant(octant));
+            let seen = projector.project(&centers.octant(octant));
             let at = places(&seen.u, &seen.v, image.stride);
             for l in 0..LANES {
                 let cell = cell_of(octant, l);
@@ -247,8 +251,8 @@ impl Projective {
     }
 }
 
-/// Silences the cells whose centre is not inside; returns whether there may be such cells.
-pub(super) fn keep_inside(
+/// Silences the cells whose center is not inside; returns whether there may be such cells.
+pub(in crate::sweep) fn keep_inside(
     lattice: &Lattice<3>,
     bounds: &Aabb<3>,
     key: BlockKey<3>,
@@ -266,142 +270,49 @@ pub(super) fn keep_inside(
     true
 }
 
-/// The search for blocks, from large boxes of blocks to single ones.
-struct Search<'a> {
+/// What an image says of cubes of cells: their smallest and largest depth against those of their window.
+struct Question<'a> {
     sweep: &'a Projective,
-    lens: &'a Lens,
-    first: [i64; 3],
-    last: [i64; 3],
-    most: usize,
+    projector: &'a Projector,
     /// Half edges along the sensor's axes of a box of half edge 1 along the map's.
     spread: [f64; 3],
 }
 
-/// What the image says of a box of blocks.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Class {
-    Nothing,
-    Free,
-    Mixed,
-}
+impl Classify for Question<'_> {
+    /// Extremes of a window that holds that of the cube.
+    type Known = [f32; 2];
 
-/// A cube of `2^level` octants of blocks from `at`, counted from the search's first block.
-#[derive(Clone, Copy)]
-struct Node {
-    at: [i64; 3],
-    level: u32,
-}
-
-/// The level at which a node is a block.
-const BLOCK: u32 = 1;
-
-impl Node {
-    fn children(self) -> impl Iterator<Item = Self> {
-        let (level, half) = (self.level - 1, 1i64 << (self.level - 1));
-        (0..8).map(move |c| Self { at: std::array::from_fn(|k| self.at[k] + half * (c >> k & 1)), level })
+    /// A window that could hold any values: nearest 0, farthest infinitely far. Of neither is anything sure.
+    fn nothing_known(&self) -> [f32; 2] {
+        [f32::NEG_INFINITY, f32::INFINITY]
     }
 
-    /// Indices of a block in 20 bits each, in the order of keys.
-    fn packed(self) -> u64 {
-        let [x, y, z] = self.at.map(|v| (v >> BLOCK) as u64);
-        (z << 40) | (y << 20) | x
+    fn classify(&self, cube: Cube, known: [f32; 2], asked: u8) -> [(Class, [f32; 2]); 8] {
+        std::array::from_fn(|i| match asked >> i & 1 {
+            0 => (Class::Nothing, known),
+            _ => self.class(cube.half(i), known),
+        })
     }
 }
 
-/// Extremes of a window that could hold any values: nearest 0, farthest infinitely far. Of neither is anything sure.
-const ANYTHING: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
-
-/// A block that is seen: its packed indices, and what is known of its octants.
-type Found = (u64, Octants);
-
-impl Search<'_> {
-    /// In the order of keys. `span` is the number of blocks along the longest axis.
-    fn run(&self, span: i64) -> Vec<Found> {
-        let level = BLOCK + span.max(1).ilog2() + u32::from(span.count_ones() > 1);
-        let mut nodes = vec![(Node { at: [0; 3], level }, ANYTHING)];
-        // Enough parts for every core, the same ones for any number of them.
-        const LEAST: u32 = BLOCK + 2;
-        while nodes.len() < 256 && nodes.iter().any(|(n, _)| n.level > LEAST) {
-            nodes = nodes
-                .into_iter()
-                .flat_map(|(n, known)| match (n.level > LEAST).then(|| self.class(n, known)) {
-                    None => vec![(n, known)],
-                    Some((Class::Nothing, _)) => vec![],
-                    Some((_, known)) => n.children().map(|child| (child, known)).collect(),
-                })
-                .collect();
-        }
-        let parts = parallel::map(&nodes, 1, |(node, known): &(Node, [f32; 2])| {
-            let mut found = Vec::new();
-            self.descend(*node, *known, &mut found);
-            found
-        });
-        let mut all = parts.concat();
-        all.sort_unstable_by_key(|found| found.0);
-        all
-    }
-
-    fn descend(&self, node: Node, known: [f32; 2], found: &mut Vec<Found>) {
-        if found.len() > self.most {
-            return;
-        }
-        let (class, known) = self.class(node, known);
-        match class {
-            Class::Nothing => {}
-            Class::Free => self.all(node, found),
-            Class::Mixed if node.level == BLOCK => {
-                let mut octants = Octants::default();
-                for (bit, octant) in node.children().enumerate() {
-                    match self.class(octant, known).0 {
-                        Class::Nothing => {}
-                        Class::Free => octants.free |= 1 << bit,
-                        Class::Mixed => octants.mixed |= 1 << bit,
-                    }
-                }
-                if octants != Octants::default() {
-                    found.push((node.packed(), octants));
-                }
-            }
-            Class::Mixed => node.children().for_each(|child| self.descend(child, known, found)),
-        }
-    }
-
-    /// All blocks of a node that is free.
-    fn all(&self, node: Node, found: &mut Vec<Found>) {
-        if !self.is_inside(node) || found.len() > self.most {
-        } else if node.level == BLOCK {
-            found.push((node.packed(), Octants { free: 0xff, mixed: 0 }));
-        } else {
-            node.children().for_each(|child| self.all(child, found));
-        }
-    }
-
-    fn is_inside(&self, node: Node) -> bool {
-        (0..3).all(|k| node.at[k] >> BLOCK <= self.last[k] - self.first[k])
-    }
-
-    /// What the image says of a node, and the extremes of its window: those of the window of its parent are `known`.
-    fn class(&self, node: Node, known: [f32; 2]) -> (Class, [f32; 2]) {
+impl Question<'_> {
+    /// What the image says of a cube, and the extremes of its window: those of the window of its parent are `known`.
+    fn class(&self, cube: Cube, known: [f32; 2]) -> (Class, [f32; 2]) {
         let sweep = self.sweep;
-        if !self.is_inside(node) {
-            return (Class::Nothing, known);
-        }
-        const OCTANT: i64 = BLOCK_EDGE as i64 / 2;
-        let edge = OCTANT << node.level;
         let r = sweep.lattice.resolution;
         let offset: [f64; 3] = std::array::from_fn(|k| {
-            let cell = self.first[k] * BLOCK_EDGE as i64 + node.at[k] * OCTANT;
-            (sweep.lattice.origin[k] - sweep.origin[k]) + (cell as f64 + 0.5 * edge as f64) * r
+            (sweep.lattice.origin[k] - sweep.origin[k])
+                + (cube.first_cell[k] as f64 + 0.5 * cube.edge as f64) * r
         });
-        // The box of the centres of its cells.
-        let half = 0.5 * (edge - 1) as f64 * r;
-        let (mut centre, mut halves) = ([0.0; 3], [0.0; 3]);
+        // The box of the centers of its cells.
+        let half = 0.5 * (cube.edge - 1) as f64 * r;
+        let (mut center, mut halves) = ([0.0; 3], [0.0; 3]);
         for k in 0..3 {
             let row = &sweep.image_from_world[k];
-            centre[k] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
+            center[k] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
             halves[k] = half * self.spread[k];
         }
-        let depth = self.lens.depth(centre, halves, || {
+        let depth = self.projector.depth(center, halves, || {
             let (mut near, mut far) = (0.0, 0.0);
             for o in offset.map(f64::abs) {
                 let (low, high) = ((o - half).max(0.0), o + half);
@@ -425,7 +336,7 @@ impl Search<'_> {
         };
         // Mostly the parent's window is enough, which costs nothing.
         match class(known) {
-            Class::Mixed => match self.lens.window(centre, halves) {
+            Class::Mixed => match self.projector.window(center, halves) {
                 None => (Class::Nothing, known),
                 Some(window) => {
                     let extremes = self.extremes(&window);
