@@ -4,7 +4,7 @@ use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Lattice};
 use portolan::map::{OccupancySweep, PointSweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
 use portolan::scan::{Body, FrameFilter};
-use portolan::sweep::WeightModel;
+use portolan::sweep::{LONGEST_RAY_CELLS, WeightModel};
 use portolan_io::weights_word;
 use serde_json::{Map, Value, json};
 
@@ -13,9 +13,6 @@ use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::mapping::{MapKind, map_word};
 use crate::saved::check_agree;
-
-/// Rays are followed so far (cells): beyond a million cells a range is no measurement.
-const FARTHEST_CELLS: f64 = (1u32 << 20) as f64;
 
 /// All that decides what the maps will hold.
 #[derive(Clone, Debug)]
@@ -59,7 +56,7 @@ impl Settings {
                 _ => PointSweep::Projective,
             },
             // What is beyond the caller's limit is cut before; the map's own is as far as it reaches.
-            max_range: FARTHEST_CELLS * self.resolution - self.truncation,
+            max_range: LONGEST_RAY_CELLS * self.resolution - self.truncation,
             ..SparseTsdfConfig::default()
         }
     }

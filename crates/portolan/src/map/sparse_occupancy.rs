@@ -236,7 +236,7 @@ mod tests {
     use super::*;
     use crate::cell::LogOdds32;
     use crate::geom::BlockKey;
-    use crate::scan::{Beam, BeamKind, Origin, Pinhole, PointScan, Projection, RangeImage, RefusedBeams};
+    use crate::scan::{Beam, BeamKind, Origin, Pinhole, PointScan, RangeImage, RefusedBeams};
     use crate::sweep::CellBox;
 
     type Map = SparseOccupancy<LogOdds8>;
@@ -427,15 +427,8 @@ mod tests {
             assert_eq!((stats.refused.too_far, stats.refused.total()), (4, 4));
             assert_eq!((stats.beams.hit, stats.beams.max_range, stats.beams.dropped), (3000, 1, 4));
             assert!(map.store().len() < 1000, "{}", map.store().len());
-            let values = vec![2.0, -1e6, 1e6, 2.0];
-            let image = RangeImage {
-                projection: Projection::Pinhole(Pinhole { fx: 2.0, fy: 2.0, cx: 0.5, cy: 0.5 }),
-                columns: 2,
-                rows: 2,
-                values,
-                colors: Vec::new(),
-                refused: RefusedBeams::default(),
-            };
+            let camera = Pinhole { fx: 2.0, fy: 2.0, cx: 0.5, cy: 0.5 };
+            let image = RangeImage::from_depth(camera, 2, 2, [2.0, -1e6, 1e6, 2.0]);
             let stats = map.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap();
             assert_eq!((stats.refused.too_far, stats.beams.hit, stats.beams.dropped), (2, 2, 2));
         }
@@ -458,7 +451,7 @@ mod tests {
     #[test]
     fn images_and_beams_without_a_surface() {
         let camera = Pinhole { fx: 20.0, fy: 20.0, cx: 15.5, cy: 11.5 };
-        let values = (0..768)
+        let values: Vec<f32> = (0..768)
             .map(|i| {
                 if i % 32 < 16 {
                     2.0
@@ -469,14 +462,8 @@ mod tests {
                 }
             })
             .collect();
-        let image = RangeImage {
-            projection: Projection::Pinhole(camera),
-            columns: 32,
-            rows: 24,
-            values,
-            colors: Vec::new(),
-            refused: RefusedBeams { too_near: 3, ..Default::default() },
-        };
+        let mut image = RangeImage::from_depth(camera, 32, 24, values);
+        image.refused.too_near = 3;
         let mut by_image = map([0.0; 3]);
         let stats = by_image.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap();
         assert_eq!((stats.beams.hit, stats.beams.max_range, stats.refused.too_near), (384, 192, 3));

@@ -427,19 +427,13 @@ fn look(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::{Pinhole, Projection, RefusedBeams};
+    use crate::scan::Pinhole;
 
     #[test]
     fn a_scan_without_end_is_told_in_its_own_words() {
         // Pixels that look almost aside: what they see is a metre deep and a hundred thousand kilometres wide.
-        let image = RangeImage {
-            projection: Projection::Pinhole(Pinhole { fx: 1e-8, fy: 1e-8, cx: 0.5, cy: 0.5 }),
-            columns: 2,
-            rows: 2,
-            values: vec![1.0; 4],
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        };
+        let camera = Pinhole { fx: 1e-8, fy: 1e-8, cx: 0.5, cy: 0.5 };
+        let image = RangeImage::from_depth(camera, 2, 2, [1.0; 4]);
         let mut map = SparseTsdf::new(SparseTsdfConfig::default()).unwrap();
         let error = map.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap_err();
         assert!(matches!(error, MapError::TooFar { .. }), "{error}");

@@ -258,8 +258,7 @@ mod tests {
     /// The widest vectors give the bits that any processor gives.
     fn same_bits(projection: Projection, values: Vec<f32>, first: [f32; 3], weights: WeightModel) {
         let (columns, rows) = (24, 12);
-        let image =
-            RangeImage { projection, columns, rows, values, colors: Vec::new(), refused: Default::default() };
+        let image = RangeImage::new(projection, columns, rows, values);
         let projector = Projector::of(&image);
         let mut padded = PaddedImage::default();
         let how = Cleaning { min_range: 0.0, max_range: 50.0, step: 0.03, weights, colors: false };
