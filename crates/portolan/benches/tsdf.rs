@@ -99,14 +99,7 @@ fn lidar(folder: &Path) -> Log {
 }
 
 fn image(projection: Projection, columns: usize, rows: usize, values: Vec<f32>) -> Frame {
-    Frame::Image(RangeImage {
-        projection,
-        columns,
-        rows,
-        values,
-        colors: Vec::new(),
-        refused: Default::default(),
-    })
+    Frame::Image(RangeImage::new(projection, columns, rows, values))
 }
 
 /// A room of 10 m x 8 m x 3 m with the sensor in it: ranges along a unit vector.
@@ -127,14 +120,7 @@ fn made_up(projection: &Projection, columns: usize, rows: usize, level: [[f64; 3
         let at = [3.0 + 0.1 * i as f64, 4.0, 1.3];
         let world_from_sensor =
             Pose { translation: at, ..turn * Pose { rotation: level, translation: [0.0; 3] } };
-        let empty = RangeImage {
-            projection: projection.clone(),
-            columns,
-            rows,
-            values: Vec::new(),
-            colors: Vec::new(),
-            refused: Default::default(),
-        };
+        let empty = RangeImage::new(projection.clone(), columns, rows, []);
         let value = |i: usize| {
             let ray = world_from_sensor.rotate(empty.ray((i % columns) as f64, i / columns));
             let length = portolan::geom::vector::norm(ray);

@@ -16,8 +16,8 @@ fn image(
     rows: usize,
     value: impl Fn(usize, usize) -> f32,
 ) -> RangeImage {
-    let values = (0..columns * rows).map(|i| value(i % columns, i / columns)).collect();
-    RangeImage { projection, columns, rows, values, colors: Vec::new(), refused: Default::default() }
+    let values: Vec<f32> = (0..columns * rows).map(|i| value(i % columns, i / columns)).collect();
+    RangeImage::new(projection, columns, rows, values)
 }
 
 /// What a cell gets, or that rounding decides it.

@@ -16,14 +16,7 @@ fn see(
     pose: &Pose<3>,
     range: impl Fn([f64; 3], [f64; 3]) -> Option<f64>,
 ) -> RangeImage {
-    let mut image = RangeImage {
-        projection,
-        columns,
-        rows,
-        values: vec![0.0; columns * rows],
-        colors: Vec::new(),
-        refused: Default::default(),
-    };
+    let mut image = RangeImage::new(projection, columns, rows, vec![0.0; columns * rows]);
     for row in 0..rows {
         for column in 0..columns {
             let ray = pose.rotate(image.ray(column as f64, row));
@@ -202,14 +195,7 @@ fn what_is_gone_is_carved_and_what_is_behind_is_not_touched() {
 
 fn plain(values: Vec<f32>) -> RangeImage {
     let camera = Pinhole { fx: 8.0, fy: 8.0, cx: 3.5, cy: 3.5 };
-    RangeImage {
-        projection: Projection::Pinhole(camera),
-        columns: 8,
-        rows: 8,
-        values,
-        colors: Vec::new(),
-        refused: Default::default(),
-    }
+    RangeImage::from_depth(camera, 8, 8, values)
 }
 
 #[test]

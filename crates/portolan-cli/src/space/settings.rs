@@ -4,8 +4,7 @@ use portolan::cell::{OccupancyModel, TsdfRule};
 use portolan::geom::{Aabb, Lattice};
 use portolan::map::{Occupancy, PointSweep, Tsdf3, TsdfConfig};
 use portolan::scan::{Body, FrameFilter};
-use portolan::sweep::OccupancySweep;
-use portolan::sweep::WeightModel;
+use portolan::sweep::{LONGEST_RAY_CELLS, WeightModel};
 use portolan_io::weights_word;
 use serde_json::{Map, Value, json};
 
@@ -14,9 +13,6 @@ use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::mapping::{MapKind, map_word};
 use crate::saved::check_agree;
-
-/// Rays are followed so far (cells): beyond a million cells a range is no measurement.
-const FARTHEST_CELLS: f64 = (1u32 << 20) as f64;
 
 /// All that decides what the maps will hold.
 #[derive(Clone, Debug)]
@@ -60,8 +56,8 @@ impl Settings {
                 _ => PointSweep::Projective,
             },
             // What is beyond the caller's limit is cut before; the map's own is as far as it reaches.
-            max_range: FARTHEST_CELLS * self.resolution - self.truncation,
-            ..TsdfConfig::default()
+            max_range: LONGEST_RAY_CELLS * self.resolution - self.truncation,
+            ..SparseTsdfConfig::default()
         }
     }
 

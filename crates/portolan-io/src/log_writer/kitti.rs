@@ -59,24 +59,15 @@ impl LogWriter {
 mod tests {
     use super::super::{LogLayout, LogWriter};
     use super::*;
-    use crate::scan_log::{ScanLog, ScanLogKind, ScanLogOptions};
-    use portolan::scan::{PointScan, RefusedBeams};
+    use crate::space_log::{SpaceLog, SpaceLogKind, SpaceLogOptions};
+    use portolan::scan::PointScan;
 
     #[test]
     fn stamps_since_the_epoch_come_back() {
         let folder = tempfile::tempdir().unwrap();
         let camera_from_lidar = Pose::from_quaternion([0.1, -0.2, 0.3], [0.5, -0.5, 0.5, 0.5]).unwrap();
         let mut writer = LogWriter::create(folder.path(), LogLayout::Kitti { camera_from_lidar }).unwrap();
-        let scan = PointScan {
-            origin: Origin::Common([0.0; 3]),
-            points: vec![[1.0, 2.0, 3.0]],
-            free_ends: vec![],
-            times: vec![],
-            colors: vec![],
-            image: None,
-            refused: RefusedBeams::default(),
-        };
-        let frame = Frame::Points(scan);
+        let frame = Frame::Points(PointScan::new([[1.0, 2.0, 3.0]], [0.0; 3]));
         let times = [0.0, 0.1037875, 1_630_577_758.569_49, 1_630_577_758.669_501];
         let pose = Pose::from_quaternion([1.0, 2.0, 3.0], [0.0, 0.0, 0.6, 0.8]).unwrap();
         times.iter().for_each(|t| writer.push(&pose, *t, &frame).unwrap());

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
+use portolan::scan::{Frame, Pinhole, RangeImage};
 
 use super::color::{color_size, read_color};
 use super::depth_png::{depth_image_size, read_depth};
@@ -107,14 +107,8 @@ impl FrameSource for DepthFrames {
             },
             None => Vec::new(),
         };
-        Ok(Frame::Image(RangeImage {
-            projection: Projection::Pinhole(frame.pinhole),
-            columns: depth.columns,
-            rows: depth.rows,
-            values: depth.values,
-            colors,
-            refused: RefusedBeams::default(),
-        }))
+        let image = RangeImage::from_depth(frame.pinhole, depth.columns, depth.rows, depth.values);
+        Ok(Frame::Image(image.with_colors(colors)))
     }
 
     fn unread_colors(&self) -> Option<UnreadColors> {

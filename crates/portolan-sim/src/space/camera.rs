@@ -4,7 +4,7 @@ use super::world::SpaceWorld;
 use crate::Random;
 use portolan::geom::Pose;
 use portolan::geom::vector::{along, norm, scale};
-use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
+use portolan::scan::{Frame, Pinhole, RangeImage};
 
 /// A depth camera; depth and colour come from one place.
 ///
@@ -99,14 +99,7 @@ pub fn camera_frame(
             }));
         }
     }
-    Frame::Image(RangeImage {
-        projection: Projection::Pinhole(*c),
-        columns: camera.columns,
-        rows: camera.rows,
-        values,
-        colors,
-        refused: RefusedBeams::default(),
-    })
+    Frame::Image(RangeImage::from_depth(*c, camera.columns, camera.rows, values).with_colors(colors))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::world::SpaceWorld;
 use crate::Random;
 use portolan::geom::Pose;
 use portolan::geom::vector::scale;
-use portolan::scan::{Frame, PointScan, Projection, RangeImage, RefusedBeams, Spherical};
+use portolan::scan::{Frame, PointScan, RangeImage, Spherical};
 
 /// A lidar that turns about its z axis: rings of one elevation, columns of one azimuth.
 ///
@@ -108,14 +108,7 @@ pub fn lidar_frame(
         values.push(value as f32);
     }
     if lidar.organised {
-        scan.image = Some(RangeImage {
-            projection: Projection::Spherical(lidar.projection()),
-            columns: lidar.columns,
-            rows: lidar.rings,
-            values,
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        });
+        scan.image = Some(RangeImage::from_ranges(lidar.projection(), lidar.columns, values));
     }
     Frame::Points(scan)
 }

@@ -4,7 +4,7 @@ mod cloud;
 mod error;
 mod integrate;
 mod occupancy_grid;
-mod sparse_fuse;
+mod repr;
 mod sparse_occupancy;
 #[cfg(test)]
 mod sparse_occupancy_tests;
@@ -19,10 +19,12 @@ mod tsdf_config;
 mod tsdf_tests;
 mod watch;
 
+pub use crate::sweep::OccupancySweep;
 pub use cloud::Cloud;
 pub use error::MapError;
 pub use occupancy_grid::OccupancyGrid;
-pub use sparse_occupancy::{OccupancySweep, SparseOccupancy};
+pub use repr::{Abilities, Derived, DerivedField, MapRepr};
+pub use sparse_occupancy::SparseOccupancy;
 pub use sparse_tsdf::SparseTsdf;
 pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
 pub use thresholds::{DistanceMap, Thresholds};

@@ -4,7 +4,7 @@ use super::Occupancy;
 use crate::cell::{LogOdds8, OccupancyModel, Planes};
 use crate::geom::vector::{norm, sub};
 use crate::geom::{BlockKey, Lattice, Pose};
-use crate::scan::{Frame, Orthographic, Pinhole, PointScan, Projection, RangeImage, RefusedBeams, Spherical};
+use crate::scan::{Frame, Orthographic, Pinhole, PointScan, Projection, RangeImage, Spherical};
 use crate::store::Store;
 use crate::sweep::OccupancySweep;
 use std::f64::consts::TAU;
@@ -42,8 +42,7 @@ fn spherical() -> Spherical {
 }
 
 fn image(projection: Projection, columns: usize, rows: usize) -> RangeImage {
-    let values = vec![0.0; columns * rows];
-    RangeImage { projection, columns, rows, values, colors: Vec::new(), refused: RefusedBeams::default() }
+    RangeImage::new(projection, columns, rows, vec![0.0; columns * rows])
 }
 
 /// What a sensor at `pose` sees of the room.

@@ -2,7 +2,7 @@
 
 use super::MapError;
 use crate::cell::{TsdfRule, TsdfRuleError};
-use crate::sweep::{LONGEST_RAY, ProjectiveSettings, WeightModel};
+use crate::sweep::{LONGEST_RAY_CELLS, ProjectiveSettings, WeightModel};
 
 /// How beams without rows and columns become observations of cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,10 +93,10 @@ impl<const D: usize> TsdfConfig<D> {
         if !(self.color_w_max > 0.0) {
             return Err(TsdfRuleError::WeightClamp(self.color_w_max).into());
         }
-        let most = LONGEST_RAY * self.resolution;
-        let (min, max) = (self.min_range, self.max_range);
-        if !(min >= 0.0 && max > min && max + self.truncation <= most) {
-            return Err(MapError::Ranges { min, max, most });
+        let most = LONGEST_RAY_CELLS * self.resolution;
+        let ranges = (self.min_range, self.max_range);
+        if !(ranges.0 >= 0.0 && ranges.1 > ranges.0 && ranges.1 + self.truncation <= most) {
+            return Err(MapError::Ranges { min: ranges.0, max: ranges.1, most });
         }
         Ok(rule)
     }

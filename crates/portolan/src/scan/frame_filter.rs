@@ -211,7 +211,7 @@ fn retain<T>(list: &mut Vec<T>, kept: &[bool]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::{Orthographic, Pinhole, Projection, RefusedBeams};
+    use crate::scan::{Orthographic, Pinhole, Projection};
 
     fn filter() -> FrameFilter {
         let body = vec![
@@ -240,15 +240,10 @@ mod tests {
 
     #[test]
     fn pixels_are_kept_cut_or_counted() {
-        let image = RangeImage {
-            projection: Projection::Pinhole(Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 }),
-            columns: 5,
-            rows: 1,
-            values: vec![1.0, 2.0, 0.0, 3.0, -1.5],
-            colors: Vec::new(),
-            // The pixel without a value was refused before.
-            refused: RefusedBeams { too_near: 1, ..Default::default() },
-        };
+        let camera = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 };
+        let mut image = RangeImage::from_depth(camera, 5, 1, [1.0, 2.0, 0.0, 3.0, -1.5]);
+        // The pixel without a value was refused before.
+        image.refused.too_near = 1;
         // Pixel 1 is (2, 0, 2), range 2.83; pixel 3 (9, 0, 3), range 9.49.
         let near = FrameFilter { min_range: 1.5, max_range: 4.0, body: Vec::new() };
         let (Frame::Image(image), counts) = near.apply(Frame::Image(image)) else {
@@ -261,25 +256,14 @@ mod tests {
         assert_eq!(counts, BeamCounts { hit: 1, max_range: 2, no_return: 0, dropped: 2, self_hit: 0 });
     }
     fn ground(values: Vec<f32>) -> RangeImage {
-        RangeImage {
-            projection: Projection::Orthographic {
-                rays: Orthographic { first: [0.0; 2], step: [0.5; 2] },
-                top: 10.0,
-            },
-            columns: values.len(),
-            rows: 1,
-            values,
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        }
+        let rays = Orthographic { first: [0.0; 2], step: [0.5; 2] };
+        RangeImage::new(Projection::Orthographic { rays, top: 10.0 }, values.len(), 1, values)
     }
 
     #[test]
     fn the_image_beside_points_is_filtered_with_them() {
-        let image = RangeImage {
-            projection: Projection::Pinhole(Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 }),
-            ..ground(vec![1.0, 0.25, 3.0, 0.0])
-        };
+        let camera = Pinhole { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 };
+        let image = RangeImage::from_depth(camera, 4, 1, [1.0, 0.25, 3.0, 0.0]);
         let origin = [5.0, 0.0, 0.0];
         let points: Vec<_> =
             image.points().map(|(_, p)| [p[0] + 5.0, p[1], p[2]].map(|v| v as f32)).collect();

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Pinhole, Projection, RangeImage, RefusedBeams, Spherical};
+use super::{Pinhole, Projection, RangeImage, Spherical};
 
 /// Fewer points tell nothing about the sensor.
 const FEWEST: usize = 64;
@@ -173,7 +173,7 @@ impl OrganisedPoints<'_> {
                 colors[at] = self.colors[i];
             }
         }
-        RangeImage { projection, columns, rows, values, colors, refused: RefusedBeams::default() }
+        RangeImage::new(projection, columns, rows, values).with_colors(colors)
     }
 }
 
@@ -239,14 +239,8 @@ mod tests {
             let (u, v) = ((i % columns) as f32, (i / columns) as f32);
             if i % 17 == 3 { 0.0 } else { 5.0 + (0.1 * u).sin() + (0.2 * v).cos() }
         };
-        let image = RangeImage {
-            projection,
-            columns,
-            rows,
-            values: (0..columns * rows).map(value).collect(),
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        };
+        let values: Vec<f32> = (0..columns * rows).map(value).collect();
+        let image = RangeImage::new(projection, columns, rows, values);
         let (pixels, points) = image.points().map(|(i, p)| (i as u32, p.map(|v| v as f32))).unzip();
         (image, points, pixels)
     }

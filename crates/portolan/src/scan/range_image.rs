@@ -1,9 +1,9 @@
-//! Organised scans of space: rows and columns, and where a pixel looks.
+//! Organised 3-D scans: rows and columns, and where a pixel looks.
 
 use super::RefusedBeams;
 
 /// A pinhole camera without distortion, in the axes of computer vision: x right, y down, z forward. Pixel `(u, v)`
-/// has its centre at `u`, `v` exactly.
+/// has its center at `u`, `v` exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pinhole {
     /// Focal length along x (pixels).
@@ -30,7 +30,7 @@ pub struct Spherical {
 /// Parallel rays along -z of the sensor's frame: a scanner whose origin is at infinity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orthographic {
-    /// x and y of the centre of pixel `(0, 0)` (metres).
+    /// x and y of the center of pixel `(0, 0)` (metres).
     pub first: [f64; 2],
     /// From one column to the next along x, from one row to the next along y (metres).
     pub step: [f64; 2],
@@ -66,13 +66,46 @@ pub struct RangeImage {
     pub rows: usize,
     /// `columns * rows` values (metres), row by row.
     pub values: Vec<f32>,
-    /// Red, green, blue of each pixel, if the sensor sees colour. Empty: it does not.
+    /// Red, green, blue of each pixel, if the sensor sees color. Empty: it does not.
     pub colors: Vec<[u8; 3]>,
     /// Readings that were refused when the image was built, by cause.
     pub refused: RefusedBeams,
 }
 
 impl RangeImage {
+    /// An image of one value per pixel, row by row (metres, of what the projection says), without colors. Nothing is checked
+    /// here: see [`RangeImage::check`]. For cameras and lidars see [`RangeImage::from_depth`] and
+    /// [`RangeImage::from_ranges`].
+    pub fn new(projection: Projection, columns: usize, rows: usize, values: impl Into<Vec<f32>>) -> Self {
+        let (values, colors, refused) = (values.into(), Vec::new(), RefusedBeams::default());
+        Self { projection, columns, rows, values, colors, refused }
+    }
+
+    /// The image of a depth camera: depths along its axis (metres), row by row; 0 where there is no reading.
+    ///
+    /// ```
+    /// use portolan::scan::{Pinhole, RangeImage};
+    ///
+    /// let camera = Pinhole { fx: 2.0, fy: 2.0, cx: 0.5, cy: 0.0 };
+    /// let image = RangeImage::from_depth(camera, 2, 1, [0.0, 3.0]).with_colors([[0; 3], [255, 0, 0]]);
+    /// assert_eq!(image.check(), Ok(()));
+    /// assert_eq!(image.points().collect::<Vec<_>>(), [(1, [0.75, 0.0, 3.0])]);
+    /// ```
+    pub fn from_depth(camera: Pinhole, columns: usize, rows: usize, depths: impl Into<Vec<f32>>) -> Self {
+        Self::new(Projection::Pinhole(camera), columns, rows, depths)
+    }
+
+    /// The image of a turning lidar: ranges (metres), ring by ring, the highest first; 0 where there is no reading.
+    pub fn from_ranges(lidar: Spherical, columns: usize, ranges: impl Into<Vec<f32>>) -> Self {
+        let rows = lidar.elevations.len();
+        Self::new(Projection::Spherical(lidar), columns, rows, ranges)
+    }
+
+    /// The same image with a color (red, green, blue) for each pixel.
+    pub fn with_colors(self, colors: impl Into<Vec<[u8; 3]>>) -> Self {
+        Self { colors: colors.into(), ..self }
+    }
+
     /// Whether rows, columns, values and rays fit together, so that every pixel has a ray. Says why not. O(rows).
     ///
     /// What maps are given is checked: an image that fails is refused, and nothing of it is used. Its values may be
@@ -90,7 +123,7 @@ impl RangeImage {
             "it has more than 2^20 rows or columns, or 2^28 pixels",
         )?;
         fits(self.values.len() == cells, "its values are not one per pixel")?;
-        fits(self.colors.is_empty() || self.colors.len() == cells, "its colours are not one per pixel")?;
+        fits(self.colors.is_empty() || self.colors.len() == cells, "its colors are not one per pixel")?;
         match &self.projection {
             Projection::Pinhole(c) => {
                 fits(c.fx.is_normal() && c.fy.is_normal(), "a focal length is 0 or not finite")?;
@@ -119,6 +152,14 @@ impl RangeImage {
                 fits(rays.first.iter().chain([top]).all(|v| v.is_finite()), "its rays are not finite")
             }
         }
+    }
+
+    /// Whether the columns of a turning sensor go once round, so that the last one is a neighbor of the first: where a full
+    /// turn has as many columns as the image to within half a column. One column less leaves a gap as wide as two steps, in
+    /// which nothing was measured; one more looks where the first one does. Both are no neighbors of the first.
+    pub fn is_full_turn(&self) -> bool {
+        let Projection::Spherical(s) = &self.projection else { return false };
+        (std::f64::consts::TAU / s.azimuth_step.abs() - self.columns as f64).abs() < 0.5
     }
 
     /// The unit of a pixel's value in the sensor's frame: a surface of value `v` lies at `ray * v` (pinhole, spherical).
@@ -188,14 +229,8 @@ pub(crate) mod testing {
 
     /// One that does not.
     pub(crate) fn whole() -> RangeImage {
-        RangeImage {
-            projection: Projection::Pinhole(Pinhole { fx: 4.0, fy: 4.0, cx: 1.0, cy: 0.5 }),
-            columns: 3,
-            rows: 2,
-            values: vec![1.0, 2.0, -1.0, 0.0, 1.5, f32::NAN],
-            colors: vec![[9; 3]; 6],
-            refused: RefusedBeams::default(),
-        }
+        let camera = Pinhole { fx: 4.0, fy: 4.0, cx: 1.0, cy: 0.5 };
+        RangeImage::from_depth(camera, 3, 2, [1.0, 2.0, -1.0, 0.0, 1.5, f32::NAN]).with_colors([[9; 3]; 6])
     }
 
     pub(crate) fn broken() -> Vec<(RangeImage, &'static str)> {
@@ -245,7 +280,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn images_that_contradict_themselves_are_told() {
+    fn images_that_contradict_themselves_are_refused() {
         for (image, why) in broken() {
             assert!(image.check().is_err(), "{why}");
         }
@@ -254,14 +289,7 @@ mod tests {
 
     #[test]
     fn pixels_look_where_the_projection_says() {
-        let image = |projection| RangeImage {
-            projection,
-            columns: 2,
-            rows: 2,
-            values: vec![0.0, 2.0, -3.0, 0.0],
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        };
+        let image = |projection| RangeImage::new(projection, 2, 2, [0.0, 2.0, -3.0, 0.0]);
         let camera = image(Projection::Pinhole(Pinhole { fx: 2.0, fy: 4.0, cx: 0.0, cy: 0.0 }));
         assert_eq!(camera.points().collect::<Vec<_>>(), [(1, [1.0, 0.0, 2.0])]);
         let lidar = image(Projection::Spherical(Spherical {

@@ -1,6 +1,6 @@
 //! Range scans whose rows and columns are only nearly regular, seen along parallel rays.
 
-use super::{Orthographic, Projection, RangeImage, RefusedBeams};
+use super::{Orthographic, Projection, RangeImage};
 
 /// An edge of the surface may be so many times as long as the distance between pixels; a longer one spans a jump between
 /// two surfaces. Four times is a surface seen at 14 degrees.
@@ -45,14 +45,9 @@ pub fn orthographic_image(
     // The rays begin just above the highest point: nothing is said about what lies above the scan.
     let top = points.iter().map(|p| f64::from(p[2])).fold(f64::NEG_INFINITY, f64::max) + longest;
     let value = |z: &f64| if z.is_finite() { (top - z) as f32 } else { 0.0 };
-    Some(RangeImage {
-        projection: Projection::Orthographic { rays: Orthographic { first, step }, top },
-        columns: shape[0],
-        rows: shape[1],
-        values: image.heights.iter().map(value).collect(),
-        colors: Vec::new(),
-        refused: RefusedBeams::default(),
-    })
+    let projection = Projection::Orthographic { rays: Orthographic { first, step }, top };
+    let values: Vec<f32> = image.heights.iter().map(value).collect();
+    Some(RangeImage::new(projection, shape[0], shape[1], values))
 }
 
 /// The points of a scan by pixel.

@@ -2,7 +2,7 @@
 
 use super::angles::atan2;
 use super::rings::{columns, extent, rings};
-use super::{Projection, RangeImage, RefusedBeams, Spherical};
+use super::{RangeImage, Spherical};
 use crate::parallel;
 use std::f64::consts::TAU;
 
@@ -174,15 +174,7 @@ impl SphericalLayout {
                 placed += 1;
             }
         }
-        let image = RangeImage {
-            values,
-            projection: Projection::Spherical(self.spherical.clone()),
-            columns: self.columns,
-            rows: self.spherical.elevations.len(),
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        };
-        (image, placed)
+        (RangeImage::from_ranges(self.spherical.clone(), self.columns, values), placed)
     }
 
     /// Rows and the first column.

@@ -5,34 +5,31 @@
 //! | [`Rays`] | hits and misses | every cell that a beam passes through, exactly |
 //! | [`March`] | distances | samples along every beam, as the textbook does it |
 //! | [`CellCentre`] | distances | the centre of every cell, against the range interpolated between beams |
-//! | [`Projective`] | distances | the centre of every cell of space, against a range image |
-//! | [`PointRays`] | distances | every cell that a ray to a point of space passes through; the nearest ray counts |
+//! | [`Projective`] | distances | the center of every 3-D cell, against a range image |
+//! | [`PointRays`] | distances | every 3-D cell that a ray to a point passes through; the nearest ray counts |
+//! | [`HitMissSweep`] | hits and misses | 3-D cells that beams pass through, exactly or through a range image |
 
-mod bands;
 mod cell_centre;
 mod fan;
 mod fan_plan;
-mod inside;
-mod lens;
+mod image;
 mod march;
 mod nearest_ray;
-mod observe;
 mod occupancy;
-mod padded_image;
+mod plan;
 mod point_rays;
-mod projective;
-mod range_pyramid;
 mod rays;
 mod touched;
 mod weight;
 
 pub use cell_centre::CellCentre;
-pub(crate) use inside::Inside;
+pub use image::{Projective, ProjectiveSettings};
 pub use march::March;
-pub(crate) use occupancy::LONGEST_RAY;
-pub use occupancy::{HitsAndMisses, OccupancySweep};
+#[cfg(test)]
+pub(crate) use occupancy::CellBox;
+pub use occupancy::{HitMissSweep, OccupancySweep};
+pub use plan::{LONGEST_RAY_CELLS, PlanError, PlanLimits, PlannedScan};
 pub use point_rays::PointRays;
-pub use projective::{Projective, ProjectiveSettings};
 pub use rays::Rays;
 pub use weight::WeightModel;
 

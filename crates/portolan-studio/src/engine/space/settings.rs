@@ -2,16 +2,15 @@
 
 use portolan::cell::OccupancyModel;
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdfConfig};
+use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::surface::MeshSettings;
+use portolan::sweep::LONGEST_RAY_CELLS;
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
 
 /// What an observation of free space weighs, as in `map`.
 const CARVE_WEIGHT: f32 = 0.3;
-/// Rays are followed so far (cells), as in `map`: beyond a million cells a range is no measurement.
-const FARTHEST_CELLS: f64 = (1u32 << 20) as f64;
-
 /// How frames are made and fused.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -77,8 +76,8 @@ impl Settings {
             carve: self.carve,
             carve_weight: CARVE_WEIGHT,
             color,
-            max_range: FARTHEST_CELLS * resolution - truncation,
-            ..TsdfConfig::default()
+            max_range: LONGEST_RAY_CELLS * resolution - truncation,
+            ..SparseTsdfConfig::default()
         })
     }
 

@@ -1,17 +1,12 @@
 //! Exact rays of a whole scan.
 
-use super::Bits;
-use super::masks::BrickMasks;
+use super::masks::{Bits, BrickMasks};
 use super::trace::{trace, walk};
 use crate::geom::vector::{along, distance, dot, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, RayWalk};
 use crate::parallel;
 use crate::scan::RefusedBeams;
-use crate::sweep::clip;
-
-/// A ray is refused where it is longer than this many cells, within the bounds: one reading of 10^8 m must not cost what
-/// a million others do. At 5 cm, 52 km.
-pub(crate) const LONGEST_RAY: f64 = (1u32 << 20) as f64;
+use crate::sweep::{LONGEST_RAY_CELLS, clip};
 
 /// One beam in the world's frame (metres).
 #[derive(Clone, Copy, Debug)]
@@ -131,24 +126,17 @@ impl ExactRays {
         self.reach
     }
 
-    /// Number of bricks in that box.
-    pub(crate) fn reach_bricks(&self) -> u64 {
-        let Some((first, last)) = self.reach else { return 0 };
-        let edge = |k: usize| (i64::from(last.0[k]) - i64::from(first.0[k]) + 1).max(0) as u64;
-        edge(0).saturating_mul(edge(1)).saturating_mul(edge(2))
-    }
-
     /// The bits of the `i`-th brick.
     pub(crate) fn bits(&self, i: usize) -> &Bits {
         self.parts[0].bits(self.slots[i])
     }
 }
 
-/// Whether a ray is longer than any that is walked, or is none.
+/// Whether a ray is longer than any that is walked, or not finite.
 #[inline(always)]
 fn is_long(lattice: &Lattice<3>, ray: &Ray) -> bool {
     let offset = sub(ray.end, ray.origin);
-    let longest = LONGEST_RAY * lattice.resolution;
+    let longest = LONGEST_RAY_CELLS * lattice.resolution;
     !(dot(offset, offset) <= longest * longest)
 }
 
@@ -193,7 +181,7 @@ fn trace_inside(
     }
     let direction = scale(sub(ray.end, ray.origin), 1.0 / length);
     if let Some((near, far)) = clip(bounds, ray.origin, direction, length) {
-        if far - near > LONGEST_RAY * lattice.resolution {
+        if far - near > LONGEST_RAY_CELLS * lattice.resolution {
             return None;
         }
         let start = if near > 0.0 { along(ray.origin, direction, near) } else { ray.origin };

@@ -1,19 +1,14 @@
-//! Occupancy of space, whole scans at a time, brick by brick.
+//! Hits and misses of whole 3-D scans, block by block.
 //!
-//! [`super::Rays`] is the textbook's sweep in any dimension, with its depth of walls, for dense arrays and trees. Here are
-//! the fast ones for bricks: [`exact`](ExactRays) rays with the meaning that OctoMap gave them (what is passed is missed
-//! once a scan, the cell of the end point is hit, a hit overrules misses), and [`projective`](Projective) misses for scans of
-//! rows and columns, whose hits are exact as well.
+//! [`super::Rays`] is the textbook's sweep in any dimension, with its depth of walls. This is the fast one for bricks:
+//! exact rays with the meaning that OctoMap gave them (what is passed is missed once a scan, the cell of the end
+//! point is hit, a hit overrules misses), and misses through a range image for scans of rows and columns.
 
 mod exact;
-mod guard;
-mod hits_and_misses;
-mod lens;
+mod hit_miss_sweep;
 mod masks;
-mod projective;
 mod trace;
 
-pub(crate) use exact::LONGEST_RAY;
-pub use hits_and_misses::{HitsAndMisses, OccupancySweep};
-use masks::Bits;
-use projective::Projective;
+#[cfg(test)]
+pub(crate) use cell_box::CellBox;
+pub use hit_miss_sweep::{HitMissSweep, OccupancySweep};

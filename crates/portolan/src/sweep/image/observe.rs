@@ -1,10 +1,12 @@
-//! What a range image says about the centres of a block's cells: 64 lanes at a time.
+//! What a range image says about the centers of a block's cells: 64 lanes at a time.
 //!
 //! Every loop runs over the 64 lanes of an octant without calls and without branches, so that it stands in the widest vectors that the
 //! processor has; no operation depends on the width, so that all versions give the same bits.
 
-use super::lens::{LANES, Lanes, Lens, Projected, Steps};
 use super::padded_image::PaddedImage;
+use super::project::{LANES, Lanes, Projected, Steps};
+use super::projector::Projector;
+use super::search::Octants;
 use crate::geom::block_cells;
 use multiversion::multiversion;
 
@@ -12,27 +14,27 @@ use multiversion::multiversion;
 pub(super) const BLOCK: usize = block_cells::<3>();
 
 /// An image and how it is read.
-pub(super) struct View<'a> {
-    pub lens: &'a Lens,
+pub(super) struct ImageLookup<'a> {
+    pub projector: &'a Projector,
     pub image: &'a PaddedImage,
     pub truncation: f32,
-    /// Weight of free space beyond the truncation; 0: nothing is said of it.
+    /// Weight of free space beyond the truncation; 0: it gets nothing.
     pub carve_weight: f32,
     /// Weights fall with the square of the range beyond 1 m.
     pub inverse_square: bool,
-    /// A ray speaks of surfaces this far aside, where it has no neighbours on the same surface (metres).
+    /// A ray counts for surfaces this far aside, where it has no neighbors on the same surface (metres).
     pub aside: f32,
 }
 
-/// The centres of a block's cells in the sensor's frame: the first one, and steps along the block's axes (metres).
+/// The centers of a block's cells in the sensor's frame: the first one, and steps along the block's axes (metres).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Centres {
+pub(super) struct BlockCenters {
     pub first: [f32; 3],
     pub steps: [[f32; 3]; 3],
 }
 
-impl Centres {
-    /// The centres of an octant, 4 x 4 x 4.
+impl BlockCenters {
+    /// The centers of an octant, 4 x 4 x 4.
     #[inline(always)]
     pub(super) fn octant(&self, octant: usize) -> [Lanes; 3] {
         let mut p = [[0.0; LANES]; 3];
@@ -55,41 +57,34 @@ pub(super) fn cell_of(octant: usize, lane: usize) -> usize {
     corner + (lane & 3) + (lane >> 2 & 3) * 8 + (lane >> 4) * 64
 }
 
-/// What is known of a block beforehand, a bit for each octant: those in which all is free, and those that must be looked at.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Octants {
-    pub free: u8,
-    pub mixed: u8,
-}
-
 /// Distance and weight of every cell of a block, in the widest vectors there are; returns how many have a weight.
 #[multiversion(targets = "simd")]
 pub(super) fn observe_block(
-    view: &View<'_>,
-    centres: &Centres,
+    view: &ImageLookup<'_>,
+    centers: &BlockCenters,
     octants: Octants,
     distance: &mut [f32; BLOCK],
     weight: &mut [f32; BLOCK],
 ) -> usize {
-    block(view, centres, octants, distance, weight)
+    block(view, centers, octants, distance, weight)
 }
 
 /// The same, compiled for any processor.
 #[cfg(test)]
 pub(super) fn observe_block_plain(
-    view: &View<'_>,
-    centres: &Centres,
+    view: &ImageLookup<'_>,
+    centers: &BlockCenters,
     octants: Octants,
     distance: &mut [f32; BLOCK],
     weight: &mut [f32; BLOCK],
 ) -> usize {
-    block(view, centres, octants, distance, weight)
+    block(view, centers, octants, distance, weight)
 }
 
 #[inline(always)]
 fn block(
-    view: &View<'_>,
-    centres: &Centres,
+    view: &ImageLookup<'_>,
+    centers: &BlockCenters,
     octants: Octants,
     distance: &mut [f32; BLOCK],
     weight: &mut [f32; BLOCK],
@@ -99,7 +94,7 @@ fn block(
     for octant in 0..8 {
         let (mut d, mut w) = ([view.truncation; LANES], [view.carve_weight; LANES]);
         if octants.mixed >> octant & 1 == 1 {
-            observe(view, &centres.octant(octant), &mut d, &mut w);
+            observe(view, &centers.octant(octant), &mut d, &mut w);
         } else if octants.free >> octant & 1 == 0 {
             continue;
         }
@@ -113,7 +108,7 @@ fn block(
     observed as usize
 }
 
-/// Where 64 points fall: the pixel left above of each, and how far right below of its centre.
+/// Where 64 points fall: the pixel left above of each, and how far right below of its center.
 pub(super) struct Places {
     pub index: [u32; LANES],
     /// Row of that pixel, the border counted.
@@ -138,9 +133,9 @@ pub(super) fn places(u: &Lanes, v: &Lanes, stride: usize) -> Places {
 }
 
 #[inline(always)]
-fn observe(view: &View<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut Lanes) {
+fn observe(view: &ImageLookup<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut Lanes) {
     let stride = view.image.stride;
-    let seen = view.lens.project(p);
+    let seen = view.projector.project(p);
     let at = places(&seen.u, &seen.v, stride);
     let mut corners = [[0.0f32; LANES]; 4];
     let linear = &view.image.linear[..];
@@ -155,7 +150,7 @@ fn observe(view: &View<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut L
         corners[2][l] = if i < n { below[i] } else { 0.0 };
         corners[3][l] = if i < n { below_right[i] } else { 0.0 };
     }
-    let parallel = view.lens.is_parallel();
+    let parallel = view.projector.is_parallel();
     let (tau, per_tau, carve) = (view.truncation, 1.0 / view.truncation, view.carve_weight);
     let mut torn = [0u32; LANES];
     for l in 0..LANES {
@@ -204,7 +199,7 @@ pub(super) fn nearest(index: usize, right: f32, below: f32, stride: usize) -> us
 /// as far aside as half a cell; beyond, what is free is free up to the nearest of the four. A ray that met nothing says that
 /// it is free.
 #[inline(always)]
-fn alone(view: &View<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes) {
+fn alone(view: &ImageLookup<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes) {
     let stride = view.image.stride;
     let value = &view.image.value[..];
     let mut steps = Steps { right: [0.0; LANES], below: [0.0; LANES], row: [0; LANES] };
@@ -217,7 +212,7 @@ fn alone(view: &View<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes) {
         let i = ((at.index[l] + right + below * stride as u32) & 0x3fff_ffff) as usize;
         own[l] = if i < value.len() { value[i] } else { 0.0 };
     }
-    let aside = view.lens.aside(&steps, seen);
+    let aside = view.projector.aside(&steps, seen);
     let mut least = [0.0f32; LANES];
     // Who says nothing of free space needs no more than the nearest ray.
     if view.carve_weight > 0.0 {
@@ -233,7 +228,7 @@ fn alone(view: &View<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes) {
             least[l] = a.min(b).min(c.min(d));
         }
     }
-    let squared = view.inverse_square & !view.lens.is_parallel();
+    let squared = view.inverse_square & !view.projector.is_parallel();
     let (tau, carve) = (view.truncation, view.carve_weight);
     let (mut distance, mut weight) = ([0.0; LANES], [0.0; LANES]);
     for l in 0..LANES {
@@ -254,34 +249,33 @@ fn alone(view: &View<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::padded_image::Cleaning;
     use super::*;
     use crate::scan::{Orthographic, Pinhole, Projection, RangeImage, Spherical};
     use crate::sweep::WeightModel;
-    use crate::sweep::padded_image::Cleaning;
     use proptest::prelude::*;
 
     /// The widest vectors give the bits that any processor gives.
     fn same_bits(projection: Projection, values: Vec<f32>, first: [f32; 3], weights: WeightModel) {
         let (columns, rows) = (24, 12);
-        let image =
-            RangeImage { projection, columns, rows, values, colors: Vec::new(), refused: Default::default() };
-        let lens = Lens::of(&image).unwrap();
+        let image = RangeImage::new(projection, columns, rows, values);
+        let projector = Projector::of(&image);
         let mut padded = PaddedImage::default();
         let how = Cleaning { min_range: 0.0, max_range: 50.0, step: 0.03, weights, colors: false };
-        padded.fill(&image, &lens, &how);
-        let view = View {
-            lens: &lens,
+        padded.fill(&image, &projector, &how);
+        let view = ImageLookup {
+            projector: &projector,
             image: &padded,
             truncation: 0.3,
             carve_weight: 0.5,
             inverse_square: weights.parts().0,
             aside: 0.05,
         };
-        let centres = Centres { first, steps: [[0.08, 0.06, 0.0], [-0.06, 0.08, 0.0], [0.0, 0.0, 0.1]] };
+        let centers = BlockCenters { first, steps: [[0.08, 0.06, 0.0], [-0.06, 0.08, 0.0], [0.0, 0.0, 0.1]] };
         let [mut a, mut b, mut c, mut d] = [[0.0f32; BLOCK]; 4];
-        let octants = Octants { free: 4, mixed: 0xfb };
-        let observed = observe_block(&view, &centres, octants, &mut a, &mut b);
-        assert_eq!(observed, observe_block_plain(&view, &centres, octants, &mut c, &mut d));
+        let octants = Octants { free: 4, mixed: 0xfb, complete: 0 };
+        let observed = observe_block(&view, &centers, octants, &mut a, &mut b);
+        assert_eq!(observed, observe_block_plain(&view, &centers, octants, &mut c, &mut d));
         let bits = |v: &[f32]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&b), bits(&d));
         let said = |d: &[f32], w: &[f32]| {

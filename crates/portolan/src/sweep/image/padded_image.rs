@@ -1,17 +1,17 @@
 //! A range image made ready for being looked up: cleaned, with a border, torn where surfaces end.
 
 use super::bands::each_row;
-use super::lens::Lens;
-use super::weight::WeightModel;
+use super::projector::Projector;
 use crate::geom::vector::{dot, norm, sub};
 use crate::scan::{BeamCounts, MAX_OPENING, MAX_SLOPE, RangeImage, RefusedBeams};
+use crate::sweep::{PlannedScan, WeightModel};
 use multiversion::multiversion;
 
-/// Neighbours nearer than this say more about the noise than about the surface (metres).
+/// Neighbors nearer than this say more about the noise than about the surface (metres).
 const BASELINE: f64 = 0.05;
-/// Surfaces nearer than this are none: their inverse is no number (metres).
+/// Surfaces nearer than this are not used: their inverse would not be finite (metres).
 const NEAREST: f64 = 1e-6;
-/// How many pixels aside neighbours are looked for.
+/// How many pixels aside neighbors are looked for.
 const REACH: usize = 8;
 
 /// Values with a border of one pixel on the left and above, two on the right, one below; of a closed image the border
@@ -22,15 +22,15 @@ pub(super) struct PaddedImage {
     pub rows: usize,
     pub stride: usize,
     closed: bool,
-    /// As in the image: a surface, 0 for nothing known, negative for free up to there. The border knows nothing.
+    /// As in the image: a surface, 0 for nothing known, negative for free up to there. The border has no readings.
     pub value: Vec<f32>,
     /// What is linear on a plane: 1 / value of a surface (the value itself where rays are parallel), else 0. The sign is
-    /// negative where this pixel, its right and lower neighbours and the one between those are not of one surface, unless
+    /// negative where this pixel, its right and lower neighbors and the one between those are not of one surface, unless
     /// nothing at all is known of the four.
     pub linear: Vec<f32>,
     /// Cosine of the incidence at each pixel; empty where the weights do not ask for it.
     pub cosine: Vec<f32>,
-    /// Colours, without border; empty where there are none.
+    /// Colors, without border; empty where there are none.
     pub colors: Vec<[u8; 3]>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct PaddedImage {
 pub(super) struct Cleaning {
     pub min_range: f64,
     pub max_range: f64,
-    /// Neighbours that are not further apart than this are of one surface, however steep (metres).
+    /// Neighbors that are not further apart than this are of one surface, however steep (metres).
     pub step: f64,
     pub weights: WeightModel,
     pub colors: bool,
@@ -47,13 +47,8 @@ pub(super) struct Cleaning {
 
 impl PaddedImage {
     /// Takes an image in. Readings that are no number, too near or too far are cleaned, and counted by cause.
-    pub(super) fn fill(
-        &mut self,
-        image: &RangeImage,
-        lens: &Lens,
-        how: &Cleaning,
-    ) -> (BeamCounts, RefusedBeams) {
-        let shape = (image.columns, image.rows, lens.is_closed());
+    pub(super) fn fill(&mut self, image: &RangeImage, projector: &Projector, how: &Cleaning) -> PlannedScan {
+        let shape = (image.columns, image.rows, projector.is_closed());
         if shape != (self.columns, self.rows, self.closed) {
             (self.columns, self.rows, self.closed) = shape;
             self.stride = image.columns + 3;
@@ -63,12 +58,12 @@ impl PaddedImage {
                 plane.resize(self.stride * (self.rows + 2), 0.0);
             }
         }
-        let counted = self.clean(image, lens, how);
-        self.tear(lens, how.step as f32);
+        let counted = self.clean(image, projector, how);
+        self.tear(projector, how.step as f32);
         self.cosine.clear();
         if how.weights.parts().1 {
             self.find_cosines(image);
-            if lens.is_closed() {
+            if projector.is_closed() {
                 Self::repeat_seam(&mut self.cosine, self.stride);
             }
         }
@@ -79,11 +74,11 @@ impl PaddedImage {
         counted
     }
 
-    fn clean(&mut self, image: &RangeImage, lens: &Lens, how: &Cleaning) -> (BeamCounts, RefusedBeams) {
+    fn clean(&mut self, image: &RangeImage, projector: &Projector, how: &Cleaning) -> PlannedScan {
         let (w, stride) = (self.columns, self.stride);
         // Along a row the least and the most that a ray is longer than its value: whole rows need no closer look.
         let all_fit = |row: usize, values: &[f32]| {
-            let stretch = [0, w / 2, w - 1].map(|c| lens.stretch(c, row));
+            let stretch = [0, w / 2, w - 1].map(|c| projector.stretch(c, row));
             let most = stretch.into_iter().fold(1.0, f64::max);
             let (low, high) =
                 (how.min_range.max(NEAREST) as f32, (how.max_range / most * (1.0 - 1e-6)) as f32);
@@ -97,7 +92,7 @@ impl PaddedImage {
                 to.copy_from_slice(from);
             } else {
                 for (column, (to, &v)) in to.iter_mut().zip(from).enumerate() {
-                    *to = clean(v, lens.stretch(column, row), how, &mut refused);
+                    *to = clean(v, projector.stretch(column, row), how, &mut refused);
                 }
             }
             refused
@@ -106,27 +101,26 @@ impl PaddedImage {
             a += b;
             a
         });
-        let (value, parallel) = (&self.value, lens.is_parallel());
+        let (value, parallel) = (&self.value, projector.is_parallel());
         let linear_row = |row: usize, linear: &mut [f32]| {
             make_linear(&value[(row + 1) * stride + 1..][..w], &mut linear[1..=w], parallel)
         };
         let (hits, free) =
             each_row(&mut self.linear[inside], stride, linear_row, |a, b| (a.0 + b.0, a.1 + b.1));
-        if lens.is_closed() {
+        if projector.is_closed() {
             Self::repeat_seam(&mut self.value, stride);
             Self::repeat_seam(&mut self.linear, stride);
         }
         let dropped = (w * self.rows) as u64 - u64::from(hits) - u64::from(free);
-        let counts =
-            BeamCounts { hit: hits.into(), max_range: free.into(), dropped, ..BeamCounts::default() };
-        (counts, refused)
+        let beams = BeamCounts { hit: hits.into(), max_range: free.into(), dropped, ..BeamCounts::default() };
+        PlannedScan { beams, refused, hits_outside: 0 }
     }
 
-    /// Marks in the sign where four neighbours are not of one surface.
-    fn tear(&mut self, lens: &Lens, step: f32) {
+    /// Marks in the sign where four neighbors are not of one surface.
+    fn tear(&mut self, projector: &Projector, step: f32) {
         let stride = self.stride;
-        let parallel = lens.is_parallel();
-        // Neighbours of one surface are not further apart than `slope` times the nearer one, and `step`.
+        let parallel = projector.is_parallel();
+        // Neighbors of one surface are not further apart than `slope` times the nearer one, and `step`.
         let slope = |opening: f32| match (parallel, f64::from(opening) <= MAX_OPENING) {
             (true, _) => (0.0, MAX_SLOPE as f32 * opening + step),
             (false, true) => (MAX_SLOPE as f32 * opening, step),
@@ -134,7 +128,7 @@ impl PaddedImage {
         };
         let value = &self.value;
         let mark_row = |row: usize, linear: &mut [f32]| {
-            let [across, down] = lens.openings(row.saturating_sub(1));
+            let [across, down] = projector.openings(row.saturating_sub(1));
             let ((ax, bx), (ay, by)) = (slope(across), slope(down));
             let (v0, v1) = (&value[row * stride..][..stride], &value[(row + 1) * stride..][..stride]);
             mark_torn(v0, v1, &mut linear[..stride - 1], [ax, bx, ay, by]);
@@ -151,7 +145,7 @@ impl PaddedImage {
         }
     }
 
-    /// Cosines from the surface through the neighbours on all four sides, as far as they are of one surface.
+    /// Cosines from the surface through the neighbors on all four sides, as far as they are of one surface.
     fn find_cosines(&mut self, image: &RangeImage) {
         let (w, h, stride) = (self.columns, self.rows, self.stride);
         self.cosine.resize(self.value.len(), 1.0);
@@ -163,7 +157,7 @@ impl PaddedImage {
                     continue;
                 }
                 let here = image.point(column, row, v);
-                let neighbour = |dc: isize, dr: isize| {
+                let neighbor = |dc: isize, dr: isize| {
                     let mut last = None;
                     for n in 1..=REACH as isize {
                         let (Some(c), Some(r)) =
@@ -192,8 +186,8 @@ impl PaddedImage {
                     (None, None) => None,
                     (a, b) => Some(sub(a.unwrap_or(here), b.unwrap_or(here))),
                 };
-                let along = side(neighbour(1, 0), neighbour(-1, 0));
-                let down = side(neighbour(0, 1), neighbour(0, -1));
+                let along = side(neighbor(1, 0), neighbor(-1, 0));
+                let down = side(neighbor(0, 1), neighbor(0, -1));
                 let ray = sub(here, image.point(column, row, 0.5 * v));
                 let cosine = match (along, down) {
                     (Some(a), Some(b)) => {
@@ -201,7 +195,7 @@ impl PaddedImage {
                             [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
                         dot(normal, ray).abs() / (norm(normal) * norm(ray)).max(1e-30)
                     }
-                    // A line of neighbours: the sine of the angle to it.
+                    // A line of neighbors: the sine of the angle to it.
                     (Some(a), None) | (None, Some(a)) => {
                         let along = dot(a, ray) / (norm(a) * norm(ray)).max(1e-30);
                         (1.0 - along * along).max(0.0).sqrt()
@@ -235,7 +229,7 @@ fn make_linear(values: &[f32], linear: &mut [f32], parallel: bool) -> (u32, u32)
     (hits, free)
 }
 
-/// Turns the sign of a row of `linear` where the four pixels below and right of it are not of one surface. Neighbours in a
+/// Turns the sign of a row of `linear` where the four pixels below and right of it are not of one surface. Neighbors in a
 /// row are where they are not further apart than `how[0]` times the nearer one and `how[1]`, in a column `how[2]`, `how[3]`.
 #[multiversion(targets = "simd")]
 fn mark_torn(above: &[f32], below: &[f32], linear: &mut [f32], how: [f32; 4]) {

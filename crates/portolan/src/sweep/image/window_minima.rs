@@ -1,4 +1,4 @@
-//! The nearest reading of any window of pixels, by one look.
+//! The nearest reading of any window of pixels, by one read.
 
 use crate::parallel;
 
@@ -9,21 +9,21 @@ const FINE: [usize; 11] = [2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64];
 
 /// Minima over windows of one size at every place, also over the image's border.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct WindowMin {
+pub(super) struct WindowMinima {
     /// Size of the windows.
-    pub(crate) columns: usize,
-    pub(crate) rows: usize,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
     /// From one row of windows to the next.
-    pub(crate) stride: usize,
+    pub(super) stride: usize,
     /// Rows of windows.
-    pub(crate) lines: usize,
+    pub(super) lines: usize,
     /// Window that starts at `(row, column)`: at `(row + rows - 1) * stride + column + columns - 1`.
-    pub(crate) minima: Vec<f32>,
+    pub(super) minima: Vec<f32>,
 }
 
-impl WindowMin {
+impl WindowMinima {
     /// The same for larger windows, at most twice as large along each axis, into `to`. `outside` counts for what is not in the
-    /// image; in a closed one the last column is a neighbour of the first.
+    /// image; in a turning sensor's one they go on at the other side.
     fn grow(&self, to: &mut Self, (columns, rows): (usize, usize), edge: Edge, wide: &mut Vec<f32>) {
         let (more_c, more_r) = (columns - self.columns, rows - self.rows);
         let stride = edge.columns + columns - 1;
@@ -33,13 +33,14 @@ impl WindowMin {
         let mut line = vec![edge.outside; stride + more_c];
         for from in self.minima.chunks_exact(self.stride) {
             line[more_c..more_c + self.stride].copy_from_slice(from);
-            if edge.closed {
-                // Starts before the image are those before its end, and the other way round.
+            if let Some(turn) = edge.turn {
+                // Starts before the image are those before a turn's end, and the other way round.
+                let known = more_c + self.stride;
                 for i in (0..more_c).rev() {
-                    line[i] = line[i + edge.columns];
+                    line[i] = if i + turn < known { line[i + turn] } else { edge.outside };
                 }
-                for i in more_c + self.stride..stride + more_c {
-                    line[i] = line[i - edge.columns];
+                for i in known..stride + more_c {
+                    line[i] = if i >= turn { line[i - turn] } else { edge.outside };
                 }
             }
             smaller(wide, &line[..stride], &line[more_c..]);
@@ -57,9 +58,9 @@ impl WindowMin {
         }
     }
 
-    /// Index of the window whose middle is nearest to a pixel coordinate; `None` where it is not in the image at all.
+    /// Index of the window whose middle is nearest to a pixel coordinate; `None` where it is outside of the image.
     #[inline(always)]
-    pub(crate) fn around(&self, column: f32, row: f32) -> Option<usize> {
+    pub(super) fn around(&self, column: f32, row: f32) -> Option<usize> {
         let c = column + 0.5 * self.columns as f32;
         let r = row + 0.5 * self.rows as f32;
         let inside = c >= 0.0 && c < self.stride as f32 && r >= 0.0 && r < self.lines as f32;
@@ -72,7 +73,8 @@ impl WindowMin {
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     columns: usize,
-    closed: bool,
+    /// Columns of a full turn, where windows go on beyond the border.
+    turn: Option<usize>,
     outside: f32,
 }
 
@@ -84,25 +86,26 @@ fn smaller(to: &mut Vec<f32>, a: &[f32], b: &[f32]) {
 
 /// The tables of one image. Buffers are kept from image to image.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Guard {
+pub(super) struct RangeTables {
     /// Nearest reading; no reading counts as infinitely far.
-    pub(crate) fine: Vec<WindowMin>,
+    pub(super) fine: Vec<WindowMinima>,
     /// Nearest reading; no reading counts as 0.
-    pub(crate) nearest: Vec<WindowMin>,
+    pub(super) nearest: Vec<WindowMinima>,
     /// Farthest reading, negated; no reading counts as 0.
-    pub(crate) farthest: Vec<WindowMin>,
+    pub(super) farthest: Vec<WindowMinima>,
     /// The nearest reading of all.
-    pub(crate) overall: f32,
+    pub(super) overall: f32,
 }
 
-impl Guard {
-    /// Makes the tables of an image's values, with windows that are `rows_per_column` as high as wide.
-    pub(crate) fn fill(&mut self, values: &[f32], columns: usize, closed: bool, rows_per_column: f32) {
+impl RangeTables {
+    /// Makes the tables of an image's values, with windows that are `rows_per_column` as high as wide. `turn`:
+    /// columns of a full turn, whether the image has all of them or not; `None` where the sensor does not turn.
+    pub(super) fn fill(&mut self, values: &[f32], columns: usize, turn: Option<usize>, rows_per_column: f32) {
         let known = |v: f32| if v > 0.0 { v } else { f32::INFINITY };
-        let series = |all: &mut Vec<WindowMin>, sizes: &[usize], value: fn(f32) -> f32, outside: f32| {
-            all.resize_with(sizes.len(), WindowMin::default);
+        let series = |all: &mut Vec<WindowMinima>, sizes: &[usize], value: fn(f32) -> f32, outside: f32| {
+            all.resize_with(sizes.len(), WindowMinima::default);
             let minima = values.iter().map(|v| value(v.abs())).collect();
-            let mut first = WindowMin {
+            let mut first = WindowMinima {
                 columns: 1,
                 rows: 1,
                 stride: columns,
@@ -112,11 +115,11 @@ impl Guard {
             let mut wide = Vec::new();
             for (i, &n) in sizes.iter().enumerate() {
                 let rows = ((n as f32 * rows_per_column).ceil() as usize).clamp(2, 64);
-                let edge = Edge { columns, closed: closed && n < columns, outside };
+                let edge = Edge { columns, turn: turn.filter(|&t| n < t.min(columns)), outside };
                 if i == 0 {
                     // From single pixels in steps that at most double.
                     while 2 * first.columns < n || 2 * first.rows < rows {
-                        let mut next = WindowMin::default();
+                        let mut next = WindowMinima::default();
                         let size = (n.min(2 * first.columns), rows.min(2 * first.rows));
                         first.grow(&mut next, size, edge, &mut wide);
                         first = next;
@@ -142,16 +145,16 @@ impl Guard {
 
 /// Sizes of windows, as lanes to compare with.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sizes {
+pub(super) struct WindowSizes {
     columns: [f32; 16],
     rows: [f32; 16],
     len: usize,
 }
 
-impl Sizes {
+impl WindowSizes {
     /// Of windows that grow along both axes, at most 16.
-    pub(crate) fn of(windows: &[WindowMin]) -> Self {
-        let lane = |i: usize, size: fn(&WindowMin) -> usize| {
+    pub(super) fn of(windows: &[WindowMinima]) -> Self {
+        let lane = |i: usize, size: fn(&WindowMinima) -> usize| {
             windows.get(i).map_or(f32::INFINITY, |w| size(w) as f32)
         };
         Self {
@@ -161,9 +164,9 @@ impl Sizes {
         }
     }
 
-    /// The smallest windows that hold `columns` and `rows` pixels, by position; `None` where none do, or one is not a number.
+    /// The smallest windows that hold `columns` and `rows` pixels, by position; `None` where all are too small, or one is not a number.
     #[inline(always)]
-    pub(crate) fn level(&self, columns: f32, rows: f32) -> Option<usize> {
+    pub(super) fn level(&self, columns: f32, rows: f32) -> Option<usize> {
         let holds = |i: usize| (self.columns[i] >= columns) & (self.rows[i] >= rows);
         let level = (0..16).map(|i| usize::from(!holds(i))).sum::<usize>();
         (level < self.len).then_some(level)
@@ -177,23 +180,29 @@ mod tests {
 
     proptest! {
         #[test]
-        fn windows_hold_their_smallest(values in prop::collection::vec(0.0..9.0f32, 80 * 24), closed in any::<bool>(), ratio in 0.2..1.5f32) {
+        fn windows_hold_their_smallest(
+            values in prop::collection::vec(0.0..9.0f32, 80 * 24),
+            turn in prop::option::of(prop_oneof![3 => Just(80usize), 2 => 76..=120usize]),
+            ratio in 0.2..1.5f32,
+        ) {
             let (columns, rows) = (80i32, 24i32);
-            let mut guard = Guard::default();
-            guard.fill(&[1.0; 800], 40, !closed, 1.0);
-            guard.fill(&values, 80, closed, ratio);
+            let mut tables = RangeTables::default();
+            tables.fill(&[1.0; 800], 40, None, 1.0);
+            tables.fill(&values, 80, turn, ratio);
             for need in [0.5, 2.0, 3.5, 16.0, 64.0, 64.5, f32::INFINITY, f32::NAN] {
-                let first = guard.fine.iter().position(|w| w.columns as f32 >= need && w.rows as f32 >= 0.4 * need);
-                prop_assert_eq!(Sizes::of(&guard.fine).level(need, 0.4 * need), first);
+                let first = tables.fine.iter().position(|w| w.columns as f32 >= need && w.rows as f32 >= 0.4 * need);
+                prop_assert_eq!(WindowSizes::of(&tables.fine).level(need, 0.4 * need), first);
             }
-            for w in &guard.fine {
+            for w in &tables.fine {
                 for k in 0..40 {
                     let (r, c) = (k * 7 % 24 - k % 3, (k * 31) % 80 - k % 5);
                     let (r, c) = (r.max(1 - w.rows as i32), c.max(1 - w.columns as i32));
+                    // A window that starts before the image is the one that starts a turn later.
+                    let start = turn.filter(|_| c < 0).map_or(c, |turn| c + turn as i32);
                     let mut least = f32::INFINITY;
                     for i in r..r + w.rows as i32 {
-                        for j in c..c + w.columns as i32 {
-                            let j = if closed { j.rem_euclid(columns) } else { j };
+                        for j in start..start + w.columns as i32 {
+                            let j = turn.filter(|_| j >= columns).map_or(j, |turn| j - turn as i32);
                             if (0..rows).contains(&i) && (0..columns).contains(&j) {
                                 let v = values[(i * columns + j) as usize];
                                 least = least.min(if v > 0.0 { v } else { f32::INFINITY });

@@ -1,0 +1,358 @@
+//! The sweep for distances through a range image: every cell's center is looked up in it.
+
+use super::observe::{BlockCenters, ImageLookup, cell_of, nearest, observe_block, places};
+use super::padded_image::{Cleaning, PaddedImage};
+use super::project::LANES;
+use super::projector::Projector;
+use super::range_pyramid::RangePyramid;
+use super::search::{Class, Classify, Cube, LONGEST_EDGE, Octants, find_blocks};
+use super::window::Window;
+use crate::cell::{ColorObservation, Colors, Distances, Evidence};
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
+use crate::scan::RangeImage;
+use crate::sweep::{PlanError, PlanLimits, PlannedScan, WeightModel};
+
+/// How a range image becomes distances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProjectiveSettings {
+    /// Truncation tau (metres): cells further behind a surface get nothing.
+    pub truncation: f64,
+    /// Weight of free space before the truncation, times that of its ray; 0: free space gets nothing.
+    pub carve_weight: f32,
+    /// How much each ray is trusted.
+    pub weights: WeightModel,
+    /// Surfaces nearer than this are not used (metres along the ray).
+    pub min_range: f64,
+    /// Surfaces further than this are not used; the space up to there is free (metres along the ray).
+    pub max_range: f64,
+}
+
+/// Gives every cell the distance at its **center**, measured along the ray through it.
+///
+/// The center is projected into the image. If the four pixels around it are of one surface, the range there is
+/// interpolated between them: `1 / z` linearly, which is exact on a plane. (Along a steep surface linear depths would be
+/// off by centimetres.) Else the nearest pixel counts, with its surface no further aside than half a cell, so that nothing is
+/// drawn across gaps and thin things stay. Depths become distances along the ray, so that weights and truncation mean the
+/// same in the image's corners as in its middle.
+///
+/// Blocks are found from the other side: boxes of blocks are projected, largest first, and compared with the
+/// smallest and the largest depth that the image has there. No block that is seen can be missing.
+#[derive(Clone, Debug)]
+pub struct Projective {
+    settings: ProjectiveSettings,
+    projector: Option<Projector>,
+    image: PaddedImage,
+    pyramid: RangePyramid,
+    lattice: Lattice<3>,
+    /// Where the sensor is (world).
+    origin: [f64; 3],
+    image_from_world: [[f64; 3]; 3],
+    bounds: Option<Aabb<3>>,
+    keys: Vec<BlockKey<3>>,
+    octants: Vec<Octants>,
+}
+
+impl Projective {
+    /// A sweep with these settings, which has seen nothing yet.
+    pub fn new(settings: ProjectiveSettings) -> Self {
+        Self {
+            settings,
+            projector: None,
+            image: PaddedImage::default(),
+            pyramid: RangePyramid::default(),
+            lattice: Lattice::new([0.0; 3], 1.0),
+            origin: [0.0; 3],
+            image_from_world: Pose::<3>::IDENTITY.rotation,
+            bounds: None,
+            keys: Vec::new(),
+            octants: Vec::new(),
+        }
+    }
+
+    /// Takes an image in, taken at a rigid pose, and finds the blocks that it says something about. Only cells whose center
+    /// lies in the bounds get anything. O(pixels + blocks), in parallel.
+    ///
+    /// # Errors
+    /// Where the image contradicts itself, or sees more blocks than it may. The plan is then empty.
+    pub fn plan(
+        &mut self,
+        image: &RangeImage,
+        world_from_image: &Pose<3>,
+        lattice: &Lattice<3>,
+        limits: &PlanLimits<3>,
+    ) -> Result<PlannedScan, PlanError> {
+        self.keys.clear();
+        self.octants.clear();
+        image.check().map_err(PlanError::BadImage)?;
+        let projector = self.projector.take().filter(|p| p.is_of(image));
+        let projector = projector.unwrap_or_else(|| Projector::of(image));
+        let tau = self.settings.truncation;
+        let cleaning = Cleaning {
+            min_range: self.settings.min_range,
+            max_range: self.settings.max_range,
+            step: (0.5 * tau).min(0.03),
+            weights: self.settings.weights,
+            colors: limits.colors,
+        };
+        let mut planned = self.image.fill(image, &projector, &cleaning);
+        planned.refused += image.refused;
+        if let Some(bounds) = &limits.bounds {
+            let outside = |p: [f64; 3]| !bounds.contains(world_from_image.transform_point(p));
+            planned.hits_outside = image.points().filter(|(_, p)| outside(*p)).count() as u64;
+        }
+        self.pyramid.build(self.image.stride, &self.image.value, !self.carves());
+        self.lattice = *lattice;
+        self.origin = world_from_image.translation;
+        self.image_from_world = world_from_image.inverse().rotation;
+        self.bounds = limits.bounds;
+        let found = self.find_blocks(&projector, world_from_image, limits.most_blocks);
+        self.projector = Some(projector);
+        found.map(|()| planned)
+    }
+
+    fn carves(&self) -> bool {
+        self.settings.carve_weight > 0.0
+    }
+
+    /// The planned blocks, ascending.
+    pub fn blocks(&self) -> &[BlockKey<3>] {
+        &self.keys
+    }
+
+    fn find_blocks(
+        &mut self,
+        projector: &Projector,
+        world_from_image: &Pose<3>,
+        most: usize,
+    ) -> Result<(), PlanError> {
+        let Some((first, last)) = self.reach(projector, world_from_image) else { return Ok(()) };
+        if (0..3).any(|k| i64::from(last[k]) - i64::from(first[k]) >= LONGEST_EDGE) {
+            return Err(PlanError::TooManyBlocks);
+        }
+        let (mut keys, mut octants) = (std::mem::take(&mut self.keys), std::mem::take(&mut self.octants));
+        let spread = self.image_from_world.map(|row| row[0].abs() + row[1].abs() + row[2].abs());
+        let question = Question { sweep: self, projector, spread };
+        let fits = find_blocks(&question, (first, last), most, &mut keys, &mut octants);
+        (self.keys, self.octants) = (keys, octants);
+        if fits { Ok(()) } else { Err(PlanError::TooManyBlocks) }
+    }
+
+    /// The first and the last block of a box that holds all that the image sees.
+    fn reach(&self, projector: &Projector, world_from_image: &Pose<3>) -> Option<([i32; 3], [i32; 3])> {
+        let whole = self.pyramid.extremes([0, self.image.columns + 2], [0, self.image.rows + 1]);
+        let farthest = f64::from(whole[1]);
+        if farthest <= 0.0 {
+            return None;
+        }
+        let tau = self.settings.truncation;
+        let (low, high) = projector.reach(farthest + tau, tau);
+        let mut seen = Aabb::EMPTY;
+        for corner in 0..8 {
+            let p = std::array::from_fn(|k| if corner >> k & 1 == 0 { low[k] } else { high[k] });
+            seen.include(world_from_image.transform_point(p));
+        }
+        let mut seen = seen.grown(self.lattice.resolution);
+        if let Some(bounds) = &self.bounds {
+            for k in 0..3 {
+                seen.min[k] = seen.min[k].max(bounds.min[k]);
+                seen.max[k] = seen.max[k].min(bounds.max[k]);
+            }
+        }
+        if seen.is_empty() {
+            return None;
+        }
+        let edge = self.lattice.resolution * BLOCK_EDGE as f64;
+        let block = |p: [f64; 3], k: usize| ((p[k] - self.lattice.origin[k]) / edge).floor();
+        // Indices that cells may have, with room for their neighbors.
+        const LIMIT: f64 = (1u32 << 27) as f64;
+        let first: [i32; 3] = std::array::from_fn(|k| block(seen.min, k).max(-LIMIT) as i32);
+        let last: [i32; 3] = std::array::from_fn(|k| block(seen.max, k).min(LIMIT - 1.0) as i32);
+        (0..3).all(|k| first[k] <= last[k]).then_some((first, last))
+    }
+
+    fn lookup<'a>(&'a self, projector: &'a Projector) -> ImageLookup<'a> {
+        ImageLookup {
+            projector,
+            image: &self.image,
+            truncation: self.settings.truncation as f32,
+            carve_weight: self.settings.carve_weight,
+            inverse_square: self.settings.weights.parts().0,
+            aside: 0.5 * self.lattice.resolution as f32,
+        }
+    }
+
+    /// From the lattice to the sensor in f64, then f32: near a UTM origin nothing is lost.
+    fn centers(&self, key: BlockKey<3>) -> BlockCenters {
+        let center = self.lattice.center(key.first_cell());
+        let offset: [f64; 3] = std::array::from_fn(|k| center[k] - self.origin[k]);
+        let rows = &self.image_from_world;
+        BlockCenters {
+            first: rows.map(|row| (0..3).map(|k| row[k] * offset[k]).sum::<f64>() as f32),
+            steps: std::array::from_fn(|axis| rows.map(|row| (row[axis] * self.lattice.resolution) as f32)),
+        }
+    }
+
+    /// Whether all cells of the `i`-th planned block are free beyond the truncation.
+    pub(crate) fn is_free(&self, i: usize) -> bool {
+        self.octants[i].mixed == 0
+    }
+
+    /// The evidence about the `i`-th planned block, into `evidence`; returns for how many cells there is some.
+    pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
+        let Some(projector) = &self.projector else { return 0 };
+        let (distance, weight) = evidence.planes_mut();
+        let mut octants = self.octants[i];
+        if self.settings.weights != WeightModel::Constant {
+            // What is free has weights of its own too.
+            octants = Octants { mixed: octants.mixed | octants.free, ..Octants::default() };
+        }
+        let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight))
+        else {
+            return;
+        };
+        let observed =
+            observe_block(&self.lookup(projector), &self.centers(self.keys[i]), octants, distance, weight);
+        match &self.bounds {
+            Some(bounds) if keep_inside(&self.lattice, bounds, self.keys[i], weight) => evidence.observed(),
+            _ => observed,
+        }
+    }
+
+    /// The colors of the `i`-th planned block: those of the nearest pixels, for cells within `band` metres of the surface,
+    /// with the weight of their distances. `distances` is the block's evidence. Returns for how many cells there is one.
+    pub fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) -> usize {
+        colors.clear();
+        let Some(projector) = self.projector.as_ref().filter(|_| !self.image.colors.is_empty()) else {
+            return 0;
+        };
+        let near = |cell: usize| distances.weights()[cell] > 0.0 && distances.distances()[cell].abs() <= band;
+        let centers = self.centers(self.keys[i]);
+        let image = &self.image;
+        for octant in 0..8 {
+            if !(0..LANES).any(|l| near(cell_of(octant, l))) {
+                continue;
+            }
+            let seen = projector.project(&centers.octant(octant));
+            let at = places(&seen.u, &seen.v, image.stride);
+            for l in 0..LANES {
+                let cell = cell_of(octant, l);
+                let pixel = nearest(at.index[l] as usize, at.right[l], at.below[l], image.stride);
+                if near(cell) && image.value[pixel] > 0.0 {
+                    let (row, column) = (pixel / image.stride - 1, pixel % image.stride);
+                    let column = (column + image.columns - 1) % image.columns;
+                    let rgb = image.colors[row * image.columns + column];
+                    colors.set(cell, ColorObservation { rgb, weight: distances.weights()[cell] });
+                }
+            }
+        }
+    }
+}
+
+/// Silences the cells whose center is not inside; returns whether there may be such cells.
+pub(in crate::sweep) fn keep_inside(
+    lattice: &Lattice<3>,
+    bounds: &Aabb<3>,
+    key: BlockKey<3>,
+    weight: &mut [f32],
+) -> bool {
+    let (low, high) = (lattice.center(key.first_cell()), lattice.center(key.cell(weight.len() - 1)));
+    if bounds.contains(low) && bounds.contains(high) {
+        return false;
+    }
+    for (i, w) in weight.iter_mut().enumerate() {
+        if !bounds.contains(lattice.center(key.cell(i))) {
+            *w = 0.0;
+        }
+    }
+    true
+}
+
+/// What an image says of cubes of cells: their smallest and largest depth against those of their window.
+struct Question<'a> {
+    sweep: &'a Projective,
+    projector: &'a Projector,
+    /// Half edges along the sensor's axes of a box of half edge 1 along the map's.
+    spread: [f64; 3],
+}
+
+impl Classify for Question<'_> {
+    /// Extremes of a window that holds that of the cube.
+    type Known = [f32; 2];
+
+    /// A window that could hold any values: nearest 0, farthest infinitely far. Of neither is anything sure.
+    fn nothing_known(&self) -> [f32; 2] {
+        [f32::NEG_INFINITY, f32::INFINITY]
+    }
+
+    fn classify(&self, cube: Cube, known: [f32; 2], asked: u8) -> [(Class, [f32; 2]); 8] {
+        std::array::from_fn(|i| match asked >> i & 1 {
+            0 => (Class::Nothing, known),
+            _ => self.class(cube.half(i), known),
+        })
+    }
+}
+
+impl Question<'_> {
+    /// What the image says of a cube, and the extremes of its window: those of the window of its parent are `known`.
+    fn class(&self, cube: Cube, known: [f32; 2]) -> (Class, [f32; 2]) {
+        let sweep = self.sweep;
+        let r = sweep.lattice.resolution;
+        let offset: [f64; 3] = std::array::from_fn(|k| {
+            (sweep.lattice.origin[k] - sweep.origin[k])
+                + (cube.first_cell[k] as f64 + 0.5 * cube.edge as f64) * r
+        });
+        // The box of the centers of its cells.
+        let half = 0.5 * (cube.edge - 1) as f64 * r;
+        let (mut center, mut halves) = ([0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            let row = &sweep.image_from_world[k];
+            center[k] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
+            halves[k] = half * self.spread[k];
+        }
+        let depth = self.projector.depth(center, halves, || {
+            let (mut near, mut far) = (0.0, 0.0);
+            for o in offset.map(f64::abs) {
+                let (low, high) = ((o - half).max(0.0), o + half);
+                (near, far) = (near + low * low, far + high * high);
+            }
+            [near.sqrt(), far.sqrt()]
+        });
+        // No corner is further away than the way to it along the axes.
+        let far = offset[0].abs() + offset[1].abs() + offset[2].abs() + 3.0 * half;
+        let (tau, slack) = (sweep.settings.truncation, 1e-4 * r + 1e-6 * (depth[1].abs() + far));
+        let class = |[least, most]: [f32; 2]| {
+            let before = depth[1] < f64::from(least) - tau - slack;
+            if depth[0] > f64::from(most) + tau + slack || (before && !sweep.carves()) {
+                Class::Nothing
+            } else if before && depth[0] >= 0.0 {
+                // (What lies behind a camera is before everything, too.)
+                Class::Free
+            } else {
+                Class::Mixed
+            }
+        };
+        // Mostly the parent's window is enough, which costs nothing.
+        match class(known) {
+            Class::Mixed => match self.projector.window(center, halves) {
+                None => (Class::Nothing, known),
+                Some(window) => {
+                    let extremes = self.extremes(&window);
+                    (class(extremes), extremes)
+                }
+            },
+            sure => (sure, known),
+        }
+    }
+
+    fn extremes(&self, window: &Window) -> [f32; 2] {
+        let (pyramid, columns) = (&self.sweep.pyramid, self.sweep.image.columns);
+        let [from, to] = window.columns;
+        if to <= columns + 2 {
+            return pyramid.extremes([from, to], window.rows);
+        }
+        // Past the seam: the rest is at the other end.
+        let a = pyramid.extremes([from.min(columns + 1), columns + 1], window.rows);
+        let b = pyramid.extremes([1, (to - columns).min(columns + 1)], window.rows);
+        [a[0].min(b[0]), a[1].max(b[1])]
+    }
+}

@@ -1,0 +1,97 @@
+//! Points to places between pixels, 64 at a time: what distances are interpolated at.
+
+use super::projector::{Kind, Projector};
+
+/// Points that are projected together: an octant of a block.
+pub(super) const LANES: usize = 64;
+
+/// One number per lane.
+pub(super) type Lanes = [f32; LANES];
+
+/// Where 64 points fall, with the image's border of one pixel counted: 0.5 to 1.5 is column 0.
+pub(super) struct Projected {
+    pub u: Lanes,
+    pub v: Lanes,
+    /// Length of the ray up to the point (metres).
+    pub length: Lanes,
+    /// What a pixel's value is multiplied with for the length of the ray up to its surface.
+    pub scale: Lanes,
+}
+
+/// From pixels to 64 points: columns, rows, and the row of each pixel (without the border).
+pub(super) struct Steps {
+    pub right: Lanes,
+    pub below: Lanes,
+    pub row: [u32; LANES],
+}
+
+impl Projector {
+    /// Projects points of the sensor's frame. What falls outside lands on the border.
+    #[inline(always)]
+    pub(super) fn project(&self, p: &[Lanes; 3]) -> Projected {
+        let mut out =
+            Projected { u: [0.0; LANES], v: [0.0; LANES], length: [0.0; LANES], scale: [1.0; LANES] };
+        match &self.kind {
+            Kind::Pinhole(c) => {
+                let [fx, fy] = [c.fx as f32, c.fy as f32];
+                let [cx, cy] = [(c.cx + 1.0) as f32, (c.cy + 1.0) as f32];
+                for l in 0..LANES {
+                    let (x, y, z) = (p[0][l], p[1][l], p[2][l]);
+                    let inverse = 1.0 / z;
+                    out.u[l] = if z > 0.0 { fx * x * inverse + cx } else { 0.0 };
+                    out.v[l] = fy * y * inverse + cy;
+                    out.length[l] = (x * x + y * y + z * z).sqrt();
+                    out.scale[l] = out.length[l] * inverse;
+                }
+            }
+            Kind::Spherical(rings) => rings.project(p, &mut out),
+            Kind::Parallel { rays, top } => {
+                let origin = [0, 1].map(|k| (1.0 - rays.first[k] / rays.step[k]) as f32);
+                let per_metre = rays.step.map(|s| (1.0 / s) as f32);
+                for l in 0..LANES {
+                    out.u[l] = p[0][l] * per_metre[0] + origin[0];
+                    out.v[l] = p[1][l] * per_metre[1] + origin[1];
+                    out.length[l] = *top as f32 - p[2][l];
+                }
+            }
+        }
+        let seam = if self.is_closed() { 1.0 } else { 0.75 };
+        let (right, bottom) = (self.columns as f32 + seam, self.rows as f32 + 0.75);
+        for l in 0..LANES {
+            // NaN becomes 0, which is the border.
+            out.u[l] = out.u[l].max(0.0).min(right);
+            out.v[l] = out.v[l].max(0.0).min(bottom);
+        }
+        out
+    }
+
+    /// Distances between points and the rays of pixels near them (metres).
+    #[inline(always)]
+    pub(super) fn aside(&self, steps: &Steps, projected: &Projected) -> Lanes {
+        let mut aside = [0.0; LANES];
+        // Checked without a way out of the loops: so the loads are gathers.
+        let openings = &self.openings[..];
+        if matches!(self.kind, Kind::Spherical(_)) {
+            for l in 0..LANES {
+                let row = (steps.row[l] & 0x3fff_ffff) as usize;
+                let row = row.min(openings.len() - 1);
+                let a = if row < openings.len() { openings[row][0] } else { 0.0 };
+                let b = if row < openings.len() { openings[row][1] } else { 0.0 };
+                aside[l] = across(steps.right[l] * a, steps.below[l] * b) * projected.length[l];
+            }
+            return aside;
+        }
+        let [a, b] = self.openings(0);
+        let parallel = self.is_parallel();
+        for l in 0..LANES {
+            let depth = if parallel { 1.0 } else { projected.length[l] / projected.scale[l] };
+            aside[l] = across(steps.right[l] * a, steps.below[l] * b) * depth;
+        }
+        aside
+    }
+}
+
+#[inline(always)]
+fn across(a: f32, b: f32) -> f32 {
+    (a * a + b * b).sqrt()
+}

@@ -1,0 +1,218 @@
+//! The search for the blocks that an image says something about: from large cubes of blocks to octants of single ones.
+
+use crate::geom::{BLOCK_EDGE, BlockKey};
+use crate::parallel;
+
+/// What an image says about the cells of a cube.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Class {
+    /// Nothing: behind all surfaces, or out of sight.
+    Nothing,
+    /// All cells are free.
+    Free,
+    /// Cells have to be looked at one by one.
+    Mixed,
+    /// The same, and all pixels that they may fall on have a reading.
+    Complete,
+}
+
+/// A cube of cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cube {
+    pub first_cell: [i64; 3],
+    /// Cells along an edge: half a block, times a power of two.
+    pub edge: i64,
+}
+
+impl Cube {
+    /// One of its eight halves, x fastest.
+    pub(super) fn half(&self, i: usize) -> Self {
+        let edge = self.edge / 2;
+        Self { first_cell: [0, 1, 2].map(|k| self.first_cell[k] + edge * (i as i64 >> k & 1)), edge }
+    }
+}
+
+/// An image that can be asked about cubes of cells.
+pub(super) trait Classify: Sync {
+    /// What the look at a cube leaves for the look at its parts.
+    type Known: Copy + Send + Sync;
+
+    /// What is known at first.
+    fn nothing_known(&self) -> Self::Known;
+
+    /// What the image says about those halves of a cube whose bit is set in `asked`; anything about the others.
+    fn classify(&self, cube: Cube, known: Self::Known, asked: u8) -> [(Class, Self::Known); 8];
+}
+
+/// What is known of a block beforehand, a bit for each octant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Octants {
+    /// All cells are free.
+    pub free: u8,
+    /// Cells must be looked at.
+    pub mixed: u8,
+    /// Those among them whose pixels all have a reading.
+    pub complete: u8,
+}
+
+impl Octants {
+    const FREE: Self = Self { free: 0xff, mixed: 0, complete: 0 };
+
+    fn of(classes: impl Iterator<Item = Class>) -> Self {
+        let mut octants = Self::default();
+        for (bit, class) in classes.enumerate() {
+            octants.free |= u8::from(class == Class::Free) << bit;
+            octants.mixed |= u8::from(matches!(class, Class::Mixed | Class::Complete)) << bit;
+            octants.complete |= u8::from(class == Class::Complete) << bit;
+        }
+        octants
+    }
+}
+
+/// Boxes of more blocks along an edge are not searched.
+pub(super) const LONGEST_EDGE: i64 = 1 << 20;
+
+/// Blocks from `first` to `last`, both included, ascending, with what is known of their octants, into `keys` and `octants`;
+/// no more than `most` and some. Returns whether there are no more. The box is at most [`LONGEST_EDGE`] blocks wide.
+pub(super) fn find_blocks<C: Classify>(
+    image: &C,
+    (first, last): ([i32; 3], [i32; 3]),
+    most: usize,
+    keys: &mut Vec<BlockKey<3>>,
+    octants: &mut Vec<Octants>,
+) -> bool {
+    keys.clear();
+    octants.clear();
+    // Aligned, so that what is found does not depend on where the box begins.
+    let anchor = first.map(|v| i64::from(v).div_euclid(ALIGNED) * ALIGNED);
+    let search = Search { image, anchor, first: first.map(i64::from), last: last.map(i64::from), most };
+    let found = search.run();
+    if found.len() > most {
+        return false;
+    }
+    keys.extend(found.iter().map(|&(packed, _)| {
+        let index = |k: usize| (packed >> (BITS * k as u32)) & ((1 << BITS) - 1);
+        BlockKey(std::array::from_fn(|k| (anchor[k] + index(k) as i64) as i32))
+    }));
+    octants.extend(found.iter().map(|(_, octants)| *octants));
+    true
+}
+
+/// Bits of a packed index, and blocks along an edge of the largest nodes that lie as all others of their size.
+const BITS: u32 = 21;
+const ALIGNED: i64 = 8;
+
+struct Search<'a, C> {
+    image: &'a C,
+    /// Block that nodes count from.
+    anchor: [i64; 3],
+    first: [i64; 3],
+    last: [i64; 3],
+    most: usize,
+}
+
+/// A cube of `2^level` octants of blocks from `at`, counted from the anchor.
+#[derive(Clone, Copy)]
+struct Node {
+    at: [i64; 3],
+    level: u32,
+}
+
+/// The level at which a node is a block.
+const BLOCK: u32 = 1;
+
+impl Node {
+    fn children(self) -> impl Iterator<Item = Self> {
+        let (level, half) = (self.level - 1, 1i64 << (self.level - 1));
+        (0..8).map(move |c| Self { at: std::array::from_fn(|k| self.at[k] + half * (c >> k & 1)), level })
+    }
+
+    /// Indices of a block, in the order of keys.
+    fn packed(self) -> u64 {
+        let [x, y, z] = self.at.map(|v| (v >> BLOCK) as u64);
+        (z << (2 * BITS)) | (y << BITS) | x
+    }
+}
+
+/// A block that is seen: its packed indices, and what is known of its octants.
+type Found = (u64, Octants);
+
+impl<C: Classify> Search<'_, C> {
+    /// In the order of keys.
+    fn run(&self) -> Vec<Found> {
+        let span = (0..3).map(|k| self.last[k] - self.anchor[k] + 1).fold(ALIGNED, i64::max);
+        let root = Node { at: [0; 3], level: BLOCK + (span as u64).next_power_of_two().ilog2() };
+        let mut nodes = vec![(root, Class::Mixed, self.image.nothing_known())];
+        // Enough parts for every core, the same ones for any number of them.
+        const LEAST: u32 = BLOCK + 2;
+        let is_large = |n: &(Node, Class, _)| n.1 != Class::Free && n.0.level > LEAST;
+        while nodes.len() < 256 && nodes.iter().any(is_large) {
+            let open = |n: (Node, Class, C::Known)| match is_large(&n) {
+                true => self.parts(n.0, n.2).collect(),
+                false => vec![n],
+            };
+            nodes = nodes.into_iter().flat_map(open).collect();
+        }
+        let parts = parallel::map(&nodes, 1, |&(node, class, known)| {
+            let mut found = Vec::new();
+            self.take(node, class, known, &mut found);
+            found
+        });
+        let mut all = parts.concat();
+        all.sort_unstable_by_key(|found| found.0);
+        all
+    }
+
+    /// The halves of a node that reach into the box and of which the image says something.
+    #[inline(always)]
+    fn parts(&self, node: Node, known: C::Known) -> impl Iterator<Item = (Node, Class, C::Known)> {
+        let children = node.children().enumerate();
+        let asked = children.fold(0, |bits, (i, child)| bits | u8::from(self.is_inside(child)) << i);
+        let classes = self.image.classify(self.cube(node), known, asked);
+        let parts = node.children().zip(classes).enumerate();
+        parts
+            .filter(move |(i, (_, (class, _)))| asked >> i & 1 == 1 && *class != Class::Nothing)
+            .map(|(_, (child, (class, known)))| (child, class, known))
+    }
+
+    fn take(&self, node: Node, class: Class, known: C::Known, found: &mut Vec<Found>) {
+        if found.len() > self.most {
+        } else if class == Class::Free {
+            self.take_all(node, found);
+        } else if node.level == BLOCK {
+            let classes = self.image.classify(self.cube(node), known, 0xff);
+            let octants = Octants::of(classes.into_iter().map(|c| c.0));
+            if octants != Octants::default() {
+                found.push((node.packed(), octants));
+            }
+        } else {
+            self.parts(node, known).for_each(|(child, class, known)| self.take(child, class, known, found));
+        }
+    }
+
+    /// All blocks of a node that is free.
+    fn take_all(&self, node: Node, found: &mut Vec<Found>) {
+        if !self.is_inside(node) || found.len() > self.most {
+        } else if node.level == BLOCK {
+            found.push((node.packed(), Octants::FREE));
+        } else {
+            node.children().for_each(|child| self.take_all(child, found));
+        }
+    }
+
+    /// Whether a node reaches into the box.
+    #[inline(always)]
+    fn is_inside(&self, node: Node) -> bool {
+        let blocks = 1i64 << node.level >> BLOCK;
+        (0..3).all(|k| {
+            let low = self.anchor[k] + (node.at[k] >> BLOCK);
+            low <= self.last[k] && low + blocks > self.first[k]
+        })
+    }
+
+    fn cube(&self, node: Node) -> Cube {
+        const OCTANT: i64 = BLOCK_EDGE as i64 / 2;
+        let first_cell = [0, 1, 2].map(|k| self.anchor[k] * BLOCK_EDGE as i64 + node.at[k] * OCTANT);
+        Cube { first_cell, edge: OCTANT << node.level }
+    }
+}
