@@ -6,7 +6,7 @@
 //! | where do the wheels say that it is | [`measure_motions`], [`dead_reckon`] |
 //! | where was it really | [`correct`]: scan matching ([`match_scans`]), loop closures, pose graph |
 //! | how far off are poses | [`PoseErrors`]; without truth [`score_relations`] |
-//! | the same in space: a building, a lidar, a depth camera, truth | [`space`], [`building`] |
+//! | the same in 3-D: a building, a lidar, a depth camera, truth | [`building`], [`building_log`] |
 //! | how long does a map believe in what is gone, and what does forgetting cost | [`ghost`](fn@ghost), [`static_noise`](fn@static_noise) |
 //!
 //! Every transcendental function comes from `libm` and every random number from one small generator, so that a
@@ -24,6 +24,7 @@
 //! ```
 
 mod apartment;
+pub mod building;
 mod drive;
 mod followed;
 mod ghost;
@@ -37,11 +38,11 @@ mod random;
 mod relations;
 mod scan_match;
 mod solid;
-pub mod space;
 mod static_noise;
 mod world;
 
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
+pub use building::building_log;
 pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
 pub use followed::GhostGroup;
 pub use ghost::{Ghost, GhostRun, GhostSettings, ghost};
@@ -55,6 +56,5 @@ pub use random::Random;
 pub use relations::{Relation, RelationError, parse_relations, score_relations};
 pub use scan_match::{MatchRefusal, MatchSettings, ScanMatch, match_scans};
 pub use solid::{Solid, SolidKind};
-pub use space::building;
 pub use static_noise::{StaticNoise, static_noise};
 pub use world::{BoundarySegment, RayHit, World};

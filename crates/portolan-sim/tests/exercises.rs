@@ -164,7 +164,7 @@ fn crossing_and_slope(map: &Tsdf<2>) -> (f64, f64) {
 /// Exercise 3 (a) and (b): beams at 0 and 60 degrees say `y` and `2 y` about a point `y` in front of a wall. Fused with
 /// equal weights that is `1.5 y`: the slope is wrong, the zero is not. What a map's cells add is the taper: behind
 /// the wall the steeper beam counts less, the slopes on both sides differ, and the straight line between two cells
-/// misses the wall by half a millimetre in 5 cm.
+/// misses the wall by half a millimeter in 5 cm.
 #[test]
 fn exercise_3_zero_crossing_of_beams_at_0_and_60_degrees() {
     let (tau, sixty) = (0.15, 60f64.to_radians());

@@ -3,7 +3,7 @@
 use portolan::map::SparseTsdf;
 use portolan::store::Store;
 use portolan::surface::Mesh;
-use portolan_sim::space::SpaceWorld;
+use portolan_sim::building::World3;
 use serde_json::{Value, json};
 
 use super::ask::ColorBy;
@@ -17,7 +17,7 @@ pub(super) fn shades(
     by: ColorBy,
     piece: &Mesh,
     tsdf: &SparseTsdf,
-    world: Option<&SpaceWorld>,
+    world: Option<&World3>,
     out: &mut Vec<u8>,
 ) {
     let known = |share: f64| [step(share), 0, 0, 255];
