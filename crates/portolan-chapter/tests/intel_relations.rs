@@ -28,7 +28,7 @@ fn corrected_intel_poses_agree_with_the_verified_relations() {
     assert_eq!(relations.len(), 2984);
     let corrected = CarmenLog::read(folder.join("intel-corrected.log.gz")).unwrap();
     let raw = CarmenLog::read(folder.join("intel.clf.bz2")).unwrap();
-    // The corrected log has a clock of its own; its readings are those of the raw log, to the centimetre.
+    // The corrected log has a clock of its own; its readings are those of the raw log, to the centimeter.
     let key = |readings: &[f64]| readings.iter().map(|z| (100.0 * z).round() as i64).collect::<Vec<_>>();
     let stamps: HashMap<_, _> = raw.raw_scans().filter_map(|s| Some((key(s.readings), s.time?))).collect();
     let poses: Vec<_> = corrected
@@ -51,6 +51,6 @@ fn corrected_intel_poses_agree_with_the_verified_relations() {
     let odometry: Vec<_> = raw.raw_scans().filter_map(|s| Some((s.time?, s.world_from_laser))).collect();
     let all = score_relations(&relations, &odometry, 0.05);
     println!("raw odometry, {} relations: {all}", all.count);
-    // Most relations are between neighbours, where odometry is good: the mean tells, not the median.
+    // Most relations are between neighbors, where odometry is good: the mean tells, not the median.
     assert!(all.count == 2984 && all.translation.mean > 10.0 * score.translation.mean);
 }

@@ -6,10 +6,10 @@ use tiny_skia::{
 
 use crate::{Color, PixelRect, View, color};
 
-/// How a line is drawn: colour, width in pixels, dashes.
+/// How a line is drawn: color, width in pixels, dashes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pen {
-    /// Colour of the line.
+    /// Color of the line.
     pub color: Color,
     /// Width in pixels.
     pub width: f64,
@@ -64,7 +64,7 @@ impl Canvas {
         PixelRect::new(0.0, 0.0, f64::from(self.width()), f64::from(self.height()))
     }
 
-    /// The colour of a pixel; paper outside of the picture.
+    /// The color of a pixel; paper outside of the picture.
     pub fn pixel(&self, x: u32, y: u32) -> Color {
         self.pixels.pixel(x, y).map_or(color::PAPER, |p| Color {
             r: p.red(),
@@ -104,7 +104,7 @@ impl Canvas {
         self.paste(x, y, other.width() as usize, &pixels);
     }
 
-    /// A raster of `shape[0] × shape[1]` cells of `resolution` metres whose cell (0, 0) has its lower left
+    /// A raster of `shape[0] × shape[1]` cells of `resolution` meters whose cell (0, 0) has its lower left
     /// corner at `origin`; `color` is asked for the cells by index and its answer laid over the picture.
     ///
     /// Every pixel looks up the cell under it, so any scale works: enlarged cells are crisp squares, and

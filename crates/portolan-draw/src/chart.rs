@@ -103,7 +103,7 @@ pub enum Mark {
 /// use portolan_draw::{Chart, Series, color};
 /// let residual = (1..100).map(|i| [i as f64, 1.0 / i as f64]);
 /// let png = Chart::new("Residual")
-///     .x("step").y("metres").log_y()
+///     .x("step").y("meters").log_y()
 ///     .series(Series::line("training", residual, color::POSITIVE))
 ///     .horizontal(0.02, "noise", color::TRUTH)
 ///     .encode_png(640, 400);

@@ -1,9 +1,9 @@
-//! The colours of all pictures, in tones that stay apart for colour-blind readers and in print.
+//! The colors of the chapter, in tones that stay apart for color-blind readers and in print.
 //!
 //! Signed distance runs from orange (negative, behind a surface) through transparent at zero to blue
 //! (positive, free space); measurements are green, extracted surfaces purple, ground truth gray and dashed.
 
-/// An sRGB colour with straight (not premultiplied) alpha, 8 bits per channel.
+/// An sRGB color with straight (not premultiplied) alpha, 8 bits per channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Color {
     /// Red, 0 to 255.
@@ -17,12 +17,12 @@ pub struct Color {
 }
 
 impl Color {
-    /// An opaque colour from `0xRRGGBB`.
+    /// An opaque color from `0xRRGGBB`.
     pub const fn hex(rgb: u32) -> Self {
         Self { r: (rgb >> 16) as u8, g: (rgb >> 8) as u8, b: rgb as u8, a: 255 }
     }
 
-    /// The same colour with opacity `alpha` in 0 to 1 (clamped; NaN is transparent).
+    /// The same color with opacity `alpha` in 0 to 1 (clamped; NaN is transparent).
     pub fn with_alpha(self, alpha: f64) -> Self {
         Self { a: (alpha.clamp(0.0, 1.0) * 255.0).round() as u8, ..self }
     }
@@ -39,7 +39,7 @@ impl Color {
         }
     }
 
-    /// What is seen where `self` lies over the opaque colour `below`.
+    /// What is seen where `self` lies over the opaque color `below`.
     pub fn over(self, below: Self) -> Self {
         let opaque = Self { a: 255, ..self };
         below.mix(opaque, f64::from(self.a) / 255.0)
@@ -73,7 +73,7 @@ pub const OCCUPIED: Color = Color::hex(0x1B2733);
 /// Surely free.
 pub const FREE: Color = Color::hex(0xF7FBFE);
 
-/// Colours for the series of a chart, in the order in which to use them.
+/// Colors for the series of a chart, in the order in which to use them.
 pub const SERIES: [Color; 6] =
     [POSITIVE, NEGATIVE, MEASUREMENT, SURFACE, Color::hex(0xC2497F), Color::hex(0x8A6D1B)];
 
@@ -84,7 +84,7 @@ pub fn signed_distance(d: f64, limit: f64) -> Color {
         return UNKNOWN;
     }
     let strength = if limit > 0.0 { (d.abs() / limit).min(1.0) } else { 1.0 };
-    // The exponent keeps the neighbourhood of the surface legible on a screen.
+    // The exponent keeps the neighborhood of the surface legible on a screen.
     let tone = if d < 0.0 { NEGATIVE } else { POSITIVE };
     if d == 0.0 { TRANSPARENT } else { tone.with_alpha(0.9 * strength.powf(0.8)) }
 }

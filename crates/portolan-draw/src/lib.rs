@@ -1,8 +1,8 @@
 //! Maps and charts as PNG bytes in memory.
 //!
-//! Not a plotting library: it has the few shapes that portolan's own pictures need, in one set of
-//! colours, and it opens no files. A picture is a [`Canvas`]; a [`View`] says which box of the world, in
-//! metres, lies on which rectangle of pixels; [`Panels`] puts several views side by side; a [`Chart`] has
+//! Not a plotting library: it has the few shapes that portolan's own pictures need, in the colors of the
+//! chapter, and it opens no files. A picture is a [`Canvas`]; a [`View`] says which box of the world, in
+//! meters, lies on which rectangle of pixels; [`Panels`] puts several views side by side; a [`Chart`] has
 //! axes. Nothing here panics on empty, constant or non-finite data: such points are left out.
 //!
 //! ```
@@ -18,7 +18,7 @@
 mod canvas;
 mod chart;
 pub mod color;
-mod furniture;
+mod legend;
 mod panels;
 mod plot;
 mod render;
@@ -30,9 +30,9 @@ mod view;
 pub use canvas::{Canvas, Pen};
 pub use chart::{Axis, Chart, Line, Mark, Scale, Series};
 pub use color::Color;
-pub use furniture::{Entry, Swatch};
+pub use legend::{Entry, Swatch};
 pub use panels::{Panel, Panels};
-pub use render::{Camera, MeshView, Preview, Sensor, Setting, preview, render_mesh};
+pub use render::{Camera, MeshView, Preview, Sensor, preview, render_mesh};
 pub use text::{Anchor, Font};
 pub use ticks::{linear_ticks, log_ticks, tick_label};
 pub use units::{shown_bytes, shown_seconds};

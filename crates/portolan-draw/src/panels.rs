@@ -1,6 +1,6 @@
 //! Maps side by side: a grid of views of the same box of the world, each with its title.
 
-use crate::{Anchor, Canvas, Entry, Font, Pen, PixelRect, View, color, furniture::legend_height};
+use crate::{Anchor, Canvas, Entry, Font, Pen, PixelRect, View, color, legend::legend_height};
 
 /// Heading of one panel.
 #[derive(Clone, Debug, Default, PartialEq)]

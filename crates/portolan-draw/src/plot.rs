@@ -1,7 +1,7 @@
 //! How a chart is drawn: room for text first, then grid, marks, series, axes.
 
 use crate::chart::{Axis, Chart, Line, Mark, Scale, Series};
-use crate::furniture::legend_height;
+use crate::legend::legend_height;
 use crate::{Anchor, Canvas, Entry, Font, Pen, PixelRect, Swatch, View, color};
 use crate::{linear_ticks, log_ticks, tick_label};
 

@@ -19,7 +19,7 @@ pub enum Anchor {
     Right,
 }
 
-/// Size, weight and colour of text.
+/// Size, weight and color of text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Font {
     height: RasterHeight,
@@ -43,7 +43,7 @@ impl Font {
         Self { weight: FontWeight::Bold, ..self }
     }
 
-    /// The same in another colour.
+    /// The same in another color.
     pub fn color(self, color: Color) -> Self {
         Self { color, ..self }
     }

@@ -9,7 +9,7 @@ pub fn linear_ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     }
     let step = nice_step(span / count.max(1) as f64);
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
-    // Beyond 2^53 steps from zero neighbouring ticks are the same number.
+    // Beyond 2^53 steps from zero neighboring ticks are the same number.
     if !(last - first >= 0.0 && last - first < 1e4 && first.abs() < 9e15) {
         return Vec::new();
     }
@@ -33,7 +33,7 @@ pub fn log_ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     decades.into_iter().step_by(every).collect()
 }
 
-/// What to write at a tick, given the distance to its neighbour: as many decimals as the step needs, and
+/// What to write at a tick, given the distance to its neighbor: as many decimals as the step needs, and
 /// powers of ten as `1e-6` where plain digits would be long.
 pub fn tick_label(value: f64, step: f64) -> String {
     if value == 0.0 || value.abs() < 1e-9 * step.abs() {

@@ -48,7 +48,7 @@ impl PixelRect {
     }
 }
 
-/// An affine map from a box of the world (metres, y up) onto a rectangle of pixels (y down).
+/// An affine map from a box of the world (meters, y up) onto a rectangle of pixels (y down).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     world_min: [f64; 2],
@@ -58,7 +58,7 @@ pub struct View {
 
 impl View {
     /// The world box as large as it fits into `rect` with equal scales, centred; [`View::rect`] is the part
-    /// that it covers. A box without extent is given a metre.
+    /// that it covers. A box without extent is given a meter.
     pub fn fit(world_min: [f64; 2], world_max: [f64; 2], rect: PixelRect) -> Self {
         let extent = extent(world_min, world_max);
         let scale = (rect.width / extent[0]).min(rect.height / extent[1]);
@@ -89,7 +89,7 @@ impl View {
         ]
     }
 
-    /// Pixels per metre along x and y.
+    /// Pixels per meter along x and y.
     pub fn scale(&self) -> [f64; 2] {
         self.scale
     }

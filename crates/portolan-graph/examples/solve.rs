@@ -1,4 +1,4 @@
-//! Optimises a g2o file from every start there is: `cargo run --release -p portolan-graph --example solve -- FILE`.
+//! Optimizes a g2o file from every start there is: `cargo run --release -p portolan-graph --example solve -- FILE`.
 
 use std::error::Error;
 use std::fs::File;
@@ -16,8 +16,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         for tolerance in [Settings::default().relative_tolerance, 1e-12] {
             let settings = settings(tolerance);
             match &file.graph {
-                AnyGraph::Plane(graph) => solve(graph, &settings)?,
-                AnyGraph::Space(graph) => solve(graph, &settings)?,
+                AnyGraph::Se2(graph) => solve(graph, &settings)?,
+                AnyGraph::Se3(graph) => solve(graph, &settings)?,
             }
         }
     }
@@ -35,7 +35,7 @@ fn solve<const D: usize>(graph: &PoseGraph<D>, settings: &Settings) -> Result<()
             _ => {}
         }
         let started = clock.elapsed().as_secs_f64();
-        let report = graph.optimise(settings)?;
+        let report = graph.optimize(settings)?;
         writeln!(
             std::io::stdout(),
             "  {start:9} {:14.6} -> {:14.9}  {:3} iterations, {:?}, start {:.1} ms, all {:.1} ms, {} factor blocks",

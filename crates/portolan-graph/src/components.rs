@@ -1,18 +1,18 @@
-//! Which vertices hang together, and which are held.
+//! Connected components, and the vertex of each that is held.
 
 use crate::graph::PoseGraph;
 
-/// The parts of a graph and the vertices that stay where they are.
+/// The connected components of a graph and the vertices that are not moved.
 pub(crate) struct Anchors {
-    /// Whether each vertex stays: fixed by the caller, or the first of a part in which none is.
+    /// Whether each vertex is held: fixed by the caller, or the first of a component without a fixed vertex.
     pub(crate) held: Vec<bool>,
-    /// The vertices held without having been fixed, ascending.
+    /// The vertices held that the caller did not fix, ascending.
     pub(crate) chosen: Vec<usize>,
-    /// Number of parts.
+    /// Number of components.
     pub(crate) components: usize,
 }
 
-/// Finds the parts (union-find with path halving) and holds one vertex of each. O(vertices + edges).
+/// Finds the components (union-find with path halving) and holds one vertex of each. O(vertices + edges).
 pub(crate) fn anchors<const D: usize>(graph: &PoseGraph<D>) -> Anchors {
     let n = graph.vertices.len();
     let mut parent: Vec<usize> = (0..n).collect();
@@ -25,7 +25,7 @@ pub(crate) fn anchors<const D: usize>(graph: &PoseGraph<D>) -> Anchors {
     };
     for &[i, j] in &graph.ends {
         let (a, b) = (root(&mut parent, i), root(&mut parent, j));
-        // The smaller index wins: the root of a part is its first vertex.
+        // The smaller index wins: the root of a component is its first vertex.
         parent[a.max(b)] = a.min(b);
     }
     let mut held: Vec<bool> = graph.vertices.iter().map(|v| v.fixed).collect();

@@ -1,18 +1,18 @@
-//! What is wrong with a graph.
+//! Errors of graphs and of the optimizer.
 
 use portolan::geom::PoseError;
 
-/// Why a graph is refused or cannot be solved.
+/// Why a graph was refused or could not be optimized.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraphError {
-    /// The id is taken.
+    /// A vertex with this id exists already.
     #[error("vertex {id} exists already")]
     DuplicateVertex {
         /// The id.
         id: u64,
     },
-    /// There is no such vertex.
+    /// No vertex has this id.
     #[error("vertex {id} does not exist")]
     UnknownVertex {
         /// The id.
@@ -24,20 +24,20 @@ pub enum GraphError {
         /// The id.
         id: u64,
     },
-    /// A pose has entries that are not finite, or a rotation that is none.
+    /// A pose has an entry that is not finite, or its matrix is not a rotation.
     #[error("{what}: {source}")]
     Pose {
-        /// Which pose.
+        /// The vertex or edge of the pose.
         what: String,
-        /// What is wrong with it.
+        /// The defect.
         source: PoseError,
     },
-    /// An upper triangle of the wrong length.
+    /// An upper triangle has the wrong length.
     #[error("an information matrix has {expected} numbers in its upper triangle, not {found}")]
     InformationLength {
-        /// 6 in the plane, 21 in space.
+        /// 6 in 2-D, 21 in 3-D.
         expected: usize,
-        /// Numbers given.
+        /// Number of values given.
         found: usize,
     },
     /// An information matrix has an entry that is NaN or infinite.
@@ -46,25 +46,24 @@ pub enum GraphError {
     /// An information matrix is not positive definite.
     #[error("an information matrix is not positive definite: pivot {pivot:.3e} in row {row}")]
     InformationNotPositive {
-        /// Row of the first bad pivot.
+        /// Row of the first pivot that is not positive.
         row: usize,
         /// The pivot.
         pivot: f64,
     },
-    /// The graph falls apart, and the settings forbid it.
-    #[error("the graph has {components} parts that no edge connects")]
+    /// The graph is not connected, and [`Settings::require_connected`](crate::Settings::require_connected) is set.
+    #[error("the graph is not connected: it has {components} components")]
     Disconnected {
-        /// Number of parts.
+        /// Number of connected components.
         components: usize,
     },
-    /// The system stays singular however much it is damped: information that spans too many orders of
-    /// magnitude.
+    /// The system is singular at any damping: the information spans too many orders of magnitude.
     #[error("the linear system of iteration {iteration} is singular")]
     Singular {
-        /// The iteration, from 0; 0 also for a start that is computed.
+        /// The iteration, from 0; also 0 in the computation of initial poses.
         iteration: usize,
     },
-    /// The cost at the start overflows: poses or information too large.
+    /// The initial cost overflows: poses or information are too large.
     #[error("the cost is not finite: poses or information are too large")]
     NotFinite,
     /// A setting is out of range.
@@ -74,7 +73,7 @@ pub enum GraphError {
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// The values allowed.
         expected: &'static str,
     },
 }

@@ -1,4 +1,4 @@
-//! The graph: poses, and what was measured between them.
+//! The graph: poses, and relative poses measured between them.
 
 use portolan::geom::Pose;
 use rustc_hash::FxHashMap;
@@ -10,20 +10,20 @@ use crate::tangent::{error_pose, residual};
 /// A pose to be estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex<const D: usize> {
-    /// Its name, unique in the graph; any number.
+    /// Any number that is unique in the graph.
     pub id: u64,
     /// The estimate.
     pub world_from_vertex: Pose<D>,
-    /// Whether the optimiser must leave it where it is.
+    /// Whether the optimizer keeps the pose as it is.
     pub fixed: bool,
 }
 
-/// Where an edge comes from.
+/// The origin of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EdgeKind {
-    /// From one pose to the next: trusted, robust kernels leave it alone.
+    /// From one pose to the next: robust kernels are not applied.
     Odometry,
-    /// A place seen again: may be false, robust kernels apply.
+    /// A place recognized again, perhaps wrongly: robust kernels are applied.
     Closure,
 }
 
@@ -36,27 +36,27 @@ pub struct Edge<const D: usize> {
     pub j: u64,
     /// The measurement: the pose of `j` in the frame of `i`.
     pub i_from_j: Pose<D>,
-    /// How sure it is.
+    /// The inverse covariance of the measurement.
     pub information: Information<D>,
-    /// Where it comes from.
+    /// The origin of the edge.
     pub kind: EdgeKind,
 }
 
-/// Poses and relative poses measured between them, in the plane (`D = 2`) or in space (`D = 3`).
+/// Poses and relative poses measured between them, in 2-D or 3-D.
 ///
-/// Everything in it is finite, rigid and positive definite: what is not was refused on the way in.
+/// All poses are finite and rigid, all information matrices positive definite: anything else is refused when added.
 ///
 /// ```
 /// use portolan::geom::Pose;
 /// use portolan_graph::{Edge, EdgeKind, Information, PoseGraph, Settings};
 ///
-/// // A square lap: four sides of 1 m with a left turn, and the closure of the lap.
+/// // A square loop: four sides of 1 m with a left turn; the last one is the closure.
 /// let mut graph = PoseGraph::<2>::new();
 /// let side = Pose::<2>::new(1.0, 0.0, std::f64::consts::FRAC_PI_2);
 /// let mut pose = Pose::IDENTITY;
 /// for id in 0..4 {
 ///     graph.add_vertex(id, pose)?;
-///     pose = pose * Pose::<2>::new(1.1, 0.0, 1.5); // what the wheels said
+///     pose = pose * Pose::<2>::new(1.1, 0.0, 1.5); // wheel odometry
 /// }
 /// for i in 0..4 {
 ///     graph.add_edge(Edge {
@@ -67,7 +67,7 @@ pub struct Edge<const D: usize> {
 ///         kind: if i < 3 { EdgeKind::Odometry } else { EdgeKind::Closure },
 ///     })?;
 /// }
-/// let report = graph.optimise(&Settings::default())?;
+/// let report = graph.optimize(&Settings::default())?;
 /// assert!(report.chi_square.last() < Some(&1e-9));
 /// assert!((graph.pose(2).unwrap().translation[1] - 1.0).abs() < 1e-6);
 /// # Ok::<(), portolan_graph::GraphError>(())
@@ -117,7 +117,7 @@ impl<const D: usize> PoseGraph<D> {
         Ok(())
     }
 
-    /// Holds a vertex where it is, or lets it go.
+    /// Fixes a vertex at its pose, or frees it.
     ///
     /// # Errors
     /// [`GraphError::UnknownVertex`].
@@ -127,7 +127,7 @@ impl<const D: usize> PoseGraph<D> {
         Ok(())
     }
 
-    /// Puts a vertex elsewhere.
+    /// Replaces the pose of a vertex.
     ///
     /// # Errors
     /// [`GraphError::UnknownVertex`], [`GraphError::Pose`].
@@ -137,7 +137,7 @@ impl<const D: usize> PoseGraph<D> {
         Ok(())
     }
 
-    /// The estimate of a vertex; `None` where there is no such id.
+    /// The estimate of a vertex; `None` for an unknown id.
     pub fn pose(&self, id: u64) -> Option<&Pose<D>> {
         self.index.get(&id).map(|&index| &self.vertices[index].world_from_vertex)
     }

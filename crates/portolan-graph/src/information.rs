@@ -1,11 +1,11 @@
-//! How sure an edge is.
+//! The information matrix of an edge.
 
 use crate::error::GraphError;
 use crate::sparse::Block;
 use crate::tangent::tangent_dimension;
 
 /// The information matrix of an edge: the inverse of the covariance of its residual, symmetric and positive
-/// definite. 3 x 3 in the plane over `[x, y, theta]`; 6 x 6 in space over `[x, y, z, qx, qy, qz]` (metres, and
+/// definite. 3 x 3 in 2-D over `[x, y, theta]`; 6 x 6 in 3-D over `[x, y, z, qx, qy, qz]` (meters, and
 /// the vector part of the quaternion, which is *half* the rotation vector: 1 rad² of variance is 0.25 there).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Information<const D: usize> {
@@ -14,7 +14,7 @@ pub struct Information<const D: usize> {
 }
 
 impl<const D: usize> Information<D> {
-    /// From the upper triangle, row by row, as g2o files hold it: 6 numbers in the plane, 21 in space.
+    /// From the upper triangle, row by row, as in g2o files: 6 numbers in 2-D, 21 in 3-D.
     ///
     /// # Errors
     /// [`GraphError::InformationLength`], [`GraphError::InformationNotFinite`],
@@ -39,10 +39,10 @@ impl<const D: usize> Information<D> {
         Ok(information)
     }
 
-    /// From one standard deviation of the position (metres) and one of the rotation (radians).
+    /// From the standard deviations of position (meters) and rotation (radians), the same along every axis.
     ///
     /// # Errors
-    /// Like [`Information::from_upper`], where a deviation is not a positive number.
+    /// As [`Information::from_upper`], where a deviation is not a positive number.
     pub fn from_sigmas(translation: f64, rotation: f64) -> Result<Self, GraphError> {
         let per_radian = if D == 2 { 1.0 } else { 4.0 };
         let n = tangent_dimension(D);
@@ -55,7 +55,7 @@ impl<const D: usize> Information<D> {
         Self::from_upper(&upper)
     }
 
-    /// The upper triangle, row by row: what [`Information::from_upper`] takes.
+    /// The upper triangle, row by row, as [`Information::from_upper`] takes it.
     pub fn upper(&self) -> Vec<f64> {
         let n = tangent_dimension(D);
         (0..n).flat_map(|r| (r..n).map(move |c| self.matrix[r][c])).collect()
@@ -128,7 +128,7 @@ mod tests {
             Information::<2>::from_sigmas(0.5, 0.1).unwrap().upper(),
             [4.0, 0.0, 0.0, 4.0, 0.0, 99.99999999999999]
         );
-        let space = Information::<3>::from_sigmas(0.5, 0.5).unwrap();
-        assert_eq!(space.weights(), [4.0, 16.0]);
+        let sharp = Information::<3>::from_sigmas(0.5, 0.5).unwrap();
+        assert_eq!(sharp.weights(), [4.0, 16.0]);
     }
 }

@@ -1,17 +1,17 @@
-//! Robust kernels: how much an edge that disagrees may still pull.
+//! Robust kernels: they bound the influence of edges with large errors.
 
 use crate::error::GraphError;
 
-/// What an edge costs, as a function of its chi-square `s = r^T Omega r`. The scale `k` of each is in standard
-/// deviations: an edge whose `sqrt(s)` is below it counts (nearly) in full.
+/// The cost of an edge as a function of its chi-square `s = r^T Omega r`. The scale `k` of each kernel is in standard
+/// deviations: an edge with `sqrt(s)` below it has (nearly) its full weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Kernel {
     /// `s`: least squares.
     #[default]
     None,
-    /// `s` up to `k²`, then `2 k sqrt(s) - k²` (Huber 1964). Convex; a gross error keeps a constant pull.
+    /// `s` up to `k²`, then `2 k sqrt(s) - k²` (Huber 1964). Convex; the influence of an outlier stays constant.
     Huber(f64),
-    /// `k² ln(1 + s / k²)`: the pull fades with the inverse of the error.
+    /// `k² ln(1 + s / k²)`: the influence falls with the inverse of the error.
     Cauchy(f64),
     /// Dynamic covariance scaling (Agarwal et al. 2013) with `Phi = k²`: `s` up to `k²`, then weight
     /// `(2 k² / (k² + s))²`. Bounded by `3 k²`.

@@ -1,18 +1,18 @@
-//! Pose graphs in the plane and in space: what was measured between poses, and the poses that agree with it best.
+//! 2-D and 3-D pose graphs: poses, the relative poses measured between them, and the poses that fit these best.
 //!
 //! ```text
 //!   odometry   o--o--o--o          o--o--o
-//!              |         \    ->   |      |      the lap closes: every pose moves a little
+//!              |         \    ->   |      |      the loop closes: every pose moves a little
 //!   closure    o - - - - -o        o--o--o
 //! ```
 //!
 //! A [`PoseGraph`] holds vertices (poses) and edges (relative poses with information matrices);
-//! [`PoseGraph::optimise`] minimises `sum r^T Omega r` by sparse Levenberg-Marquardt, with a robust [`Kernel`] where
-//! closures may be false. A minimum is only as good as the start: [`PoseGraph::start_from_chordal`] for graphs
-//! that can be trusted, [`PoseGraph::start_from_tree`] with [`Chain::Odometry`] for others. [`read_g2o`] and
-//! [`write_g2o`] speak the format of the community's benchmark graphs.
+//! [`PoseGraph::optimize`] minimizes `sum r^T Omega r` by sparse Levenberg-Marquardt, with a robust [`Kernel`] where
+//! closures may be false. The minimum found depends on the initial poses: use [`PoseGraph::start_from_chordal`] for
+//! graphs without outliers, [`PoseGraph::start_from_tree`] with [`Chain::Odometry`] for others. [`read_g2o`] and
+//! [`write_g2o`] read and write the format of the public benchmark graphs.
 //!
-//! The crate opens no files, prints nothing, and gives the same bytes on every machine.
+//! The crate opens no files, prints nothing, and computes the same bytes on every machine.
 
 #![allow(clippy::needless_range_loop, reason = "formulas over rows and columns read best with their indices")]
 
@@ -22,7 +22,7 @@ mod g2o;
 mod graph;
 mod information;
 mod kernel;
-mod optimise;
+mod optimize;
 mod settings;
 mod sparse;
 mod start;

@@ -1,22 +1,22 @@
-//! What the optimiser is told, and what it tells.
+//! Settings of the optimizer, and its report.
 
 use crate::error::GraphError;
 use crate::kernel::Kernel;
 
-/// How to optimise.
+/// Settings of [`PoseGraph::optimize`](crate::PoseGraph::optimize).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Applied to edges of the kind [`EdgeKind::Closure`](crate::EdgeKind::Closure). None by default.
+    /// Applied to edges of the kind [`EdgeKind::Closure`](crate::EdgeKind::Closure). [`Kernel::None`] by default.
     pub kernel: Kernel,
-    /// How a kernel is brought in; without effect where there is none. [`Approach::Better`] by default.
+    /// How a robust kernel is applied; no effect with [`Kernel::None`]. [`Approach::Better`] by default.
     pub approach: Approach,
-    /// Linear systems solved at most, by each approach. 200 by default.
+    /// Limit of the number of linear systems solved by each approach. 200 by default.
     pub max_iterations: usize,
-    /// Converged where a step lowers the cost by less than this part of it. 1e-6 by default.
+    /// Relative decrease of the cost in a step below which the optimizer has converged. 1e-6 by default.
     pub relative_tolerance: f64,
-    /// First damping, in units of the diagonal of the system. 1e-6 by default: nearly Gauss-Newton.
+    /// Initial damping, in units of the diagonal of the system. 1e-6 by default: nearly Gauss-Newton.
     pub damping: f64,
-    /// Whether a graph in several parts is refused. By default one vertex of each part is held.
+    /// Whether a graph of several components is refused. By default one vertex of each component is held.
     pub require_connected: bool,
 }
 
@@ -33,51 +33,51 @@ impl Default for Settings {
     }
 }
 
-/// How a robust kernel is brought in. Kernels other than Huber's have many minima, and which one is found depends
-/// on the way.
+/// How a robust kernel is applied. The cost under kernels other than Huber's has many minima, and the approach decides
+/// which one is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Approach {
-    /// With its scale from the first step on: finds the minimum next to the start. Right where the start is good,
-    /// say by chained odometry that drifts less than the closures' own errors allow.
+    /// At full scale from the first step: finds the minimum nearest to the initial poses. For good initial poses, such
+    /// as chained odometry that drifts less than the error of true closures.
     Direct,
-    /// It starts so wide that nothing is an outlier and narrows to its scale by halves (graduated non-convexity,
-    /// Yang et al. 2020): nearly independent of the start, but least squares must not be misled too far.
+    /// At a scale at which no edge is an outlier, halved down to the scale of the kernel (graduated non-convexity,
+    /// Yang et al. 2020): nearly independent of the initial poses, but fails where outliers dominate least squares.
     Graduated,
-    /// Both, and the lower cost is kept.
+    /// Both; the result with the lower cost is kept.
     Better,
 }
 
-/// Why the optimiser stopped.
+/// Why the optimizer stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stop {
     /// The last step lowered the cost by less than the tolerance.
     Converged,
-    /// No step lowers the cost, however small: a minimum to the last digit.
+    /// No step lowers the cost at any damping: a minimum to the last digit.
     Stalled,
-    /// The limit of [`Settings::max_iterations`] was reached before.
+    /// [`Settings::max_iterations`] was reached.
     IterationLimit,
-    /// No vertex is free, or there is no edge.
+    /// All vertices are held, or the graph has no edges.
     NothingToMove,
 }
 
-/// What the optimiser did.
+/// The result of an optimization, beside the poses.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// `sum r^T Omega r` without kernels: at the start, then after each accepted step.
+    /// `sum r^T Omega r` without kernels: of the initial poses, then after each accepted step.
     pub chi_square: Vec<f64>,
-    /// The cost that was minimised, with kernels, at the same moments. It is not monotone where a kernel narrows.
-    /// Where two approaches were tried, both lists are of the one that was kept.
+    /// The minimized cost, with kernels, at the same steps. It is not monotone while a kernel is narrowed.
+    /// With [`Approach::Better`] both lists are those of the result that was kept.
     pub cost: Vec<f64>,
-    /// Linear systems solved, steps that were taken back included, by all approaches tried.
+    /// Number of linear systems solved by all approaches, rejected steps included.
     pub iterations: usize,
-    /// Why it ended.
+    /// Why the optimizer stopped.
     pub stop: Stop,
-    /// Parts of the graph that no edge connects.
+    /// Number of connected components of the graph.
     pub components: usize,
-    /// Ids of vertices held because no vertex of their part was fixed: the first of each such part.
+    /// Ids of the vertices held in components without a fixed vertex: the first vertex of each.
     pub held: Vec<u64>,
-    /// Blocks off the diagonal of the sparse factor: what the fill costs.
+    /// Number of blocks of the sparse factor off its diagonal.
     pub factor_blocks: usize,
 }
 

@@ -5,9 +5,9 @@ use portolan::geom::Pose;
 use crate::graph::{EdgeKind, PoseGraph, quadratic};
 use crate::kernel::Kernel;
 use crate::sparse::{Block, Pattern, SymmetricBlocks};
-use crate::tangent::{error_pose, linearise, residual};
+use crate::tangent::{error_pose, linearize, residual};
 
-/// The edges of a graph prepared for many linearisations, and the numbering of its free vertices.
+/// The edges of a graph prepared for many linearizations, and the numbering of its free vertices.
 pub(crate) struct System<const D: usize, const B: usize> {
     pub(crate) pattern: Pattern,
     /// Vertex of each variable.
@@ -26,12 +26,12 @@ struct Term<const D: usize, const B: usize> {
     pair: usize,
 }
 
-/// What a set of poses costs.
+/// The cost of a set of poses.
 #[derive(Clone, Copy)]
 pub(crate) struct Cost {
     /// `sum r^T Omega r`.
     pub(crate) chi_square: f64,
-    /// The same under the kernel: what is minimised.
+    /// The same under the kernel: what is minimized.
     pub(crate) robust: f64,
 }
 
@@ -82,7 +82,7 @@ impl<const D: usize, const B: usize> System<D, B> {
     }
 
     /// Fills `h` and `g` (both overwritten) at `poses`.
-    pub(crate) fn linearise(
+    pub(crate) fn linearize(
         &self,
         poses: &[Pose<D>],
         kernel: Kernel,
@@ -93,7 +93,7 @@ impl<const D: usize, const B: usize> System<D, B> {
         g.fill([0.0; B]);
         for term in &self.terms {
             let [i, j] = term.ends;
-            let linear = linearise::<D, B>(&term.j_from_i, &poses[i], &poses[j]);
+            let linear = linearize::<D, B>(&term.j_from_i, &poses[i], &poses[j]);
             let s = quadratic(&linear.residual, &term.omega);
             let weight = term.kernel(kernel).cost_and_weight(s).1;
             let omega = term.omega.map(|row| row.map(|v| weight * v));

@@ -1,11 +1,10 @@
-//! The error of one edge, its derivatives, and the step of one pose: what is different about the plane and
-//! space stands here and nowhere else.
+//! The error of one edge, its derivatives, and the step of one pose: the only code that differs between 2-D and 3-D.
 //!
 //! For an edge with the measurement `i_from_j = Z` between poses `X_i`, `X_j` (world from vertex), the error pose
-//! is `E = Z^-1 X_i^-1 X_j`, and the residual is what g2o calls it (Grisetti et al. 2010, the g2o file format):
+//! is `E = Z^-1 X_i^-1 X_j`, and the residual is that of g2o (Grisetti et al. 2010, the g2o file format):
 //!
-//! - plane: `[x, y, theta]` of `E`, theta in `(-pi, pi]`;
-//! - space: `[x, y, z, qx, qy, qz]` of `E`, the quaternion with `qw >= 0`: *half* the rotation vector for small
+//! - 2-D: `[x, y, theta]` of `E`, theta in `(-pi, pi]`;
+//! - 3-D: `[x, y, z, qx, qy, qz]` of `E`, the quaternion with `qw >= 0`: *half* the rotation vector for small
 //!   angles, bounded by one for large ones.
 //!
 //! A step `[rho, phi]` acts on the right: `X <- (R exp(phi), t + R rho)`.
@@ -15,12 +14,12 @@ use portolan::geom::vector::{add, dot, scale, sub};
 
 use crate::sparse::Block;
 
-/// Numbers in a step of a pose: 3 in the plane, 6 in space.
+/// Degrees of freedom of a pose: 3 in 2-D, 6 in 3-D.
 pub(crate) const fn tangent_dimension(dimension: usize) -> usize {
     dimension * (dimension + 1) / 2
 }
 
-/// An edge linearised: residual and its derivatives with respect to the steps of both ends.
+/// An edge linearized: residual and its derivatives with respect to the steps of both ends.
 pub(crate) struct Linear<const B: usize> {
     pub(crate) residual: [f64; B],
     pub(crate) by_i: Block<B>,
@@ -47,7 +46,7 @@ pub(crate) fn residual<const D: usize, const B: usize>(error: &Pose<D>) -> [f64;
 }
 
 /// The residual of an edge and its derivatives, `j_from_i` being the inverse of the measurement.
-pub(crate) fn linearise<const D: usize, const B: usize>(
+pub(crate) fn linearize<const D: usize, const B: usize>(
     j_from_i: &Pose<D>,
     i: &Pose<D>,
     j: &Pose<D>,
@@ -111,7 +110,7 @@ pub(crate) fn stepped<const D: usize, const B: usize>(pose: &Pose<D>, step: &[f6
     *pose * local
 }
 
-/// `e_k x p`, or in the plane the quarter turn of `p`.
+/// `e_k x p`; in 2-D, `p` turned by 90 degrees.
 #[inline(always)]
 fn turned<const D: usize>(k: usize, p: [f64; D]) -> [f64; D] {
     let mut out = [0.0; D];
@@ -129,13 +128,13 @@ pub(crate) fn angle<const D: usize>(pose: &Pose<D>) -> f64 {
     libm::atan2(pose.rotation[1][0], pose.rotation[0][0])
 }
 
-/// The pose in the plane with this heading, the same bytes on every platform.
+/// The 2-D pose with this heading, the same bytes on every platform.
 pub(crate) fn planar(x: f64, y: f64, theta: f64) -> Pose<2> {
     Pose::from_cos_sin(x, y, libm::cos(theta), libm::sin(theta))
 }
 
-/// The unit quaternion `(x, y, z, w)` of a pose in space, `w >= 0`. The largest of the four is found first, so
-/// that no digits are lost (Shepperd 1978).
+/// The unit quaternion `(x, y, z, w)` of a 3-D pose, `w >= 0`. The largest of the four is computed first, so that no
+/// digits are lost (Shepperd 1978).
 pub(crate) fn quaternion<const D: usize>(pose: &Pose<D>) -> [f64; 4] {
     let m = &pose.rotation;
     let trace = m[0][0] + m[1][1] + m[2][2];
@@ -200,7 +199,7 @@ mod tests {
     fn derivatives_agree<const D: usize, const B: usize>(v: &[f64]) {
         let (z, i, j) = (pose::<D>(&v[..6]), pose::<D>(&v[6..12]), pose::<D>(&v[12..18]));
         let back = z.inverse();
-        let linear = linearise::<D, B>(&back, &i, &j);
+        let linear = linearize::<D, B>(&back, &i, &j);
         // At a half turn the residual jumps: there is no derivative to compare with.
         let error = error_pose(&back, &i, &j);
         let far = match D {

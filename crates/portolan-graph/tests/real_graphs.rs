@@ -51,13 +51,13 @@ fn reaches_best<const D: usize>(graph: &PoseGraph<D>, best: f64) {
     // Twice the same bytes.
     let mut again = graph.clone();
     again.start_from_chordal().unwrap();
-    again.optimise(&Settings::default()).unwrap();
+    again.optimize(&Settings::default()).unwrap();
     assert_eq!(again.vertices(), chordal.vertices());
 }
 
 fn ends_at<const D: usize>(graph: &mut PoseGraph<D>, best: f64, start: &str) {
     let anchor = graph.vertices()[0];
-    let report = graph.optimise(&Settings::default()).unwrap();
+    let report = graph.optimize(&Settings::default()).unwrap();
     let end = graph.chi_square();
     assert!((end / best - 1.0).abs() < 1e-4, "{start}: {end}, not {best}");
     assert_eq!(report.chi_square.last(), Some(&end));
@@ -83,13 +83,13 @@ fn chi_square_is_the_best_known_from_every_start() {
         let file = read_g2o(text.as_bytes(), name).unwrap();
         assert!(file.unknown.is_empty() && !file.vertices_made && file.quaternions_off == 0);
         match &file.graph {
-            AnyGraph::Plane(graph) => {
+            AnyGraph::Se2(graph) => {
                 reaches_best(graph, best);
-                through_a_file(graph, plane);
+                through_a_file(graph, se2);
             }
-            AnyGraph::Space(graph) => {
+            AnyGraph::Se3(graph) => {
                 reaches_best(graph, best);
-                through_a_file(graph, space);
+                through_a_file(graph, se3);
             }
         }
     }
@@ -103,31 +103,31 @@ fn files_without_vertices_too() {
         let file = read_g2o(edges.as_bytes(), name).unwrap();
         assert!(file.vertices_made);
         match file.graph {
-            AnyGraph::Plane(mut graph) => ends_at(&mut graph, best, "made"),
-            AnyGraph::Space(mut graph) => ends_at(&mut graph, best, "made"),
+            AnyGraph::Se2(mut graph) => ends_at(&mut graph, best, "made"),
+            AnyGraph::Se3(mut graph) => ends_at(&mut graph, best, "made"),
         }
     }
 }
 
-fn plane(graph: AnyGraph) -> PoseGraph<2> {
-    let AnyGraph::Plane(graph) = graph else { panic!("not the plane") };
+fn se2(graph: AnyGraph) -> PoseGraph<2> {
+    let AnyGraph::Se2(graph) = graph else { panic!("not 2-D") };
     graph
 }
 
-fn space(graph: AnyGraph) -> PoseGraph<3> {
-    let AnyGraph::Space(graph) = graph else { panic!("not space") };
+fn se3(graph: AnyGraph) -> PoseGraph<3> {
+    let AnyGraph::Se3(graph) = graph else { panic!("not 3-D") };
     graph
 }
 
-/// A tenth as many false closures as the Intel log has true ones: with a kernel, poses stay within centimetres of
+/// A tenth as many false closures as the Intel log has true ones: with a kernel, poses stay within centimeters of
 /// the ones without them.
 #[test]
 fn intel_with_false_closures() {
     let Some(text) = text("intel") else { return };
-    let clean = plane(read_g2o(text.as_bytes(), "intel").unwrap().graph);
+    let clean = se2(read_g2o(text.as_bytes(), "intel").unwrap().graph);
     let closures = clean.edges().iter().filter(|e| e.kind == EdgeKind::Closure).count();
     let mut best = clean.clone();
-    best.optimise(&Settings::default()).unwrap();
+    best.optimize(&Settings::default()).unwrap();
     let mut draw = Draw(11);
     let mut graph = clean.clone();
     for _ in 0..closures / 10 {
@@ -144,7 +144,7 @@ fn intel_with_false_closures() {
         if !given {
             graph.start_from_tree(Chain::Odometry);
         }
-        graph.optimise(&Settings { kernel, ..Settings::default() }).unwrap();
+        graph.optimize(&Settings { kernel, ..Settings::default() }).unwrap();
         position_error(&graph, &truth).0
     };
     assert!(error(Kernel::None, true) > 1.0);

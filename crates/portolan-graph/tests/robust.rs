@@ -11,7 +11,7 @@ fn recovers<const D: usize>() {
     for seed in [1, 2, 3] {
         let laps = laps::<D>(seed, 1, 1.0);
         let mut plain = laps.graph.clone();
-        plain.optimise(&Settings::default()).unwrap();
+        plain.optimize(&Settings::default()).unwrap();
         let (mean, _) = position_error(&plain, &laps.truth);
         assert!(mean > 0.3, "seed {seed}: least squares is misled, mean error {mean}");
 
@@ -20,7 +20,7 @@ fn recovers<const D: usize>() {
         for kernel in [Kernel::Cauchy(k), Kernel::Dcs(k), Kernel::GemanMcClure(k)] {
             let mut graph = laps.graph.clone();
             let settings = Settings { kernel, ..Settings::default() };
-            graph.optimise(&settings).unwrap();
+            graph.optimize(&settings).unwrap();
             let (mean, worst) = position_error(&graph, &laps.truth);
             assert!(mean < 0.05 && worst < 0.12, "D {D} seed {seed} {kernel:?}: mean {mean}, worst {worst}");
 
@@ -46,9 +46,9 @@ fn in_space() {
 fn without_false_closures_a_kernel_costs_little() {
     let laps = laps::<2>(4, 0, 1.0);
     let (mut plain, mut robust) = (laps.graph.clone(), laps.graph.clone());
-    plain.optimise(&Settings::default()).unwrap();
+    plain.optimize(&Settings::default()).unwrap();
     let kernel = Kernel::Dcs(3.4);
-    robust.optimise(&Settings { kernel, ..Settings::default() }).unwrap();
+    robust.optimize(&Settings { kernel, ..Settings::default() }).unwrap();
     let apart = plain.vertices().iter().zip(robust.vertices());
     let apart = apart.map(|(a, b)| a.world_from_vertex.translation_to(&b.world_from_vertex));
     assert!(apart.fold(0.0, f64::max) < 0.01);
@@ -58,8 +58,8 @@ fn without_false_closures_a_kernel_costs_little() {
 fn huber_halves_the_harm_at_least() {
     let laps = laps::<2>(5, 1, 1.0);
     let (mut plain, mut huber) = (laps.graph.clone(), laps.graph.clone());
-    plain.optimise(&Settings::default()).unwrap();
-    huber.optimise(&Settings { kernel: Kernel::Huber(3.4), ..Settings::default() }).unwrap();
+    plain.optimize(&Settings::default()).unwrap();
+    huber.optimize(&Settings { kernel: Kernel::Huber(3.4), ..Settings::default() }).unwrap();
     let errors = [&plain, &huber].map(|graph| position_error(graph, &laps.truth).0);
     assert!(errors[1] < 0.5 * errors[0], "{errors:?}");
 }
@@ -72,7 +72,7 @@ fn both_approaches_together_are_as_good_as_the_better_one() {
     let [direct, graduated, better] =
         [Approach::Direct, Approach::Graduated, Approach::Better].map(|approach| {
             let mut graph = laps.graph.clone();
-            let report = graph.optimise(&Settings { kernel, approach, ..Settings::default() }).unwrap();
+            let report = graph.optimize(&Settings { kernel, approach, ..Settings::default() }).unwrap();
             assert_eq!(*report.chi_square.last().unwrap(), graph.chi_square());
             (*report.cost.last().unwrap(), position_error(&graph, &laps.truth).0)
         });

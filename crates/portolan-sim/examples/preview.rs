@@ -8,8 +8,8 @@ use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, Projection, RangeImage};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan_draw::{MeshView, Preview, Sensor, preview};
-use portolan_io::scan_log::{ScanLog, ScanLogOptions};
-use portolan_sim::space::{BuildingConfig, DepthCamera, SpaceSensor, building};
+use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
+use portolan_sim::building::{BuildingConfig, BuildingSensor, DepthCamera, building_log};
 use std::path::Path;
 use std::time::Instant;
 
@@ -18,15 +18,15 @@ type Scans = Vec<(Pose<3>, Frame)>;
 
 fn scans(log: &str, every: usize) -> Result<Scans, Error> {
     let sensor = match log {
-        "lidar" => return Ok(building(&BuildingConfig::default()).scans),
-        "camera" => SpaceSensor::Camera(DepthCamera::default()),
+        "lidar" => return Ok(building_log(&BuildingConfig::default()).scans),
+        "camera" => BuildingSensor::Camera(DepthCamera::default()),
         path => {
             let log = ScanLog::open(Path::new(path), &ScanLogOptions::default())?;
             let scan = |i: usize| Ok((*log.pose(i), log.frame(i)?));
             return (0..log.len()).step_by(every).map(scan).collect();
         }
     };
-    Ok(building(&BuildingConfig { scans: 120, sensor, ..Default::default() }).scans)
+    Ok(building_log(&BuildingConfig { scans: 120, sensor, ..Default::default() }).scans)
 }
 
 fn main() -> Result<(), Error> {

@@ -7,14 +7,14 @@ use crate::{Solid, SolidKind, World};
 pub struct Apartment {
     /// Walls, furniture, and the solid `chair` that can be moved.
     pub world: World,
-    /// Corners of the path of one lap (world, metres); the last is the first.
+    /// Corners of the path of one lap (world, meters); the last is the first.
     pub path: Vec<[f64; 2]>,
 }
 
-/// Where the chair goes when it is moved (metres).
+/// Where the chair goes when it is moved (meters).
 pub const CHAIR_MOVE: [f64; 2] = [1.38, -1.62];
 
-/// Thickness of every wall (metres).
+/// Thickness of every wall (meters).
 const WALL: f64 = 0.3;
 const DOOR: f64 = 0.9;
 const SIZE: [f64; 2] = [12.0, 9.0];
@@ -68,7 +68,7 @@ const ROOMS: [Room; 10] = [
     room(("office", true), (2.1, 1.0, false), ("long desk", 0.0, 1.7, 0.6), ("cabinet", 0.45, [2.2, 3.0])),
 ];
 
-/// Builds the Apartment. Its lower left outer corner is the world's zero; `V` is 108 square metres.
+/// Builds the Apartment. Its lower left outer corner is the world's zero; `V` is 108 square meters.
 pub fn apartment() -> Apartment {
     let wall = |name: &str, min, max| Solid::rectangle(name, SolidKind::Wall, min, max);
     let [width, height] = SIZE;

@@ -4,8 +4,10 @@
 //! |---|---|
 //! | what is there, what does the robot see | [`apartment`], [`lap`], [`scan_at`] |
 //! | where do the wheels say that it is | [`measure_motions`], [`dead_reckon`] |
-//! | how far off are answers | [`Truth`], [`ErrorSummary`] |
-//! | the same in 3-D: a building, a lidar, a depth camera, truth | [`space`], [`building`] |
+//! | where was it really | [`correct`]: scan matching ([`match_scans`]), loop closures, pose graph |
+//! | how far off are poses | [`PoseErrors`]; without truth [`score_relations`] |
+//! | the same in 3-D: a building, a lidar, a depth camera, truth | [`building`], [`building_log`] |
+//! | how long does a map believe in what is gone, and what does forgetting cost | [`ghost`](fn@ghost), [`static_noise`](fn@static_noise) |
 //!
 //! Every transcendental function comes from `libm` and every random number from one small generator, so that a
 //! seed gives the same bytes on every platform and for any number of threads.
@@ -23,20 +25,22 @@
 
 mod accuracy;
 mod apartment;
+pub mod building;
 mod drive;
 mod lidar;
 mod odometry;
 mod random;
 mod solid;
-pub mod space;
+mod static_noise;
 mod world;
 
 pub use accuracy::{ErrorSummary, Truth};
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
+pub use building::building_log;
 pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
 pub use lidar::{Lidar, scan_at};
 pub use odometry::{OdometryNoise, dead_reckon, heading, measure_motions, planar};
 pub use random::Random;
 pub use solid::{Solid, SolidKind};
-pub use space::building;
+pub use static_noise::{StaticNoise, static_noise};
 pub use world::{BoundarySegment, RayHit, World};

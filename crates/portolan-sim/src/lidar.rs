@@ -9,9 +9,9 @@ use portolan::scan::{Beam, BeamKind, Scan};
 pub struct Lidar {
     /// Beams over the full turn.
     pub beams: usize,
-    /// Standard deviation of the range (metres).
+    /// Standard deviation of the range (meters).
     pub noise: f64,
-    /// Beams that meet nothing up to here become [`BeamKind::MaxRange`] (metres).
+    /// Beams that meet nothing up to here become [`BeamKind::MaxRange`] (meters).
     pub max_range: f64,
     /// Share of beams that come back without echo, whatever is there; nothing is known to be free then.
     pub no_return_rate: f64,

@@ -20,7 +20,7 @@ pub struct Solid {
     pub name: String,
     /// What it is.
     pub kind: SolidKind,
-    /// Corners counter-clockwise (world, metres).
+    /// Corners counter-clockwise (world, meters).
     pub corners: Vec<[f64; 2]>,
 }
 

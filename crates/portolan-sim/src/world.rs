@@ -8,7 +8,7 @@ use portolan::geom::vector::{along, cross, dot, point_segment, sub, unit};
 /// (solids run counter-clockwise).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundarySegment {
-    /// Start (world, metres).
+    /// Start (world, meters).
     pub a: [f64; 2],
     /// End.
     pub b: [f64; 2],
@@ -19,7 +19,7 @@ pub struct BoundarySegment {
 /// What a ray meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// Arc length (metres).
+    /// Arc length (meters).
     pub range: f64,
     /// Unit normal of the surface, towards free space.
     pub normal: [f64; 2],
@@ -36,7 +36,7 @@ pub struct World {
     boundary: Vec<BoundarySegment>,
 }
 
-/// Points this far to either side of a boundary decide what it separates (metres).
+/// Points this far to either side of a boundary decide what it separates (meters).
 const ASIDE: f64 = 1e-7;
 
 /// How far a ray may pass beyond the ends of a segment and still meet it, as a share of its length: a ray into
@@ -74,13 +74,13 @@ impl World {
         &self.boundary
     }
 
-    /// Length of the boundary of the walls alone, all faces, without furniture (metres).
+    /// Length of the boundary of the walls alone, all faces, without furniture (meters).
     pub fn wall_length(&self) -> f64 {
         let walls: Vec<_> = self.solids.iter().filter(|s| s.kind == SolidKind::Wall).cloned().collect();
         Self::new(walls).boundary.iter().map(|s| portolan::geom::vector::distance(s.a, s.b)).sum()
     }
 
-    /// The same world with one solid moved by an offset (metres).
+    /// The same world with one solid moved by an offset (meters).
     ///
     /// # Panics
     /// Where no solid has that name.
@@ -101,7 +101,7 @@ impl World {
         self.solids.iter().zip(&self.boxes).any(|(s, b)| b.contains(p) && s.contains(p))
     }
 
-    /// Signed distance to the nearest boundary (metres): positive in free space, negative inside solids.
+    /// Signed distance to the nearest boundary (meters): positive in free space, negative inside solids.
     /// Infinite in a world without solids. O(boundary).
     pub fn signed_distance(&self, p: [f64; 2]) -> f64 {
         let d = self.boundary.iter().map(|s| point_segment(p, s.a, s.b).0).fold(f64::INFINITY, f64::min);

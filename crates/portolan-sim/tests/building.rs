@@ -1,19 +1,18 @@
-//! Maps of the Building against the truth: free space, surfaces, distances, colours.
+//! Maps of the Building against the truth: free space, surfaces, distances, colors.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
 
 use portolan::geom::Lattice;
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::{MeshSettings, marching_cubes};
-use portolan::sweep::OccupancySweep;
-use portolan_sim::space::{
-    BuildingConfig, BuildingLog, DepthCamera, SpaceSensor, building, free_points, score_free, score_surface,
-    seen_surface, surface_errors, surface_points,
+use portolan_sim::building::{
+    BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, building_log, free_points, score_free,
+    score_surface, seen_surface, surface_errors, surface_points,
 };
 use std::sync::LazyLock;
 
 /// The default lidar: 40 scans of 64 x 1024 rays, noise 1 cm.
-static LIDAR: LazyLock<BuildingLog> = LazyLock::new(|| building(&BuildingConfig::default()));
+static LIDAR: LazyLock<BuildingLog> = LazyLock::new(|| building_log(&BuildingConfig::default()));
 
 fn occupancy(resolution: f64, sweep: OccupancySweep) -> Occupancy<3> {
     let lattice = Lattice::new([0.0; 3], resolution);
@@ -99,14 +98,17 @@ fn the_surface_of_lidar_scans_is_3_mm_off_in_the_median() {
 #[test]
 fn the_surface_and_colours_of_depth_images_are_right() {
     let camera = DepthCamera::default().with_noise(0.01);
-    let log =
-        building(&BuildingConfig { scans: 60, sensor: SpaceSensor::Camera(camera), ..Default::default() });
-    let map = tsdf_of(&log, TsdfConfig { color: true, truncation: 0.15, ..Default::default() });
+    let log = building_log(&BuildingConfig {
+        scans: 60,
+        sensor: BuildingSensor::Camera(camera),
+        ..Default::default()
+    });
+    let map = tsdf_of(&log, SparseTsdfConfig { color: true, truncation: 0.15, ..Default::default() });
     let points = vertices(&map);
     let errors = surface_errors(&log.world, points.iter().copied()).unwrap();
     println!("depth camera, 5 cm, noise 1 cm: {errors:?}");
     assert!(errors.count > 20_000 && errors.median <= 3e-3, "{errors:?}");
-    // Colours of squares and bodies that are larger than a voxel come back where nothing else is near.
+    // Colors of squares and bodies that are larger than a voxel come back where nothing else is near.
     let (mut right, mut all) = (0, 0);
     for p in points {
         let around = |k: usize| {

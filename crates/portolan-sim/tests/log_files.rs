@@ -8,11 +8,13 @@ use portolan::scan::{Frame, RangeImage};
 use portolan_io::poses3::{PoseConvention, PoseLayout, read_poses_3d};
 use portolan_io::scan_log::{ScanLog, ScanLogKind, ScanLogOptions};
 use portolan_io::{LogLayout, LogWriter};
-use portolan_sim::space::{BuildingConfig, BuildingLog, DepthCamera, SpaceLidar, SpaceSensor, building};
+use portolan_sim::building::{
+    BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, SpinningLidar, building_log,
+};
 use std::path::Path;
 
-fn log(sensor: SpaceSensor) -> BuildingLog {
-    building(&BuildingConfig { scans: 4, sensor, ..Default::default() })
+fn log(sensor: BuildingSensor) -> BuildingLog {
+    building_log(&BuildingConfig { scans: 4, sensor, ..Default::default() })
 }
 
 fn write(log: &BuildingLog, folder: &Path, layout: LogLayout) {
@@ -56,7 +58,7 @@ fn assert_same_images(log: &BuildingLog, folder: &Path, kind: ScanLogKind, unit:
 #[test]
 fn seven_scenes_come_back() {
     let folder = tempfile::tempdir().unwrap();
-    let log = log(SpaceSensor::Camera(DepthCamera::default()));
+    let log = log(BuildingSensor::Camera(DepthCamera::default()));
     write(&log, folder.path(), LogLayout::SevenScenes);
     assert_same_images(&log, folder.path(), ScanLogKind::SevenScenes, 1e-3);
 }
@@ -65,8 +67,8 @@ fn seven_scenes_come_back() {
 #[test]
 fn kitti_holds_points_and_poses_of_the_camera() {
     let folder = tempfile::tempdir().unwrap();
-    let lidar = SpaceLidar { rings: 16, columns: 64, ..Default::default() };
-    let log = log(SpaceSensor::Lidar(lidar));
+    let lidar = SpinningLidar { rings: 16, columns: 64, ..Default::default() };
+    let log = log(BuildingSensor::Lidar(lidar));
     // As on the car: the camera looks along the lidar's x.
     let rotation = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]];
     let camera_from_lidar = Pose { rotation, translation: [0.0, -0.08, -0.27] };
@@ -106,7 +108,7 @@ fn kitti_holds_points_and_poses_of_the_camera() {
 #[test]
 fn tum_has_a_trajectory_and_lists() {
     let folder = tempfile::tempdir().unwrap();
-    let log = log(SpaceSensor::Camera(DepthCamera::default()));
+    let log = log(BuildingSensor::Camera(DepthCamera::default()));
     write(&log, folder.path(), LogLayout::TumRgbd);
     assert_same_images(&log, folder.path(), ScanLogKind::TumRgbd, 1.0 / 5000.0);
     let track = read_poses_3d(folder.path().join("groundtruth.txt")).unwrap();
@@ -124,8 +126,8 @@ fn tum_has_a_trajectory_and_lists() {
 #[test]
 fn what_a_layout_cannot_hold_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let lidar = SpaceLidar { rings: 4, columns: 16, ..Default::default() };
-    let log = log(SpaceSensor::Lidar(lidar));
+    let lidar = SpinningLidar { rings: 4, columns: 16, ..Default::default() };
+    let log = log(BuildingSensor::Lidar(lidar));
     let (pose, frame) = &log.scans[0];
     for layout in [LogLayout::TumRgbd, LogLayout::SevenScenes] {
         let error = LogWriter::create(folder.path(), layout).unwrap().push(pose, 0.0, frame).unwrap_err();

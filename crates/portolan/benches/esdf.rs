@@ -14,8 +14,8 @@ use portolan::geom::{BlockKey, Lattice};
 use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::store::{Bricks, Store};
 use portolan_sim::SEED;
-use portolan_sim::space::{
-    BuildingConfig, DepthCamera, SpaceSensor, building_poses, building_world, camera_frame,
+use portolan_sim::building::{
+    BuildingConfig, BuildingSensor, DepthCamera, building_poses, building_world, camera_frame,
 };
 use std::sync::LazyLock;
 
@@ -161,7 +161,7 @@ fn measure_carved_1m(bencher: Bencher, threads: usize) {
 /// after it.
 static WALK: LazyLock<[Tsdf3; 2]> = LazyLock::new(|| {
     let camera = DepthCamera::default();
-    let config = BuildingConfig { scans: 600, sensor: SpaceSensor::Camera(camera), seed: SEED };
+    let config = BuildingConfig { scans: 600, sensor: BuildingSensor::Camera(camera), seed: SEED };
     let building = building_world(config.seed);
     let mut map = Tsdf3::new(TsdfConfig { max_range: 5.0, ..Default::default() }).expect("a valid map");
     let mut before = map.clone();

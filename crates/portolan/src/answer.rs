@@ -1,15 +1,15 @@
-//! What a map answers when asked.
+//! The answer of a map to a query.
 
-/// An answer and what it is worth. Unknown is never a number.
+/// The answer of a map to a query at a point. Unknown is never encoded as a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer<T> {
-    /// The map knows.
+    /// The value.
     Known(T),
-    /// Beyond what the map maintains: at least so much, with the sign of the side.
+    /// A distance beyond the range that the map maintains: at least this much, with the sign of the side.
     Saturated(T),
-    /// Inside the map, where nothing was observed.
+    /// The point lies inside the map and was not observed.
     Unknown,
-    /// Outside of the map.
+    /// The point lies outside the map.
     Outside,
 }
 
@@ -30,7 +30,7 @@ pub enum Status {
 }
 
 impl<T> Answer<T> {
-    /// The value where it is known.
+    /// The value of [`Answer::Known`]; `None` for all others.
     pub fn known(self) -> Option<T> {
         match self {
             Self::Known(value) => Some(value),

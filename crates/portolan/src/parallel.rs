@@ -1,19 +1,19 @@
-//! Work shared out to all cores with the feature `parallel`. What comes back is in order, and the same either way: every
-//! task is done by itself.
+//! Work distributed over all cores with the feature `parallel`. Results are in order and do not depend on the number of
+//! threads: tasks are independent.
 //!
-//! Workers take tasks one after the other from a common iterator. What starts them is not generic, so that it is
-//! compiled once, here, and not in every crate that uses a map; parallel iterators were a seventh of all that such a crate
-//! compiled. A task is worth taking a lock: some microseconds at the least.
+//! Workers take tasks one after the other from a common iterator. The function that starts them is not generic, so that it
+//! is compiled once, here, and not in every crate that uses a map; parallel iterators were a seventh of all that such a
+//! crate compiled. Taking a task takes a lock: a task should last some microseconds at least.
 
 use std::sync::{Mutex, PoisonError};
 
-/// How many tasks are done at once.
+/// Number of threads.
 #[cfg(feature = "parallel")]
 pub(crate) fn threads() -> usize {
     rayon::current_num_threads()
 }
 
-/// How many tasks are done at once.
+/// Number of threads: 1.
 #[cfg(not(feature = "parallel"))]
 pub(crate) fn threads() -> usize {
     1
@@ -48,7 +48,7 @@ pub(crate) fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B)
     (a(), b())
 }
 
-/// `work(task, scratch)` of every task, with one scratch for each worker.
+/// Calls `work(task, scratch)` for every task, with one scratch for each worker.
 pub(crate) fn for_each<T: Send, S>(
     tasks: impl Iterator<Item = T> + Send,
     scratch: impl Fn() -> S + Sync,
@@ -72,7 +72,7 @@ pub(crate) fn for_each<T: Send, S>(
     });
 }
 
-/// `change(item, scratch)` of every item, `together` items in one task.
+/// Calls `change(item, scratch)` for every item, `together` items in one task.
 pub(crate) fn change_each<T: Send, S>(
     items: &mut [T],
     together: usize,
@@ -84,12 +84,12 @@ pub(crate) fn change_each<T: Send, S>(
     });
 }
 
-/// What `make` makes of each item, in their order, `together` items in one task.
+/// `make(item)` of every item, in order, `together` items in one task.
 pub(crate) fn map<T: Sync, R: Send>(items: &[T], together: usize, make: impl Fn(&T) -> R + Sync) -> Vec<R> {
     map_with(items, together, || (), |item, ()| make(item))
 }
 
-/// What `make` makes of every number below `count`, in their order; each is a task.
+/// `make(i, scratch)` of every `i` below `count`, in order; each is a task.
 pub(crate) fn map_numbers<R: Send, S>(
     count: usize,
     scratch: impl Fn() -> S + Sync,
@@ -100,7 +100,7 @@ pub(crate) fn map_numbers<R: Send, S>(
     made.into_iter().flatten().collect()
 }
 
-/// [`map`] with scratch that is used again.
+/// [`map`] with one scratch for each worker.
 pub(crate) fn map_with<T: Sync, R: Send, S>(
     items: &[T],
     together: usize,

@@ -11,7 +11,7 @@ use portolan::explore::{
 use portolan::geom::{Aabb, Pose, vector};
 use portolan::map::{BeamSweep, Tsdf3, TsdfConfig};
 use portolan::store::{Bricks, Store};
-use portolan_sim::space::{BuildingConfig, SpaceLidar, SpaceSensor, building};
+use portolan_sim::building::{BuildingConfig, BuildingSensor, SpinningLidar, building_log};
 
 fn frontiers<const D: usize>(store: &Bricks<SignedDistance, D>) -> Vec<Frontier<D>> {
     let mut map = FrontierMap::new(FrontierSettings::default());
@@ -82,10 +82,10 @@ fn the_expected_gain_is_what_a_scan_adds_and_more() {
 
 #[test]
 fn frontiers_of_the_building_follow_its_scans() {
-    let sensor = SpaceSensor::Lidar(SpaceLidar { rings: 16, columns: 256, ..Default::default() });
-    let log = building(&BuildingConfig { scans: 12, sensor, ..Default::default() });
-    let config = TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() };
-    let mut map = Tsdf3::new(config).unwrap();
+    let sensor = BuildingSensor::Lidar(SpinningLidar { rings: 16, columns: 256, ..Default::default() });
+    let log = building_log(&BuildingConfig { scans: 12, sensor, ..Default::default() });
+    let config = SparseTsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() };
+    let mut map = SparseTsdf::new(config).unwrap();
     let mut kept = FrontierMap::new(FrontierSettings::default());
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();

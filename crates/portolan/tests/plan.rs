@@ -16,7 +16,7 @@ use portolan::plan::{
 };
 use portolan::store::Store;
 use portolan::surface::{ContourSettings, MeshSettings, NearestSurface, marching_cubes, marching_squares};
-use portolan_sim::space::{BuildingConfig, SpaceLidar, SpaceSensor, building};
+use portolan_sim::building::{BuildingConfig, BuildingSensor, SpinningLidar, building_log};
 use scenes::{Random, Segments};
 use std::sync::LazyLock;
 
@@ -143,9 +143,10 @@ fn from_a_wall_the_nearest_free_place_is_before_it() {
 
 #[test]
 fn certified_motions_through_the_building_keep_their_clearance() {
-    let sensor = SpaceSensor::Lidar(SpaceLidar { rings: 32, columns: 512, ..Default::default() });
-    let log = building(&BuildingConfig { scans: 24, sensor, ..Default::default() });
-    let mut map = Tsdf3::new(TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
+    let sensor = BuildingSensor::Lidar(SpinningLidar { rings: 32, columns: 512, ..Default::default() });
+    let log = building_log(&BuildingConfig { scans: 24, sensor, ..Default::default() });
+    let mut map =
+        SparseTsdf::new(SparseTsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();
     }

@@ -165,7 +165,7 @@ pub fn correct(
                 kind: EdgeKind::Closure,
             })?;
         }
-        let report = graph.optimise(&Settings { kernel: settings.kernel, ..Settings::default() })?;
+        let report = graph.optimize(&Settings { kernel: settings.kernel, ..Settings::default() })?;
         lap.poses = graph.vertices().iter().map(|v| v.world_from_vertex).collect();
         lap.agrees = graph.edge_chi_squares()[motions.len()..].iter().map(|&c| c < 11.3).collect();
         lap.rounds.push(Round { candidates, closures: closures.len(), refused, report });

@@ -26,7 +26,7 @@ pub struct RelationError {
 }
 
 /// Reads the text of a relations file (Kümmerle et al. 2009): `t1 t2 x y z roll pitch yaw` on a line, seconds,
-/// metres and radians; `#` starts a comment. `z`, `roll` and `pitch` are left out: the robot drives in the plane.
+/// meters and radians; `#` starts a comment. `z`, `roll` and `pitch` are left out: the robot drives in the plane.
 ///
 /// # Errors
 /// [`RelationError`], the first line that is no relation.

@@ -5,7 +5,7 @@ use super::vector::{cross, dot, sub, unit_or};
 /// A perspective camera, and what it leaves out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it is (the mesh's coordinates, metres).
+    /// Where it is (the mesh's coordinates, meters).
     pub eye: [f32; 3],
     /// What is in the middle of the picture.
     pub target: [f32; 3],
@@ -13,9 +13,9 @@ pub struct Camera {
     pub up: [f32; 3],
     /// Angle between the upper and the lower edge of the picture (radians).
     pub field_of_view: f32,
-    /// Nothing nearer than this is drawn (metres, along the view).
+    /// Nothing nearer than this is drawn (meters, along the view).
     pub near: f32,
-    /// Nothing above this height along `up` is drawn (metres): takes ceilings away.
+    /// Nothing above this height along `up` is drawn (meters): takes ceilings away.
     pub cut: Option<f32>,
     /// Whether triangles seen from behind are left out: looks into rooms from outside.
     pub cull_back: bool,
@@ -53,7 +53,7 @@ impl Camera {
 
 /// A camera with its picture: from the mesh's coordinates to pixels.
 #[derive(Clone, Copy)]
-pub(super) struct Lens {
+pub(super) struct Projection {
     pub(super) axes: [[f32; 3]; 3],
     pub(super) eye: [f32; 3],
     /// Pixels per unit of x / z.
@@ -63,7 +63,7 @@ pub(super) struct Lens {
     pub(super) near: f32,
 }
 
-impl Lens {
+impl Projection {
     pub(super) fn new(camera: &Camera, width: usize, height: usize) -> Self {
         let half = 0.5 * camera.field_of_view.clamp(0.01, 3.0);
         Self {

@@ -5,17 +5,17 @@ use super::vector::{cross, sub, unit_or};
 /// Triangles over shared vertices, borrowed from whoever has them.
 ///
 /// Triangles run counter-clockwise as seen from free space. Coordinates are relative to a point nearby, which all of a
-/// picture shares: far from zero an `f32` loses millimetres. Triangles with an index or a coordinate that is no good are
+/// picture shares: far from zero an `f32` loses millimeters. Triangles with an index or a coordinate that is no good are
 /// not drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshView<'a> {
-    /// Metres.
+    /// Meters.
     pub vertices: &'a [[f32; 3]],
     /// Indices of vertices.
     pub triangles: &'a [[u32; 3]],
     /// Towards free space, one per vertex. Empty: the mean of the triangles around a vertex.
     pub normals: &'a [[f32; 3]],
-    /// Red, green, blue, one per vertex. Empty, or one colour for all, which says nothing: tinted by height.
+    /// Red, green, blue, one per vertex. Empty, or one color for all, which says nothing: tinted by height.
     pub colors: &'a [[u8; 3]],
 }
 
@@ -26,7 +26,7 @@ impl MeshView<'_> {
         Some([a?, b?, c?])
     }
 
-    /// The same without colours that say nothing.
+    /// The same without colors that say nothing.
     pub(super) fn with_telling_colors(self) -> Self {
         let told = self.colors.len() == self.vertices.len() && self.colors.windows(2).any(|w| w[0] != w[1]);
         if told { self } else { Self { colors: &[], ..self } }

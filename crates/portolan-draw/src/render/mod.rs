@@ -1,4 +1,4 @@
-//! Pictures of triangle meshes: a software rasteriser with soft light.
+//! Pictures of triangle meshes: a software rasterizer with soft light.
 //!
 //! The steps of [`render_mesh`]: project and cut triangles (`camera`, `clip`), sort them into bands of rows and fill
 //! those (`raster`), darken what lies in corners and draw creases (`occlusion`), light what is seen (`shade`).
@@ -10,7 +10,7 @@ mod occlusion;
 mod parallel;
 mod preview;
 mod raster;
-mod setting;
+mod scene;
 mod shade;
 #[cfg(test)]
 mod testing;
@@ -19,5 +19,5 @@ mod vector;
 pub use camera::Camera;
 pub use mesh::MeshView;
 pub use preview::{Preview, preview};
-pub use setting::{Sensor, Setting};
+pub use scene::Sensor;
 pub use shade::render_mesh;

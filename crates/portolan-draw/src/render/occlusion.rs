@@ -1,8 +1,8 @@
 //! Darker where little light comes in, and along outlines: what makes a shape readable without shadows.
 
-use super::camera::Lens;
+use super::camera::Projection;
 use super::parallel;
-use super::raster::Seen;
+use super::raster::Visible;
 use super::vector::{dot, sub};
 
 /// Places around a pixel that are looked at.
@@ -27,9 +27,9 @@ pub(super) struct Surface {
 }
 
 /// How much light reaches every pixel, 0 to 1 (after the screen-space ambient occlusion of Filion & McNaughton 2008).
-pub(super) fn openness(surface: &Surface, lens: &Lens) -> Vec<f32> {
+pub(super) fn openness(surface: &Surface, projection: &Projection) -> Vec<f32> {
     let reach = REACH * median_depth(&surface.nearness);
-    let raw = by_rows(surface, |x, y| sample(surface, lens, x, y, reach));
+    let raw = by_rows(surface, |x, y| sample(surface, projection, x, y, reach));
     by_rows(surface, |x, y| {
         let own = surface.nearness[y * surface.width + x];
         let (mut sum, mut count) = (0.0, 0.0);
@@ -52,10 +52,10 @@ impl Surface {
         inside.then(|| y as usize * self.width + x as usize)
     }
 
-    fn place(&self, lens: &Lens, x: usize, y: usize) -> Option<[f32; 3]> {
+    fn place(&self, projection: &Projection, x: usize, y: usize) -> Option<[f32; 3]> {
         let w = self.nearness[y * self.width + x];
         let pixel = [x as f32 + 0.5, y as f32 + 0.5];
-        let ray = |k: usize| (pixel[k] - lens.middle[k]) / lens.focal;
+        let ray = |k: usize| (pixel[k] - projection.middle[k]) / projection.focal;
         (w > 0.0).then(|| [ray(0) / w, ray(1) / w, 1.0 / w])
     }
 }
@@ -74,10 +74,10 @@ fn median_depth(nearness: &[f32]) -> f32 {
     some.get(some.len() / 2).map_or(1.0, |w| 1.0 / w)
 }
 
-fn sample(surface: &Surface, lens: &Lens, x: usize, y: usize, reach: f32) -> f32 {
-    let Some(p) = surface.place(lens, x, y) else { return 1.0 };
+fn sample(surface: &Surface, projection: &Projection, x: usize, y: usize, reach: f32) -> f32 {
+    let Some(p) = surface.place(projection, x, y) else { return 1.0 };
     let normal = surface.normals[y * surface.width + x];
-    let radius = (reach * lens.focal / p[2]).clamp(3.0, WIDEST);
+    let radius = (reach * projection.focal / p[2]).clamp(3.0, WIDEST);
     // Another turn for every pixel of a small tile: what would be bands becomes noise, which the blur takes away.
     let turn = (52.982_918 * (0.067_110_56 * x as f32 + 0.005_837_15 * y as f32).fract()).fract();
     let mut dark = 0.0;
@@ -86,7 +86,7 @@ fn sample(surface: &Surface, lens: &Lens, x: usize, y: usize, reach: f32) -> f32
         let (sin, cos) = (2.399_963 * k as f32 + std::f32::consts::TAU * turn).sin_cos();
         let (u, v) = (x as f32 + radius * share * cos, y as f32 + radius * share * sin);
         let Some(at) = surface.index(u.round() as i64, v.round() as i64) else { continue };
-        let Some(q) = surface.place(lens, at % surface.width, at / surface.width) else { continue };
+        let Some(q) = surface.place(projection, at % surface.width, at / surface.width) else { continue };
         let way = sub(q, p);
         let length_sq = dot(way, way);
         let rise = dot(normal, way) / length_sq.sqrt().max(1e-6) - 0.12;
@@ -99,16 +99,16 @@ fn sample(surface: &Surface, lens: &Lens, x: usize, y: usize, reach: f32) -> f32
 }
 
 /// How strongly a point of the picture lies on the near side of an outline, 0 to 1: nearer than the line through its two
-/// neighbours would have it, which on a plane it never is.
-pub(super) fn outline(seen: &Seen, x: usize, y: usize) -> f32 {
-    let own = seen.nearness[y * seen.width + x];
-    let at = |x: usize, y: usize| seen.nearness[y * seen.width + x];
+/// neighbors would have it, which on a plane it never is.
+pub(super) fn outline(visible: &Visible, x: usize, y: usize) -> f32 {
+    let own = visible.nearness[y * visible.width + x];
+    let at = |x: usize, y: usize| visible.nearness[y * visible.width + x];
     let bend = |before: f32, after: f32| (2.0 * own - before - after) / own;
     let mut most: f32 = 0.0;
-    if x > 0 && x + 1 < seen.width {
+    if x > 0 && x + 1 < visible.width {
         most = most.max(bend(at(x - 1, y), at(x + 1, y)));
     }
-    if y > 0 && y + 1 < seen.height {
+    if y > 0 && y + 1 < visible.height {
         most = most.max(bend(at(x, y - 1), at(x, y + 1)));
     }
     ((most - 0.02) / 0.1).clamp(0.0, 1.0)

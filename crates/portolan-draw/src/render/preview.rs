@@ -1,7 +1,7 @@
 //! One sheet that tells whether a map is good.
 
 use super::mesh::MeshView;
-use super::setting::{Sensor, Setting};
+use super::scene::{MeshScene, Sensor};
 use super::shade::render_mesh;
 use crate::{Anchor, Canvas, Font, color};
 
@@ -29,18 +29,18 @@ const GAP: usize = 24;
 pub fn preview(what: &Preview<'_>) -> Canvas {
     let normals = if what.mesh.normals.is_empty() { what.mesh.smooth_normals() } else { Vec::new() };
     let mesh = if normals.is_empty() { what.mesh } else { MeshView { normals: &normals, ..what.mesh } };
-    let setting = Setting::of(&mesh, what.sensors);
+    let scene = MeshScene::of(&mesh, what.sensors);
     let aspect = |[width, height]: [u32; 2]| width as f32 / height as f32;
-    let mut small = setting.inside_views(2);
+    let mut small = scene.inside_views(2);
     if small.is_empty() {
-        small = setting.other_sides(aspect(SMALL));
+        small = scene.other_sides(aspect(SMALL));
     }
     let width = 2 * MARGIN + LARGE[0] as usize + GAP + SMALL[0] as usize;
     let height = HEAD + LARGE[1] as usize + MARGIN;
     let mut sheet = Canvas::new(width as u32, height as u32);
     sheet.text([MARGIN as f64, 10.0], what.title, Font::new(24).bold(), Anchor::Left);
     sheet.text([MARGIN as f64, 38.0], what.subtitle, Font::new(16).color(color::MUTED), Anchor::Left);
-    let large = render_mesh(&mesh, &setting.overview(aspect(LARGE)), LARGE[0], LARGE[1]);
+    let large = render_mesh(&mesh, &scene.overview(aspect(LARGE)), LARGE[0], LARGE[1]);
     sheet.paste_canvas(MARGIN, HEAD, &large);
     for (i, camera) in small.iter().take(2).enumerate() {
         let picture = render_mesh(&mesh, camera, SMALL[0], SMALL[1]);

@@ -4,7 +4,7 @@
 //! on the edge between two triangles belongs to exactly one of them: no cracks, nothing drawn twice. Bands of rows are
 //! filled independently of each other, triangles in their order, so that the picture does not depend on the threads.
 
-use super::camera::{Camera, Lens};
+use super::camera::{Camera, Projection};
 use super::clip::Polygon;
 use super::mesh::MeshView;
 use super::parallel;
@@ -23,7 +23,7 @@ const PARTS: f32 = 256.0;
 const FAR_OUT: f32 = 4e6;
 
 /// What is seen, row by row.
-pub(super) struct Seen {
+pub(super) struct Visible {
     pub(super) width: usize,
     pub(super) height: usize,
     /// The triangle's index, or [`NOTHING`].
@@ -52,20 +52,20 @@ struct Sorted {
     bands: Vec<Vec<u32>>,
 }
 
-pub(super) fn rasterise(
+pub(super) fn rasterize(
     mesh: &MeshView<'_>,
     camera: &Camera,
-    lens: &Lens,
+    projection: &Projection,
     width: usize,
     height: usize,
-) -> Seen {
+) -> Visible {
     let bands = height.div_ceil(BAND);
     let sorted = parallel::map(mesh.triangles.len().div_ceil(CHUNK), |chunk| {
         let from = chunk * CHUNK;
         let to = (from + CHUNK).min(mesh.triangles.len());
         let mut sorted = Sorted { pieces: Vec::new(), bands: vec![Vec::new(); bands] };
         for triangle in from..to {
-            place(mesh, camera, lens, triangle, [width, height], &mut sorted);
+            place(mesh, camera, projection, triangle, [width, height], &mut sorted);
         }
         sorted
     });
@@ -78,20 +78,20 @@ pub(super) fn rasterise(
         }
     });
     let (triangles, nearness) = cells.into_iter().unzip();
-    Seen { width, height, triangles, nearness }
+    Visible { width, height, triangles, nearness }
 }
 
 /// Sorts a triangle, or what planes leave of it, into the bands that it touches.
 fn place(
     mesh: &MeshView<'_>,
     camera: &Camera,
-    lens: &Lens,
+    projection: &Projection,
     triangle: usize,
     size: [usize; 2],
     sorted: &mut Sorted,
 ) {
     let Some(corners) = mesh.corners(triangle) else { return };
-    let view = corners.map(|p| lens.view(p));
+    let view = corners.map(|p| projection.view(p));
     if !view.iter().flatten().all(|v| v.is_finite()) {
         return;
     }
@@ -99,18 +99,19 @@ fn place(
         // Height above the eye in the camera's axes, of which `up` has a component along each.
         Some(cut) => {
             let up = camera.upwards();
-            let height = (0..3).map(|k| p[k] * dot(lens.axes[k], up)).sum::<f32>() + dot(lens.eye, up);
+            let height =
+                (0..3).map(|k| p[k] * dot(projection.axes[k], up)).sum::<f32>() + dot(projection.eye, up);
             cut - height
         }
         None => 1.0,
     };
-    let in_front = |p: [f32; 3]| p[2] - lens.near;
+    let in_front = |p: [f32; 3]| p[2] - projection.near;
     let keep = view.map(|p| below(p) >= 0.0 && in_front(p) >= 0.0);
     if keep == [true; 3] {
-        push(view, triangle, camera, lens, size, sorted);
+        push(view, triangle, camera, projection, size, sorted);
     } else if view.iter().any(|p| below(*p) >= 0.0) && view.iter().any(|p| in_front(*p) >= 0.0) {
         for part in Polygon::new(view).cut(in_front).cut(below).triangles() {
-            push(part, triangle, camera, lens, size, sorted);
+            push(part, triangle, camera, projection, size, sorted);
         }
     }
 }
@@ -119,12 +120,12 @@ fn push(
     view: [[f32; 3]; 3],
     triangle: usize,
     camera: &Camera,
-    lens: &Lens,
+    projection: &Projection,
     [width, height]: [usize; 2],
     sorted: &mut Sorted,
 ) {
     let corners = view.map(|p| {
-        let [x, y] = lens.pixel(p).map(|v| (v.clamp(-FAR_OUT, FAR_OUT) * PARTS).round() as i32);
+        let [x, y] = projection.pixel(p).map(|v| (v.clamp(-FAR_OUT, FAR_OUT) * PARTS).round() as i32);
         Corner { x, y, w: 1.0 / p[2] }
     });
     let [a, b, c] = corners;
@@ -258,20 +259,20 @@ mod tests {
         ] {
             let mesh = MeshView { vertices, triangles, normals: &[], colors: &[] };
             let (width, height) = (120, 90);
-            let lens = Lens::new(&camera, width, height);
-            let seen = rasterise(&mesh, &camera, &lens, width, height);
+            let projection = Projection::new(&camera, width, height);
+            let visible = rasterize(&mesh, &camera, &projection, width, height);
             let mut compared = 0;
             for y in 0..height {
                 for x in 0..width {
-                    let ray = lens.ray([x as f32 + 0.5, y as f32 + 0.5]);
+                    let ray = projection.ray([x as f32 + 0.5, y as f32 + 0.5]);
                     let Some(want) = oracle(&mesh, &camera, camera.eye, ray) else { continue };
                     compared += 1;
                     let at = y * width + x;
                     match want {
-                        None => assert_eq!(seen.triangles[at], NOTHING, "{x} {y}"),
+                        None => assert_eq!(visible.triangles[at], NOTHING, "{x} {y}"),
                         Some((t, depth)) => {
-                            assert_eq!(seen.triangles[at], t, "{x} {y}");
-                            let off = seen.nearness[at] * depth - 1.0;
+                            assert_eq!(visible.triangles[at], t, "{x} {y}");
+                            let off = visible.nearness[at] * depth - 1.0;
                             assert!(off.abs() < 0.02, "{x} {y} {off}");
                         }
                     }
@@ -288,10 +289,10 @@ mod tests {
         let mesh = MeshView { vertices: &vertices, triangles: &triangles, normals: &[], colors: &[] };
         let camera = Camera::new([0.1, 0.0, 0.05], [1.0, 0.3, 0.2]);
         let (width, height) = (317, 211);
-        let lens = Lens::new(&camera, width, height);
+        let projection = Projection::new(&camera, width, height);
         let mut sorted = Sorted { pieces: Vec::new(), bands: vec![Vec::new(); height.div_ceil(BAND)] };
         for t in 0..triangles.len() {
-            place(&mesh, &camera, &lens, t, [width, height], &mut sorted);
+            place(&mesh, &camera, &projection, t, [width, height], &mut sorted);
         }
         let mut count = vec![0; width * height];
         for piece in &sorted.pieces {

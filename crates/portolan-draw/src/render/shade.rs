@@ -1,10 +1,10 @@
 //! Light on what is seen.
 
-use super::camera::{Camera, Lens};
+use super::camera::{Camera, Projection};
 use super::mesh::MeshView;
 use super::occlusion::{Surface, openness, outline};
 use super::parallel;
-use super::raster::{NOTHING, Seen, rasterise};
+use super::raster::{NOTHING, Visible, rasterize};
 use super::vector::{along, cross, dot, sub, unit_or};
 use crate::{Canvas, color};
 
@@ -23,10 +23,10 @@ pub fn render_mesh(mesh: &MeshView<'_>, camera: &Camera, width: u32, height: u32
     let (columns, rows) = (canvas.width() as usize, canvas.height() as usize);
     let smooth = if mesh.normals.len() == mesh.vertices.len() { Vec::new() } else { mesh.smooth_normals() };
     let normals = if smooth.is_empty() { mesh.normals } else { &smooth };
-    let lens = Lens::new(camera, SUPER * columns, SUPER * rows);
-    let seen = rasterise(mesh, camera, &lens, SUPER * columns, SUPER * rows);
-    let scene = Scene { mesh, normals, lens, tint: Tint::of(mesh, camera), up: camera.upwards() };
-    let open = openness(&scene.surface(&seen, columns, rows), &Lens::new(camera, columns, rows));
+    let projection = Projection::new(camera, SUPER * columns, SUPER * rows);
+    let visible = rasterize(mesh, camera, &projection, SUPER * columns, SUPER * rows);
+    let shading = Shading { mesh, normals, projection, tint: Tint::of(mesh, camera), up: camera.upwards() };
+    let open = openness(&shading.surface(&visible, columns, rows), &Projection::new(camera, columns, rows));
     let paper = [color::PAPER.r, color::PAPER.g, color::PAPER.b].map(to_linear);
     let mut pixels = vec![[0u8; 3]; columns * rows];
     parallel::chunks(&mut pixels, columns, |row, out| {
@@ -34,11 +34,11 @@ pub fn render_mesh(mesh: &MeshView<'_>, camera: &Camera, width: u32, height: u32
             let mut sum = [0.0; 3];
             for sub in 0..SUPER * SUPER {
                 let (x, y) = (SUPER * column + sub % SUPER, SUPER * row + sub / SUPER);
-                let light = match seen.triangles[y * seen.width + x] {
+                let light = match visible.triangles[y * visible.width + x] {
                     NOTHING => paper,
                     t => {
-                        let dark = 1.0 - 0.45 * outline(&seen, x, y);
-                        scene.light(t as usize, x, y, open[row * columns + column]).map(|v| v * dark)
+                        let dark = 1.0 - 0.45 * outline(&visible, x, y);
+                        shading.light(t as usize, x, y, open[row * columns + column]).map(|v| v * dark)
                     }
                 };
                 sum = along(sum, light, 1.0 / (SUPER * SUPER) as f32);
@@ -50,16 +50,16 @@ pub fn render_mesh(mesh: &MeshView<'_>, camera: &Camera, width: u32, height: u32
     canvas
 }
 
-struct Scene<'a> {
+struct Shading<'a> {
     mesh: &'a MeshView<'a>,
     normals: &'a [[f32; 3]],
-    lens: Lens,
+    projection: Projection,
     tint: Tint,
     up: [f32; 3],
 }
 
 /// What a ray meets on a triangle.
-struct Met {
+struct Hit {
     /// Shares of the corners.
     shares: [f32; 3],
     /// Unit normal towards the viewer.
@@ -68,12 +68,12 @@ struct Met {
     ray: [f32; 3],
 }
 
-impl Scene<'_> {
+impl Shading<'_> {
     /// Where the ray of a sample meets the plane of a triangle (Moeller & Trumbore 1997).
-    fn meet(&self, triangle: usize, x: usize, y: usize) -> Option<Met> {
+    fn meet(&self, triangle: usize, x: usize, y: usize) -> Option<Hit> {
         let [a, b, c] = self.mesh.corners(triangle)?;
-        let ray = self.lens.ray([x as f32 + 0.5, y as f32 + 0.5]);
-        let (ab, ac, to) = (sub(b, a), sub(c, a), sub(self.lens.eye, a));
+        let ray = self.projection.ray([x as f32 + 0.5, y as f32 + 0.5]);
+        let (ab, ac, to) = (sub(b, a), sub(c, a), sub(self.projection.eye, a));
         let h = cross(ray, ac);
         let scale = dot(ab, h);
         let q = cross(to, ab);
@@ -93,26 +93,27 @@ impl Scene<'_> {
         // A smooth normal may turn away from the viewer where the face does not.
         let ray = unit_or(ray, [1.0, 0.0, 0.0]);
         let away = dot(normal, ray).max(0.0);
-        Some(Met { shares, normal: unit_or(along(normal, ray, -1.02 * away), face), behind, ray })
+        Some(Hit { shares, normal: unit_or(along(normal, ray, -1.02 * away), face), behind, ray })
     }
 
-    fn surface(&self, seen: &Seen, width: usize, height: usize) -> Surface {
+    fn surface(&self, visible: &Visible, width: usize, height: usize) -> Surface {
         let nearest = parallel::map(height, |row| {
             let of = |column: usize| {
                 let (x, y) = (0..SUPER * SUPER)
                     .map(|s| (SUPER * column + s % SUPER, SUPER * row + s / SUPER))
                     .max_by(|a, b| {
-                        let w = |p: &(usize, usize)| seen.nearness[p.1 * seen.width + p.0];
+                        let w = |p: &(usize, usize)| visible.nearness[p.1 * visible.width + p.0];
                         w(a).total_cmp(&w(b))
                     })
                     .unwrap_or_default();
-                let at = y * seen.width + x;
-                let normal = match seen.triangles[at] {
+                let at = y * visible.width + x;
+                let normal = match visible.triangles[at] {
                     NOTHING => None,
                     t => self.meet(t as usize, x, y),
                 };
-                let normal = normal.map_or([0.0, 0.0, -1.0], |m| self.lens.axes.map(|a| dot(a, m.normal)));
-                (seen.nearness[at], normal)
+                let normal =
+                    normal.map_or([0.0, 0.0, -1.0], |m| self.projection.axes.map(|a| dot(a, m.normal)));
+                (visible.nearness[at], normal)
             };
             (0..width).map(of).collect::<Vec<_>>()
         });
@@ -122,15 +123,15 @@ impl Scene<'_> {
 
     /// Linear light from a sample.
     fn light(&self, triangle: usize, x: usize, y: usize, open: f32) -> [f32; 3] {
-        let Some(met) = self.meet(triangle, x, y) else { return [0.0; 3] };
-        let [right, down, _] = self.lens.axes;
-        let to_eye = met.ray.map(|v| -v);
+        let Some(hit) = self.meet(triangle, x, y) else { return [0.0; 3] };
+        let [right, down, _] = self.projection.axes;
+        let to_eye = hit.ray.map(|v| -v);
         let lamp = |aside: f32, above: f32| unit_or(along(along(to_eye, right, aside), down, -above), to_eye);
-        let key = dot(met.normal, lamp(-0.55, 0.65)).max(0.0);
-        let fill = dot(met.normal, lamp(0.9, 0.1)).max(0.0);
-        let sky = 0.5 + 0.5 * dot(met.normal, self.up);
+        let key = dot(hit.normal, lamp(-0.55, 0.65)).max(0.0);
+        let fill = dot(hit.normal, lamp(0.9, 0.1)).max(0.0);
+        let sky = 0.5 + 0.5 * dot(hit.normal, self.up);
         let strength = open * (0.24 + 0.20 * sky) + (0.4 + 0.6 * open) * (0.50 * key + 0.16 * fill);
-        let paint = if met.behind { BEHIND } else { self.paint(triangle, met.shares) };
+        let paint = if hit.behind { BEHIND } else { self.paint(triangle, hit.shares) };
         paint.map(|v| v * strength)
     }
 

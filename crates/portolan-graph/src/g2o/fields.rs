@@ -1,13 +1,13 @@
-//! Lines and their fields, and what can be wrong with them.
+//! The lines of a g2o file and their fields, and the errors in them.
 
 use std::io::BufRead;
 
 use crate::error::GraphError;
 
-/// No line of a g2o file is longer (bytes); the longest edge in space takes about 700.
+/// Longest line accepted (bytes); the longest 3-D edge takes about 700.
 pub(super) const LONGEST_LINE: usize = 1 << 16;
 
-/// What is wrong with a g2o file.
+/// Why a g2o file was refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum G2oError {
@@ -18,7 +18,7 @@ pub enum G2oError {
         name: String,
         /// The line, from 1.
         line: usize,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The file holds no vertex and no edge.
@@ -29,7 +29,7 @@ pub enum G2oError {
         /// Lines in it.
         lines: usize,
     },
-    /// A line does not end.
+    /// A line is too long.
     #[error("{name}, line {line}: longer than {LONGEST_LINE} bytes")]
     LineTooLong {
         /// The file.
@@ -61,7 +61,7 @@ pub enum G2oError {
         /// What stands there.
         value: String,
     },
-    /// A field holds something else than it should.
+    /// A field holds a value of the wrong kind.
     #[error("{name}, line {line}: {tag} has {value:?} in its field {field}, not {expected}")]
     Value {
         /// The file.
@@ -72,12 +72,12 @@ pub enum G2oError {
         tag: &'static str,
         /// The field.
         field: String,
-        /// What stands there.
+        /// The text of the field.
         value: String,
-        /// What should.
+        /// What the field must hold.
         expected: &'static str,
     },
-    /// Poses in the plane and in space in one file.
+    /// One file holds 2-D and 3-D poses.
     #[error("{name}, line {line}: {tag} in a file that began with the other dimension")]
     MixedDimensions {
         /// The file.
@@ -87,15 +87,15 @@ pub enum G2oError {
         /// First word of the line.
         tag: &'static str,
     },
-    /// The line can be read, but the graph refuses it: a second vertex of the same id, an edge to a vertex that is
-    /// missing from a file that has vertices, information that is not positive definite ...
+    /// The graph refuses the line: a second vertex with the same id, an edge to a vertex that is missing from a file
+    /// with vertices, information that is not positive definite.
     #[error("{name}, line {line}: {source}")]
     Graph {
         /// The file.
         name: String,
         /// The line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The reason.
         source: GraphError,
     },
 }

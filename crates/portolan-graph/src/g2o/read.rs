@@ -11,36 +11,36 @@ use crate::information::Information;
 use crate::start::Chain;
 use crate::tangent::{planar, tangent_dimension};
 
-/// A graph of the dimension that a file has.
+/// A 2-D or a 3-D graph.
 #[derive(Clone, Debug)]
 pub enum AnyGraph {
-    /// Poses in the plane.
-    Plane(PoseGraph<2>),
-    /// Poses in space.
-    Space(PoseGraph<3>),
+    /// 2-D poses.
+    Se2(PoseGraph<2>),
+    /// 3-D poses.
+    Se3(PoseGraph<3>),
 }
 
-/// What a g2o file holds.
+/// The content of a g2o file.
 #[derive(Clone, Debug)]
 pub struct G2oFile {
     /// The graph. Edges between ids that differ by one are odometry, all others closures.
     pub graph: AnyGraph,
-    /// Whether the file had no vertices: they were then made from the ids in the edges, ascending, and placed by
-    /// chaining odometry ([`Chain::Odometry`]).
+    /// Whether the file had edges only: the vertices were then made from the ids in the edges, ascending, and placed
+    /// by chaining odometry ([`Chain::Odometry`]).
     pub vertices_made: bool,
-    /// Lines that were skipped, counted by their first word; after 64 different ones as `(other)`.
+    /// Number of lines skipped by their first word; from the 65th word on counted as `(other)`.
     pub unknown: BTreeMap<String, usize>,
-    /// Quaternions whose length was off by more than 1e-3; all are normalised.
+    /// Number of quaternions whose length differs from 1 by more than 1e-3; all are normalized.
     pub quaternions_off: usize,
 }
 
-/// Reads a g2o text file; `name` is what error messages call it. Comments (`#`) and empty lines are skipped.
+/// Reads a g2o text file; `name` is its name in error messages. Comments (`#`) and empty lines are skipped.
 ///
 /// ```
 /// use portolan_graph::{AnyGraph, read_g2o};
 /// let text = "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n";
 /// let file = read_g2o(text.as_bytes(), "two poses")?;
-/// let AnyGraph::Plane(graph) = file.graph else { panic!("SE2 is the plane") };
+/// let AnyGraph::Se2(graph) = file.graph else { panic!("SE2 is 2-D") };
 /// assert!(file.vertices_made);
 /// assert_eq!(graph.pose(1).unwrap().translation, [1.0, 0.0]);
 /// # Ok::<(), portolan_graph::G2oError>(())
@@ -49,8 +49,8 @@ pub struct G2oFile {
 /// # Errors
 /// [`G2oError`], which names the line, the field and the value. Nothing is repaired or left out.
 pub fn read_g2o(mut input: impl BufRead, name: &str) -> Result<G2oFile, G2oError> {
-    let mut plane = Lines::<2>::default();
-    let mut space = Lines::<3>::default();
+    let mut se2 = Lines::<2>::default();
+    let mut se3 = Lines::<3>::default();
     let mut fixed = Vec::new();
     let mut unknown = BTreeMap::new();
     let mut quaternions_off = 0;
@@ -63,13 +63,13 @@ pub fn read_g2o(mut input: impl BufRead, name: &str) -> Result<G2oFile, G2oError
         let fields = |tag| Fields::new(name, line, tag, rest);
         match word {
             "" => {}
-            "VERTEX_SE2" => plane.vertex(fields("VERTEX_SE2"), planar_pose)?,
-            "EDGE_SE2" => plane.edge(fields("EDGE_SE2"), planar_pose)?,
+            "VERTEX_SE2" => se2.vertex(fields("VERTEX_SE2"), planar_pose)?,
+            "EDGE_SE2" => se2.edge(fields("EDGE_SE2"), planar_pose)?,
             "VERTEX_SE3:QUAT" => {
-                space.vertex(fields("VERTEX_SE3:QUAT"), |f| spatial_pose(f, &mut quaternions_off))?;
+                se3.vertex(fields("VERTEX_SE3:QUAT"), |f| spatial_pose(f, &mut quaternions_off))?;
             }
             "EDGE_SE3:QUAT" => {
-                space.edge(fields("EDGE_SE3:QUAT"), |f| spatial_pose(f, &mut quaternions_off))?;
+                se3.edge(fields("EDGE_SE3:QUAT"), |f| spatial_pose(f, &mut quaternions_off))?;
             }
             "FIX" => {
                 let mut fields = fields("FIX");
@@ -85,25 +85,25 @@ pub fn read_g2o(mut input: impl BufRead, name: &str) -> Result<G2oFile, G2oError
                 *unknown.entry(if known { key } else { "(other)".into() }).or_insert(0) += 1;
             }
         }
-        if let (Some(_), Some(_)) = (plane.last, space.last) {
-            let tag = plane.last.max(space.last).map_or("", |(_, tag)| tag);
+        if let (Some(_), Some(_)) = (se2.last, se3.last) {
+            let tag = se2.last.max(se3.last).map_or("", |(_, tag)| tag);
             return Err(G2oError::MixedDimensions { name: name.into(), line, tag });
         }
         line += 1;
     }
-    let (graph, vertices_made) = if plane.last.is_some() {
-        let (graph, made) = plane.graph(name, &fixed)?;
-        (AnyGraph::Plane(graph), made)
-    } else if space.last.is_some() {
-        let (graph, made) = space.graph(name, &fixed)?;
-        (AnyGraph::Space(graph), made)
+    let (graph, vertices_made) = if se2.last.is_some() {
+        let (graph, made) = se2.graph(name, &fixed)?;
+        (AnyGraph::Se2(graph), made)
+    } else if se3.last.is_some() {
+        let (graph, made) = se3.graph(name, &fixed)?;
+        (AnyGraph::Se3(graph), made)
     } else {
         return Err(G2oError::Empty { name: name.into(), lines: line - 1 });
     };
     Ok(G2oFile { graph, vertices_made, unknown, quaternions_off })
 }
 
-/// What was read, with line numbers, until all of it is known: edges may stand before their vertices.
+/// The lines of one dimension, kept until the end of the file: edges may precede their vertices.
 #[derive(Default)]
 struct Lines<const D: usize> {
     vertices: Vec<(usize, u64, Pose<D>)>,
@@ -198,15 +198,15 @@ mod tests {
     use crate::g2o::write_g2o;
     use proptest::prelude::*;
 
-    const PLANE: &str = "EDGE_SE2 5 9 1 2 0.5 4 0 0 4 0 100";
+    const SE2_EDGE: &str = "EDGE_SE2 5 9 1 2 0.5 4 0 0 4 0 100";
 
     fn error(text: &str) -> String {
         read_g2o(text.as_bytes(), "f").unwrap_err().to_string()
     }
 
-    fn plane(text: &str) -> (PoseGraph<2>, G2oFile) {
+    fn se2(text: &str) -> (PoseGraph<2>, G2oFile) {
         let file = read_g2o(text.as_bytes(), "f").unwrap();
-        let AnyGraph::Plane(graph) = file.graph.clone() else { panic!("not the plane") };
+        let AnyGraph::Se2(graph) = file.graph.clone() else { panic!("not 2-D") };
         (graph, file)
     }
 
@@ -254,8 +254,8 @@ mod tests {
 
     #[test]
     fn huge_ids_unknown_tags_and_broken_characters() {
-        let (graph, file) = plane(&format!(
-            "PARAMS 0 1\nPARAMS 2\n\u{fffd}\r\nEDGE_SE2 18446744073709551615 0 1 0 0 1 0 0 1 0 1\r\n{PLANE}"
+        let (graph, file) = se2(&format!(
+            "PARAMS 0 1\nPARAMS 2\n\u{fffd}\r\nEDGE_SE2 18446744073709551615 0 1 0 0 1 0 0 1 0 1\r\n{SE2_EDGE}"
         ));
         assert_eq!(graph.vertices().iter().map(|v| v.id).collect::<Vec<_>>(), [0, 5, 9, u64::MAX]);
         assert!(file.vertices_made);
@@ -264,20 +264,20 @@ mod tests {
         assert!(graph.pose(0).unwrap().translation == [0.0, 0.0]);
         assert!((graph.pose(9).unwrap().translation[1] - 2.0).abs() < 1e-15, "its own part starts at 5");
         let many: String = (0..200).map(|k| format!("T{k}\n")).collect();
-        let (_, file) = plane(&format!("{many}{PLANE}"));
+        let (_, file) = se2(&format!("{many}{SE2_EDGE}"));
         assert_eq!(file.unknown.len(), 65);
         assert_eq!(file.unknown["(other)"], 136);
     }
 
     #[test]
     fn written_graphs_read_back() {
-        let (graph, _) = plane(&format!(
-            "VERTEX_SE2 9 1e-7 -2e20 3.1\nVERTEX_SE2 5 0.1 0.2 -1.3\nVERTEX_SE2 6 0 0 7\n{PLANE}\n\
+        let (graph, _) = se2(&format!(
+            "VERTEX_SE2 9 1e-7 -2e20 3.1\nVERTEX_SE2 5 0.1 0.2 -1.3\nVERTEX_SE2 6 0 0 7\n{SE2_EDGE}\n\
              EDGE_SE2 6 5 1 1 1 3 0.1 0.2 4 0.3 5\nFIX 5\n"
         ));
         let mut text = Vec::new();
         write_g2o(&graph, &mut text).unwrap();
-        let (again, _) = plane(std::str::from_utf8(&text).unwrap());
+        let (again, _) = se2(std::str::from_utf8(&text).unwrap());
         for (a, b) in graph.vertices().iter().zip(again.vertices()) {
             assert_eq!((a.id, a.fixed), (b.id, b.fixed));
             assert_eq!(a.world_from_vertex.translation, b.world_from_vertex.translation);
@@ -309,25 +309,25 @@ mod tests {
                 "\nEDGE_SE2 3 2 1 0 0 1e300 0 0 1e-300 0 1\n", "\nEDGE_SE2 1 3 9 9 9 1 0.9 0 1 0 1\n", "\u{e9}", "\nFIX 1\n",
             ];
             let text: String = words.iter().map(|&k| format!("{} ", WORDS[k])).collect();
-            if let Ok(G2oFile { graph: AnyGraph::Plane(mut graph), .. }) = read_g2o(text.as_bytes(), "words") {
+            if let Ok(G2oFile { graph: AnyGraph::Se2(mut graph), .. }) = read_g2o(text.as_bytes(), "words") {
                 let _ = graph.start_from_chordal();
-                let _ = graph.optimise(&crate::Settings::default());
+                let _ = graph.optimize(&crate::Settings::default());
             }
         }
 
         /// Good files with a few bytes changed: most of them fail late, some not at all.
         #[test]
         fn damaged_files_never_panic(
-            space in any::<bool>(),
+            se3 in any::<bool>(),
             damage in proptest::collection::vec((any::<proptest::sample::Index>(), 0usize..14), 0..6),
         ) {
             let identity = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 4 0 0 4 0 4";
-            let text = if space {
+            let text = if se3 {
                 format!("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0.6 0.8\nFIX 1\n\
                          EDGE_SE3:QUAT 0 1 1 2 3 0.5 0.5 0.5 0.5 {identity}\n\
                          EDGE_SE3:QUAT 1 0 1 1 1 0.1 0.2 0.3 0.9 {identity}\n")
             } else {
-                format!("{PLANE}\nEDGE_SE2 9 4 1 1 -3 1 0.1 0 2 0 3\nEDGE_SE2 4 5 0 0 1 1 0 0 1 0 1\n")
+                format!("{SE2_EDGE}\nEDGE_SE2 9 4 1 1 -3 1 0.1 0 2 0 3\nEDGE_SE2 4 5 0 0 1 1 0 0 1 0 1\n")
             };
             let mut bytes = text.into_bytes();
             for (at, with) in damage {
@@ -336,13 +336,13 @@ mod tests {
             }
             let settings = crate::Settings { kernel: crate::Kernel::Dcs(1.0), ..crate::Settings::default() };
             match read_g2o(&bytes[..], "damaged") {
-                Ok(G2oFile { graph: AnyGraph::Plane(mut graph), .. }) => {
+                Ok(G2oFile { graph: AnyGraph::Se2(mut graph), .. }) => {
                     let _ = graph.start_from_chordal();
-                    let _ = graph.optimise(&settings);
+                    let _ = graph.optimize(&settings);
                 }
-                Ok(G2oFile { graph: AnyGraph::Space(mut graph), .. }) => {
+                Ok(G2oFile { graph: AnyGraph::Se3(mut graph), .. }) => {
                     let _ = graph.start_from_chordal();
-                    let _ = graph.optimise(&settings);
+                    let _ = graph.optimize(&settings);
                 }
                 Err(_) => {}
             }

@@ -6,12 +6,11 @@ use crate::graph::PoseGraph;
 use crate::tangent::{angle, quaternion};
 use portolan::geom::Pose;
 
-/// Writes a graph as g2o text: vertices, `FIX` lines, edges, each in the order of the graph. Numbers have as many
-/// digits as it takes to read the same ones back. Where an edge comes from
-/// ([`EdgeKind`](crate::EdgeKind)) is not part of the format.
+/// Writes a graph as g2o text: vertices, `FIX` lines, edges, each in the order of the graph. Numbers are written with
+/// the digits needed to read back the same values. The format does not store [`EdgeKind`](crate::EdgeKind).
 ///
 /// # Errors
-/// What the writer says.
+/// The errors of `out`.
 pub fn write_g2o<const D: usize>(graph: &PoseGraph<D>, mut out: impl Write) -> std::io::Result<()> {
     let (vertex_tag, edge_tag) =
         if D == 2 { ("VERTEX_SE2", "EDGE_SE2") } else { ("VERTEX_SE3:QUAT", "EDGE_SE3:QUAT") };

@@ -1,5 +1,5 @@
 //! The dense kernels on one block. All loops have constant bounds, rows first, so that the compiler unrolls
-//! and vectorises the innermost one; sums run in a fixed order, so that results are the same bytes everywhere.
+//! and vectorizes the innermost one; sums run in a fixed order, so that results are the same bytes everywhere.
 
 /// A dense `B x B` block, rows first.
 pub(crate) type Block<const B: usize> = [[f64; B]; B];

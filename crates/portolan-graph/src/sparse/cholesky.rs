@@ -6,13 +6,13 @@ use super::block::{
 };
 use super::pattern::{Pattern, SymmetricBlocks};
 
-/// A factor and the scratch to make it, reused from one factorisation to the next.
+/// A factor and the scratch to make it, reused from one factorization to the next.
 pub(crate) struct Cholesky<const B: usize> {
     /// Lower triangles of the diagonal blocks.
     diagonal: Vec<Block<B>>,
     /// Rows of the blocks of each column, ascending.
     rows: Vec<usize>,
-    /// The blocks of each column, *transposed*, so that the innermost loop of the product runs over neighbours.
+    /// The blocks of each column, *transposed*, so that the innermost loop of the product runs over neighbors.
     blocks: Vec<Block<B>>,
     /// How far each column is filled.
     end: Vec<usize>,

@@ -139,8 +139,8 @@ impl<const B: usize> SymmetricBlocks<B> {
     }
 }
 
-/// An approximate minimum degree order (Amestoy, Davis & Duff 1996): the place of each variable. Should the
-/// crate refuse, the given order stands: slower, never wrong.
+/// An approximate minimum degree order (Amestoy, Davis & Duff 1996): the place of each variable. Where the crate
+/// returns an error the given order is kept, which is slower but correct.
 fn minimum_degree(variables: usize, pairs: &[[usize; 2]]) -> Vec<usize> {
     let mut entries: Vec<[usize; 2]> = pairs.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
     entries.extend((0..variables).map(|k| [k, k]));

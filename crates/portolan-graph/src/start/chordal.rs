@@ -1,4 +1,4 @@
-//! Chordal initialisation (Carlone et al. 2015, section III-B): rotations first, as a *linear* least-squares
+//! Chordal initialization (Carlone et al. 2015, section III-B): rotations first, as a *linear* least-squares
 //! problem over matrices that need not be rotations, then positions, which are linear once rotations are known.
 
 use portolan::geom::Pose;
@@ -10,13 +10,13 @@ use crate::graph::PoseGraph;
 use crate::sparse::{Block, Cholesky, Pattern, SymmetricBlocks, transposed};
 
 impl<const D: usize> PoseGraph<D> {
-    /// Puts every free vertex at the chordal solution, whatever was there before: a start from which large loops
-    /// converge. It trusts all edges alike: for graphs with false closures take
-    /// [`Chain::Odometry`](crate::Chain::Odometry). Two sparse factorisations.
+    /// Places every free vertex at the chordal solution, from which large loops converge; its previous pose has no
+    /// influence. All edges have the same trust: for graphs with false closures use
+    /// [`Chain::Odometry`](crate::Chain::Odometry). Cost: two sparse factorizations.
     ///
     /// # Errors
     /// [`GraphError::Singular`] where information spans too many orders of magnitude, [`GraphError::NotFinite`]
-    /// where measurements are too large. The graph is then left as it was.
+    /// where measurements are too large. The graph is then unchanged.
     pub fn start_from_chordal(&mut self) -> Result<(), GraphError> {
         let held = anchors(self).held;
         let numbering = Numbering::new(self, &held);
@@ -64,7 +64,7 @@ impl<const D: usize> PoseGraph<D> {
         let rows: Vec<Vec<[f64; D]>> = rows.iter().map(|b| factor.solve(&at.pattern, b)).collect();
         for (variable, &vertex) in at.free.iter().enumerate() {
             let relaxed = std::array::from_fn(|row| rows[row][variable]);
-            // A matrix without a nearest rotation keeps the one that was there.
+            // Without a nearest rotation the vertex keeps the one it has.
             if let Some(rotation) = nearest_rotation(relaxed) {
                 poses[vertex].rotation = rotation;
             }
@@ -205,7 +205,7 @@ mod tests {
         assert!(nearest_rotation([[1.0, 0.0], [0.0, -1.0]]).is_none());
         assert!(nearest_rotation([[0.0; 3]; 3]).is_none());
         assert!(nearest_rotation([[f64::NAN; 2]; 2]).is_none());
-        let plane = nearest_rotation([[0.0, -3.0], [3.0, 0.0]]).unwrap();
-        assert!((plane[1][0] - 1.0).abs() < 1e-15);
+        let turned = nearest_rotation([[0.0, -3.0], [3.0, 0.0]]).unwrap();
+        assert!((turned[1][0] - 1.0).abs() < 1e-15);
     }
 }

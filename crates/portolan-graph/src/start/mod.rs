@@ -1,4 +1,4 @@
-//! Where to start from: the optimiser finds the minimum next to its start.
+//! Initial poses: the optimizer finds the minimum nearest to them.
 
 mod chordal;
 mod tree;

@@ -9,15 +9,15 @@ use crate::graph::{EdgeKind, PoseGraph};
 /// Which edges a tree prefers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Chain {
-    /// Odometry before closures: dead reckoning, which false closures cannot disturb.
+    /// Odometry before closures: dead reckoning, unaffected by false closures.
     Odometry,
-    /// The fewest edges from the anchor: less drift, where closures can be trusted.
+    /// The fewest edges from the held vertex: less drift, for graphs without false closures.
     Shortest,
 }
 
 impl<const D: usize> PoseGraph<D> {
-    /// Puts every vertex where a tree of measurements says, from the fixed vertices (or the first vertex of a
-    /// part without one) on. O(edges log edges). What was there before is forgotten, except at the anchors.
+    /// Places every vertex by chaining measurements along a spanning tree from the fixed vertices (or from the first
+    /// vertex of a component without one). Previous poses of other vertices are discarded. O(edges log edges).
     pub fn start_from_tree(&mut self, chain: Chain) {
         let anchors = anchors(self);
         let mut placed = anchors.held;

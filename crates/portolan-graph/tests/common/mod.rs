@@ -23,7 +23,7 @@ impl Draw {
     }
 }
 
-/// A pose from a position, a heading, and in space a pitch.
+/// A pose from a position, a heading, and in 3-D a pitch.
 pub(crate) fn pose<const D: usize>(position: [f64; 3], heading: f64, pitch: f64) -> Pose<D> {
     let mut out = Pose::<D>::IDENTITY;
     out.translation.copy_from_slice(&position[..D]);
@@ -52,9 +52,9 @@ pub(crate) struct Laps<const D: usize> {
     pub(crate) false_closures: Vec<bool>,
 }
 
-/// Four laps of 60 poses on an oval of 16 x 8 m (in space one that climbs and dips). Each place is joined with
+/// Four laps of 60 poses on an oval of 16 x 8 m (in 3-D one that climbs and dips). Each place is joined with
 /// the same place of the next lap; `wrong` of every ten closures are false: random places, random poses.
-/// Noise: 1 cm and 2 mrad; `slip` times that for odometry. The start is what odometry says.
+/// Noise: 1 cm and 2 mrad; `slip` times that for odometry. The initial poses are those of odometry.
 pub(crate) fn laps<const D: usize>(seed: u64, wrong: usize, slip: f64) -> Laps<D> {
     const LAP: usize = 60;
     let mut draw = Draw(seed);
@@ -105,7 +105,7 @@ pub(crate) fn laps<const D: usize>(seed: u64, wrong: usize, slip: f64) -> Laps<D
     Laps { graph, truth, false_closures }
 }
 
-/// Mean and largest distance of the positions from the truth (metres).
+/// Mean and largest distance of the positions from the truth (meters).
 pub(crate) fn position_error<const D: usize>(graph: &PoseGraph<D>, truth: &[Pose<D>]) -> (f64, f64) {
     let errors: Vec<f64> =
         graph.vertices().iter().zip(truth).map(|(v, t)| v.world_from_vertex.translation_to(t)).collect();

@@ -1,10 +1,10 @@
-//! What is known of a cell.
+//! Free, occupied or unknown: the state of a cell.
 
 use crate::cell::{DistanceBrick, SignedDistance};
 use crate::geom::BlockKey;
 use crate::store::Bricks;
 
-/// A cell as exploration sees it.
+/// The state of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Known {
     Free,
@@ -12,7 +12,7 @@ pub(super) enum Known {
     Unknown,
 }
 
-/// A cell of this distance and weight, with this least weight.
+/// The state of a cell with this distance and weight.
 #[inline(always)]
 pub(super) fn known(distance: f32, weight: f32, min_weight: f32) -> Known {
     // False for NaN, too.
@@ -25,7 +25,7 @@ pub(super) fn known(distance: f32, weight: f32, min_weight: f32) -> Known {
     }
 }
 
-/// Looks cells up one after the other, as a ray meets them: the brick is looked for only where it changes.
+/// Reads cells one after the other, as along a ray: the brick is looked up only where it changes.
 #[derive(Debug)]
 pub(super) struct Reader<'a, const D: usize> {
     store: &'a Bricks<SignedDistance, D>,

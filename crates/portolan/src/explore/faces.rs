@@ -5,12 +5,12 @@ use crate::cell::{DistanceBrick, SignedDistance};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
 use crate::store::Bricks;
 
-/// A free cell with an unknown neighbour.
+/// A free cell with an unknown neighbor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FrontierCell {
     /// Its place in the brick.
     pub(super) offset: u16,
-    /// Bit `2 k`: the neighbour below along axis `k` is unknown; bit `2 k + 1`: the one above.
+    /// Bit `2 k`: the neighbor below along axis `k` is unknown; bit `2 k + 1`: the one above.
     pub(super) faces: u8,
     /// Which of the brick's groups of touching cells it belongs to.
     pub(super) group: u16,
@@ -24,14 +24,14 @@ pub(super) struct BrickFrontier {
 }
 
 impl BrickFrontier {
-    /// The group of the cell at a place; `None` where it is no frontier cell.
+    /// The group of the frontier cell with this offset; `None` for other cells.
     #[inline]
     pub(super) fn group_at(&self, offset: usize) -> Option<u16> {
         let i = self.cells.binary_search_by_key(&(offset as u16), |c| c.offset).ok()?;
         Some(self.cells[i].group)
     }
 
-    /// Of a brick of the store. Reads its face neighbours, too.
+    /// The frontier cells of a brick of the store. Also reads its face neighbors.
     pub(super) fn of<const D: usize>(
         store: &Bricks<SignedDistance, D>,
         key: BlockKey<D>,
@@ -42,7 +42,7 @@ impl BrickFrontier {
         if free == NO_CELLS {
             return Self::default();
         }
-        // Cells whose neighbour through a face is unknown, face by face.
+        // Cells whose neighbor through a face is unknown, face by face.
         let mut faces = [NO_CELLS; 6];
         for k in 0..D {
             for (side, step) in [-1, 1].into_iter().enumerate() {
@@ -80,7 +80,7 @@ impl BrickFrontier {
                 self.cells[i].group = group;
                 let at = BlockKey([0; D]).cell(offset);
                 for n in 0..3usize.pow(D as u32) {
-                    let cell = neighbour(at, n);
+                    let cell = neighbor(at, n);
                     if cell.iter().any(|&v| v < 0 || v >= BLOCK_EDGE as i32) {
                         continue;
                     }
@@ -98,12 +98,12 @@ impl BrickFrontier {
     }
 }
 
-/// A bit for each cell of a brick, x from the lowest bit on: a word is a layer of 8 x 8. The plane needs one word.
+/// A bit for each cell of a brick, x from the lowest bit on: a word is a layer of 8 x 8. 2-D needs one word.
 type Cells = [u64; WORDS];
 const WORDS: usize = 8;
 const NO_CELLS: Cells = [0; WORDS];
 
-/// Free cells, and unknown ones; in the plane all words but the first are empty.
+/// Free cells and unknown cells; in 2-D all words but the first are empty.
 fn masks(brick: &DistanceBrick, min_weight: f32) -> (Cells, Cells) {
     let (mut free, mut unknown) = (NO_CELLS, NO_CELLS);
     let layers = brick.distances().chunks(64).zip(brick.weights().chunks(64));
@@ -117,7 +117,7 @@ fn masks(brick: &DistanceBrick, min_weight: f32) -> (Cells, Cells) {
     (free, unknown)
 }
 
-/// Cells whose neighbour a step along an axis is in a set, which goes on in the next brick with `beyond`.
+/// Cells whose neighbor one step along an axis is in a set; `beyond` is the set in the next brick.
 fn shifted<const D: usize>(set: &Cells, beyond: &Cells, axis: usize, step: i32) -> Cells {
     /// The cells with x = 0 of a layer.
     const FIRST: u64 = 0x0101_0101_0101_0101;
@@ -166,7 +166,7 @@ const NONE: u16 = u16::MAX;
 
 /// The `n`-th of the `3^D` indices around one, itself among them.
 #[inline(always)]
-pub(super) fn neighbour<const D: usize>(at: [i32; D], n: usize) -> [i32; D] {
+pub(super) fn neighbor<const D: usize>(at: [i32; D], n: usize) -> [i32; D] {
     let mut n = n as i32;
     std::array::from_fn(|k| {
         let step = n % 3 - 1;

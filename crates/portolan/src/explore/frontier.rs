@@ -1,33 +1,32 @@
-//! Frontier cells that touch, as one.
+//! Connected frontier cells as one frontier.
 
-use super::faces::{BrickFrontier, neighbour};
+use super::faces::{BrickFrontier, neighbor};
 use crate::geom::vector::unit;
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 
-/// A border of the known: free cells that touch each other, by a face, an edge or a corner, each with an unknown cell
-/// beside one of its faces.
+/// A frontier: free cells connected by a face, an edge or a corner, each with an unknown cell at one of its faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frontier<const D: usize> {
-    /// The free cells, brick by brick as keys ascend, in a brick x fastest.
+    /// The free cells, in ascending order of bricks, within a brick x fastest.
     pub cells: Vec<[i32; D]>,
-    /// Faces between these cells and unknown ones; times `resolution^(D - 1)` the length or area of the border.
+    /// Number of faces between these cells and unknown ones; times `resolution^(D - 1)` the length or area.
     pub faces: usize,
-    /// Mean of the cells' centres (world). May lie in a wall, or in what is unknown, where the border is bent.
+    /// Mean of the cell centers (world). Of a curved frontier it may lie in a wall or in unknown space.
     pub centroid: [f64; D],
-    /// Centre of the cell that is nearest to the centroid (world), the first of equals: a place to go to.
+    /// Center of the cell nearest to the centroid (world), the first of equals: a goal for the robot.
     pub middle: [f64; D],
-    /// Mean direction of the faces, from free space to the unknown, at length one; `None` where they cancel out.
+    /// Unit mean direction of the faces, from free to unknown space; `None` where they cancel out.
     pub normal: Option<[f64; D]>,
-    /// Box of the cells (world).
+    /// Bounding box of the cells (world).
     pub extent: Aabb<D>,
 }
 
-/// Everything kept per brick, by key.
+/// The frontier cells of all bricks, by key.
 pub(super) type Pieces<const D: usize> = FxHashMap<BlockKey<D>, BrickFrontier>;
 
-/// Joins the groups of all bricks and measures them: largest first, of equal ones that with the lowest first cell.
+/// Joins the groups of all bricks into frontiers, sorted by size, largest first, then by first cell.
 pub(super) fn join<const D: usize>(
     pieces: &Pieces<D>,
     lattice: &Lattice<D>,
@@ -44,7 +43,7 @@ pub(super) fn join<const D: usize>(
     }
     let mut sets = Sets((0..groups).collect());
     for key in &keys {
-        join_with_neighbours(pieces, &first, *key, &mut sets);
+        join_with_neighbors(pieces, &first, *key, &mut sets);
     }
     let mut sums: Vec<Sum<D>> = Vec::new();
     // Where the sum of a set is, by the set's name.
@@ -66,16 +65,16 @@ pub(super) fn join<const D: usize>(
     sums.into_iter().map(|sum| sum.measured(lattice)).collect()
 }
 
-/// Joins the groups of a brick with those that they touch in the bricks around it with greater keys; the others did it
-/// already.
-fn join_with_neighbours<const D: usize>(
+/// Joins the groups of a brick with those they touch in neighboring bricks with greater keys; the pairs with smaller keys
+/// are joined from there.
+fn join_with_neighbors<const D: usize>(
     pieces: &Pieces<D>,
     first: &FxHashMap<BlockKey<D>, u32>,
     key: BlockKey<D>,
     sets: &mut Sets,
 ) {
     let around: [Option<(&BrickFrontier, u32)>; 27] = std::array::from_fn(|n| {
-        let at = BlockKey(if n < 3usize.pow(D as u32) { neighbour(key.0, n) } else { key.0 });
+        let at = BlockKey(if n < 3usize.pow(D as u32) { neighbor(key.0, n) } else { key.0 });
         if at > key { pieces.get(&at).map(|piece| (piece, first[&at])) } else { None }
     });
     if around.iter().all(Option::is_none) {
@@ -88,7 +87,7 @@ fn join_with_neighbours<const D: usize>(
             continue;
         }
         for n in 0..3usize.pow(D as u32) {
-            let next = neighbour(at, n);
+            let next = neighbor(at, n);
             // Which of the bricks around: their numbers count like those of cells.
             let brick =
                 (0..D).rev().fold(0, |b, k| 3 * b + (1 + next[k].div_euclid(BLOCK_EDGE as i32)) as usize);
@@ -101,7 +100,7 @@ fn join_with_neighbours<const D: usize>(
     }
 }
 
-/// Disjoint sets; a set's name is its lowest member.
+/// Disjoint sets; the representative of a set is its lowest member.
 struct Sets(Vec<u32>);
 
 impl Sets {
@@ -120,7 +119,7 @@ impl Sets {
     }
 }
 
-/// What is added up of a frontier: whole numbers, so that no order matters.
+/// Sums over the cells of a frontier: integers, so that the order has no influence.
 struct Sum<const D: usize> {
     cells: Vec<[i32; D]>,
     places: [i64; D],

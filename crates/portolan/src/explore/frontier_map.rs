@@ -1,4 +1,4 @@
-//! The frontiers of a map, kept up with its changes.
+//! The frontiers of a map, updated with its changes.
 
 use super::Frontier;
 use super::faces::BrickFrontier;
@@ -12,14 +12,14 @@ use crate::store::{Bricks, Store};
 /// Settings of a [`FrontierMap`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrontierSettings {
-    /// Cells of smaller weight count as never observed. `None`: any weight above 0 counts.
-    pub min_weight: Option<f32>,
-    /// Frontiers of fewer cells are left out.
+    /// Cells of smaller weight are unknown.
+    pub min_weight: f32,
+    /// Frontiers of fewer cells are omitted.
     pub min_cells: usize,
 }
 
 impl Default for FrontierSettings {
-    /// Any weight; ten cells.
+    /// A weight of 0.5, half an observation; ten cells.
     fn default() -> Self {
         Self { min_weight: None, min_cells: 10 }
     }
@@ -32,10 +32,10 @@ impl FrontierSettings {
     }
 }
 
-/// Where the known ends *(Yamauchi 1997)*, brick by brick, kept between changes of the map.
+/// The frontiers of a map *(Yamauchi 1997)*, brick by brick, kept between changes of the map.
 ///
-/// [`FrontierMap::update`] looks again at what changed since the last call; [`FrontierMap::frontiers`] joins the pieces.
-/// Both together give what a new `FrontierMap` over the whole map gives.
+/// [`FrontierMap::update`] processes the bricks that changed since the last call; [`FrontierMap::frontiers`] joins the
+/// cells of all bricks. The result equals that of a new `FrontierMap` over the whole map.
 ///
 /// ```
 /// use portolan::cell::DistanceBrick;
@@ -43,7 +43,7 @@ impl FrontierSettings {
 /// use portolan::geom::{BlockKey, Lattice};
 /// use portolan::store::Bricks;
 ///
-/// // 8 x 8 cells of 10 cm are known: a wall on the left, else free.
+/// // 8 x 8 observed cells of 10 cm: a wall on the left, else free.
 /// let mut store = Bricks::new(Lattice::new([0.0, 0.0], 0.1));
 /// let known: Vec<f32> = (0..64).map(|i| if i % 8 == 0 { -0.05 } else { 0.3 }).collect();
 /// store.insert(BlockKey([0, 0]), DistanceBrick::from_parts(&known, &[1.0; 64]).expect("sane"))?;
@@ -55,14 +55,14 @@ impl FrontierSettings {
 /// let towards = border.normal.expect("the right side is open, the left is not");
 /// assert!((towards[0] - 1.0).abs() < 1e-12);
 ///
-/// // More is seen on the right: only there the map is looked at again.
+/// // More is observed on the right: only the bricks there are processed.
 /// store.insert(BlockKey([1, 0]), DistanceBrick::from_parts(&[0.3; 64], &[1.0; 64]).expect("sane"))?;
 /// assert_eq!(map.update(&store), [BlockKey([0, 0]), BlockKey([1, 0])]);
 /// assert_eq!(map.frontiers()[0].extent.max[0], 1.6);
 /// # Ok::<(), portolan::store::StoreFull>(())
 /// ```
 ///
-/// In space the same with [`Tsdf3::store`](crate::map::Tsdf3::store):
+/// The same in 3-D, where the store is that of [`SparseTsdf::store`](crate::map::SparseTsdf::store):
 ///
 /// ```
 /// use portolan::cell::DistanceBrick;
@@ -82,7 +82,7 @@ impl FrontierSettings {
 #[derive(Clone, Debug)]
 pub struct FrontierMap<const D: usize> {
     settings: FrontierSettings,
-    /// Only bricks that have a frontier cell.
+    /// Bricks with a frontier cell.
     pieces: Pieces<D>,
     /// Epoch up to which the pieces are.
     seen: u64,
@@ -90,7 +90,7 @@ pub struct FrontierMap<const D: usize> {
 }
 
 impl<const D: usize> FrontierMap<D> {
-    /// Of nothing yet.
+    /// An empty one.
     pub fn new(settings: FrontierSettings) -> Self {
         Self { settings, pieces: Pieces::default(), seen: 0, lattice: None }
     }
@@ -100,12 +100,11 @@ impl<const D: usize> FrontierMap<D> {
         &self.settings
     }
 
-    /// Looks again at the bricks that changed since the last call, and at those that share a face with them. Returns the
-    /// keys of the bricks looked at, ascending. O(bricks) to look for changes, then O(changed bricks), in parallel with
-    /// the feature `parallel`.
+    /// Processes the bricks that changed since the last call, and those that share a face with them. Returns their keys,
+    /// ascending. O(bricks) to find changes, then O(changed bricks), on all cores with the feature `parallel`.
     ///
-    /// `store` must be that of the last call, changed since; another map needs another `FrontierMap`. One that is plainly
-    /// another, of another lattice or of an earlier epoch, is looked at from scratch.
+    /// `store` must be the store of the last call; use another `FrontierMap` for another map. A store with another lattice
+    /// or an earlier epoch is processed from scratch.
     pub fn update(&mut self, store: &Bricks<SignedDistance, D>) -> Vec<BlockKey<D>> {
         if self.lattice != Some(*store.lattice()) || store.epoch() < self.seen {
             (self.pieces, self.seen) = (Pieces::default(), 0);
@@ -144,7 +143,7 @@ impl<const D: usize> FrontierMap<D> {
         self.lattice.map_or(Vec::new(), |lattice| join(&self.pieces, &lattice, self.settings.min_cells))
     }
 
-    /// Bytes that the pieces hold.
+    /// Memory of the frontier cells (bytes).
     pub fn memory_bytes(&self) -> usize {
         let cells = |piece: &BrickFrontier| size_of_val(&piece.cells[..]);
         self.pieces.values().map(cells).sum::<usize>()

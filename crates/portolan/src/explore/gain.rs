@@ -1,4 +1,4 @@
-//! How much that is unknown a sensor would see from somewhere.
+//! The information gain of a view: how many unknown cells a sensor would see from a pose.
 
 use super::cells::{Known, Reader};
 use crate::cell::SignedDistance;
@@ -10,23 +10,22 @@ use crate::store::{Bricks, Store};
 use crate::sweep::clip;
 use rustc_hash::FxHashMap;
 
-/// How far views reach.
+/// Settings of [`expected_gain`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GainSettings<const D: usize> {
-    /// Cells of smaller weight count as never observed. `None`: any weight above 0 counts.
-    pub min_weight: Option<f32>,
-    /// The sensor sees no further (metres). Infinite is the longest a ray may be at all: 100 000 cells.
+    /// Cells of smaller weight are unknown.
+    pub min_weight: f32,
+    /// Range of the sensor (meters). Infinite is limited to 100,000 cells, the longest ray.
     pub max_range: f64,
-    /// A ray is expected to see so far into the unknown (metres, summed along the ray), and no further; infinite: to its
-    /// largest range. What is unknown may be full: with more than the depth of what is usually behind a door, the gain is
-    /// mostly walls.
+    /// Depth to which a ray is expected to see into unknown space (meters, summed along the ray); infinite for the whole
+    /// range. Unknown space may be occupied: with more than the typical depth of a room, the gain counts mostly walls.
     pub penetration: f64,
-    /// Rays end where they leave this box (world): what lies outside of it is of no interest. `None`: all of space is.
+    /// Rays end where they leave this box (world), so that nothing outside it is counted. `None` for no bounds.
     pub bounds: Option<Aabb<D>>,
 }
 
 impl<const D: usize> Default for GainSettings<D> {
-    /// Any weight; 5 m; a metre of the unknown; everywhere.
+    /// A weight of 0.5, half an observation; a range of 5 m; a penetration of 1 m; no bounds.
     fn default() -> Self {
         Self { min_weight: None, max_range: 5.0, penetration: 1.0, bounds: None }
     }
@@ -39,33 +38,33 @@ impl<const D: usize> GainSettings<D> {
     }
 }
 
-/// What is expected to be new.
+/// The expected gain of a view.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ViewGain {
-    /// Of the unknown cells that rays cross (square or cubic metres); each is counted once.
+    /// Area or volume of the unknown cells that rays cross (square or cubic meters); each cell counts once.
     pub volume: f64,
-    /// Their number.
+    /// Number of these cells.
     pub cells: usize,
-    /// Rays that end at something occupied.
+    /// Rays that end at an occupied cell.
     pub hit: usize,
-    /// Rays that end in the unknown: as far in as they see, or at the largest range.
+    /// Rays that end in unknown space, at the penetration depth or at the largest range.
     pub unknown: usize,
-    /// Rays that leave the bounds, or what a lattice can number.
+    /// Rays that leave the bounds or the index range of the lattice.
     pub outside: usize,
-    /// Rays that end in free space, at the largest range.
+    /// Rays that end in free space at the largest range.
     pub free: usize,
-    /// Directions that are none (zero, NaN).
+    /// Directions that are zero or not finite.
     pub refused: usize,
 }
 
-/// Cells that a ray crosses, at most, along each axis: its largest range in cells.
+/// Longest ray (cells).
 const FARTHEST: f64 = 1e5;
 
-/// Casts rays (the sensor's frame; of any length) from a pose and counts the unknown cells that they would see *(as
-/// Bircher et al. 2016, who count the volume in a frustum)*.
+/// Casts rays (directions of any length in the sensor's frame) from a pose and counts the unknown cells that they cross
+/// *(after Bircher et al. 2016, who sum the volume in a frustum)*.
 ///
-/// A ray runs through free space until it meets an occupied cell. Where it enters unknown cells it counts them, and goes on
-/// for [`GainSettings::penetration`] in all. O(cells crossed).
+/// A ray runs through free cells until it meets an occupied one. Unknown cells are counted, up to a total length of
+/// [`GainSettings::penetration`] in them. O(cells crossed).
 ///
 /// ```
 /// use portolan::cell::DistanceBrick;
@@ -73,10 +72,10 @@ const FARTHEST: f64 = 1e5;
 /// use portolan::geom::{BlockKey, Lattice, Pose};
 /// use portolan::store::Bricks;
 ///
-/// // 8 x 8 free cells of 10 cm, nothing else is known.
+/// // 8 x 8 free cells of 10 cm; everything else is unknown.
 /// let mut store = Bricks::new(Lattice::new([0.0, 0.0], 0.1));
 /// store.insert(BlockKey([0, 0]), DistanceBrick::from_parts(&[0.3; 64], &[1.0; 64]).expect("sane"))?;
-/// // A single ray to the right sees 2 cells if it sees 15 cm of what is beyond.
+/// // A single ray to the right crosses 2 unknown cells in 15 cm.
 /// let world_from_sensor = Pose::<2>::new(0.45, 0.45, 0.0);
 /// let settings = GainSettings { penetration: 0.15, ..Default::default() };
 /// let gain = expected_gain(&store, &world_from_sensor, &fan(0.0, 0.0, 1), &settings);
@@ -95,7 +94,7 @@ pub fn expected_gain<const D: usize>(
         reader: Reader::new(store, settings.min_weight.unwrap_or(0.0)),
         store,
         settings,
-        seen: Seen::new(),
+        seen: CellSet::new(),
     };
     let mut gain = ViewGain::default();
     for direction in directions_sensor {
@@ -113,8 +112,8 @@ pub fn expected_gain<const D: usize>(
     gain
 }
 
-/// [`expected_gain`] from many poses (world from sensor), each by itself, in their order. On all cores with the feature
-/// `parallel`: the same answers.
+/// [`expected_gain`] from many poses (world from sensor), each by itself, in their order. Runs on all cores with the feature
+/// `parallel`; results do not depend on it.
 pub fn expected_gains<const D: usize>(
     store: &Bricks<SignedDistance, D>,
     poses: &[Pose<D>],
@@ -137,13 +136,13 @@ struct View<'a, const D: usize> {
     reader: Reader<'a, D>,
     store: &'a Bricks<SignedDistance, D>,
     settings: &'a GainSettings<D>,
-    seen: Seen<D>,
+    seen: CellSet<D>,
 }
 
 impl<const D: usize> View<'_, D> {
     fn cast(&mut self, direction: [f64; D]) -> End {
         let lattice = self.store.lattice();
-        // NaN is no range: `min` takes the other.
+        // Where one of the two is NaN, `min` returns the other.
         let range = self.settings.max_range.min(FARTHEST * lattice.resolution);
         let part = match &self.settings.bounds {
             Some(bounds) => clip(bounds, self.origin, direction, f64::INFINITY),
@@ -158,7 +157,7 @@ impl<const D: usize> View<'_, D> {
         loop {
             let exit = walk.exit().min(end);
             let inside = exit - f64::max(at, enter);
-            // A cell that a ray only touches, at a corner or behind the bounds by rounding, is not seen.
+            // A cell that a ray only touches, at a corner or beyond the bounds by rounding, is not counted.
             let crossed = exit - at > 1e-9 * lattice.resolution;
             let found = if crossed { self.reader.at(walk.cell()) } else { Known::Free };
             if found == Known::Occupied {
@@ -186,15 +185,15 @@ impl<const D: usize> View<'_, D> {
 }
 
 /// A set of cells: a bit each, brick by brick.
-struct Seen<const D: usize> {
+struct CellSet<const D: usize> {
     slots: FxHashMap<BlockKey<D>, usize>,
     bits: Vec<[u64; 8]>,
-    /// The brick asked for last.
+    /// The brick of the last cell inserted.
     last: Option<(BlockKey<D>, usize)>,
     count: usize,
 }
 
-impl<const D: usize> Seen<D> {
+impl<const D: usize> CellSet<D> {
     fn new() -> Self {
         Self { slots: FxHashMap::default(), bits: Vec::new(), last: None, count: 0 }
     }

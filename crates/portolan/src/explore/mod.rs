@@ -1,7 +1,7 @@
-//! Where the known ends, and what would be seen from somewhere: what exploration asks of a map in bricks.
+//! Frontiers, and the information gain of views, for exploration with a map in bricks.
 //!
-//! A cell of a field of signed distances is *free* where it was observed and its distance is positive, *occupied* where it
-//! was observed and is not free, and unknown elsewhere; also where there is no brick.
+//! A cell of a field of signed distances is *free* where it was observed with a positive distance, *occupied* where it was
+//! observed with another one, and *unknown* elsewhere, including where no brick exists.
 
 mod cells;
 mod faces;

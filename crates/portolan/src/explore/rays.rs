@@ -1,14 +1,14 @@
-//! Directions of the rays of sensors that are not there yet.
+//! Ray directions of common sensors, for views that are planned.
 
-/// Unit directions of a scanner of the plane: `count` rays from the bearing `first` to `last` (radians,
-/// counter-clockwise from x of the sensor), both included; one ray looks in the middle.
+/// Unit directions of a 2-D scanner: `count` rays from the bearing `first` to `last` (radians, counter-clockwise from x of
+/// the sensor), both included; a single ray points to the middle.
 pub fn fan(first: f64, last: f64, count: usize) -> Vec<[f64; 2]> {
     spread(first, last, count).map(|bearing| [bearing.cos(), bearing.sin()]).collect()
 }
 
-/// Unit directions of a scanner of space that turns about its z axis: bearings from x (radians, counter-clockwise) as in
-/// [`fan`], for each of the elevations from the xy plane upwards, row by row. All around, `last` is one step less than
-/// `first + 2 pi`.
+/// Unit directions of a 3-D lidar that turns about its z axis: bearings from x (radians, counter-clockwise) as in [`fan`],
+/// for each of the elevations from the xy plane upward, row by row. For a full turn the last bearing is one step less than
+/// the first plus 2 pi.
 pub fn spherical(bearings: [f64; 2], across: usize, elevations: [f64; 2], rows: usize) -> Vec<[f64; 3]> {
     spread(elevations[0], elevations[1], rows)
         .flat_map(|up| {
@@ -18,9 +18,9 @@ pub fn spherical(bearings: [f64; 2], across: usize, elevations: [f64; 2], rows: 
         .collect()
 }
 
-/// Unit directions through the pixels of a pinhole camera (z ahead, x right, y down), row by row: through the middle of
-/// every `step`-th of `width` x `height` pixels, with focal lengths and principal point in pixels, whose centres are whole
-/// numbers.
+/// Unit directions through the pixels of a pinhole camera (z forward, x right, y down), row by row: through the center of
+/// every `step`-th of `width` x `height` pixels, with focal lengths and principal point in pixels. Pixel centers have
+/// integer coordinates.
 pub fn pinhole(
     [width, height]: [usize; 2],
     focal: [f64; 2],

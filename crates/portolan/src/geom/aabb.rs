@@ -1,6 +1,6 @@
 //! Axis-aligned boxes.
 
-/// An axis-aligned box in world coordinates (metres); `min > max` along an axis means empty.
+/// An axis-aligned box in world coordinates (meters); `min > max` along an axis means empty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb<const D: usize> {
     /// The corner with the smallest coordinates.
@@ -10,7 +10,7 @@ pub struct Aabb<const D: usize> {
 }
 
 impl<const D: usize> Aabb<D> {
-    /// The box that holds nothing and grows with the first point.
+    /// The empty box, which grows with the first point included.
     pub const EMPTY: Self = Self { min: [f64::INFINITY; D], max: [f64::NEG_INFINITY; D] };
 
     /// The box with these corners.
@@ -18,13 +18,13 @@ impl<const D: usize> Aabb<D> {
         Self { min, max }
     }
 
-    /// Grows to hold `p`.
+    /// Grows to contain `p`.
     pub fn include(&mut self, p: [f64; D]) {
         self.min = std::array::from_fn(|k| self.min[k].min(p[k]));
         self.max = std::array::from_fn(|k| self.max[k].max(p[k]));
     }
 
-    /// The smallest box that holds both.
+    /// The smallest box that contains both.
     pub fn union(mut self, other: Self) -> Self {
         if !other.is_empty() {
             self.include(other.min);
@@ -33,20 +33,12 @@ impl<const D: usize> Aabb<D> {
         self
     }
 
-    /// The box of the points that lie in both; empty where there are none.
-    pub fn intersection(self, other: Self) -> Self {
-        Self {
-            min: std::array::from_fn(|k| self.min[k].max(other.min[k])),
-            max: std::array::from_fn(|k| self.max[k].min(other.max[k])),
-        }
-    }
-
-    /// The box with every face moved outwards by `margin` (metres).
+    /// The box with every face moved outward by `margin` (meters).
     pub fn grown(self, margin: f64) -> Self {
         Self { min: self.min.map(|v| v - margin), max: self.max.map(|v| v + margin) }
     }
 
-    /// Whether no point lies inside.
+    /// Whether the box contains no point.
     pub fn is_empty(&self) -> bool {
         (0..D).any(|k| {
             !matches!(
@@ -61,7 +53,7 @@ impl<const D: usize> Aabb<D> {
         (0..D).all(|k| self.min[k] <= p[k] && p[k] <= self.max[k])
     }
 
-    /// Edge lengths (metres); zero for an empty box.
+    /// Edge lengths (meters); zero for an empty box.
     pub fn extent(&self) -> [f64; D] {
         std::array::from_fn(|k| (self.max[k] - self.min[k]).max(0.0))
     }

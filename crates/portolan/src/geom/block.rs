@@ -1,20 +1,20 @@
-//! Blocks of `8^D` cells: the unit in which sweeps hand evidence to stores.
+//! Blocks of `8^D` cells: the unit in which sweeps pass evidence to stores.
 
 /// Edge of a block in cells.
 pub const BLOCK_EDGE: usize = 8;
 
-/// Number of cells of a block: 64 in the plane, 512 in space.
+/// Number of cells of a block: 64 in 2-D, 512 in 3-D.
 pub const fn block_cells<const D: usize>() -> usize {
     BLOCK_EDGE.pow(D as u32)
 }
 
-/// Index of a block: cell index divided by eight, rounded down. Ordered along the last axis first, so
-/// that sorted keys run through memory in the order of a dense array.
+/// Index of a block: the cell index divided by eight, rounded down. Ordered by the last axis first, the order of a dense
+/// array in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlockKey<const D: usize>(pub [i32; D]);
 
 impl<const D: usize> BlockKey<D> {
-    /// The block that holds `cell`.
+    /// The block that contains `cell`.
     #[inline(always)]
     pub fn of_cell(cell: [i32; D]) -> Self {
         Self(cell.map(|v| v >> 3))
@@ -43,7 +43,7 @@ impl<const D: usize> BlockKey<D> {
     }
 }
 
-/// One word for the hasher, where the derived implementation writes a length and every index by itself.
+/// One word for the hasher; the derived implementation writes a length and each index separately.
 impl<const D: usize> std::hash::Hash for BlockKey<D> {
     #[inline(always)]
     fn hash<H: std::hash::Hasher>(&self, state: &mut H) {

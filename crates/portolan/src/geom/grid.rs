@@ -5,21 +5,21 @@ use super::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
 /// A box of cells starting at cell 0 of its lattice. Linear index: x fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid<const D: usize> {
-    /// Index to metres.
+    /// Origin and resolution.
     pub lattice: Lattice<D>,
     /// Number of cells along each axis.
     pub shape: [usize; D],
 }
 
 impl<const D: usize> Grid<D> {
-    /// A grid of `shape` cells whose first cell has its lower corner at `origin` (metres).
+    /// A grid of `shape` cells whose first cell has its lower corner at `origin` (meters).
     pub fn new(origin: [f64; D], resolution: f64, shape: [usize; D]) -> Self {
         Self { lattice: Lattice::new(origin, resolution), shape }
     }
 
-    /// The smallest grid that covers `bounds`, with its origin at a multiple of the resolution, so that the
-    /// cells of two maps of one resolution coincide. `None` where an axis would need more than 2^30 cells
-    /// or the box is empty or not finite.
+    /// The smallest grid that covers `bounds`, with its origin at a multiple of the resolution, so that cells of maps with
+    /// the same resolution coincide. `None` for a box that is empty or not finite, or that takes more than 2^30 cells along
+    /// an axis.
     pub fn covering(bounds: Aabb<D>, resolution: f64) -> Option<Self> {
         let finite = bounds.min.iter().chain(&bounds.max).all(|v| v.is_finite());
         if bounds.is_empty() || !finite || !(resolution > 0.0 && resolution.is_finite()) {
@@ -31,7 +31,7 @@ impl<const D: usize> Grid<D> {
         held.then(|| Self::new(first.map(|v| v * resolution), resolution, cells.map(|n| n as usize)))
     }
 
-    /// Number of cells; `None` where it does not fit.
+    /// Number of cells; `None` where it overflows.
     pub fn checked_len(&self) -> Option<usize> {
         self.shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s))
     }
@@ -41,12 +41,12 @@ impl<const D: usize> Grid<D> {
         self.shape.iter().product()
     }
 
-    /// Whether there is no cell.
+    /// Whether the grid has no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// World box of all cells.
+    /// Bounding box of all cells (world).
     pub fn aabb(&self) -> Aabb<D> {
         self.lattice.aabb([0; D], self.shape.map(|s| s as i32))
     }
@@ -56,7 +56,7 @@ impl<const D: usize> Grid<D> {
     pub fn index(&self, cell: [i32; D]) -> Option<usize> {
         let mut i = 0;
         for k in (0..D).rev() {
-            // As unsigned, a negative index is too large as well: one comparison.
+            // As unsigned, a negative index is too large: one comparison.
             let c = cell[k] as u32 as usize;
             if c >= self.shape[k] {
                 return None;
@@ -75,13 +75,13 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    /// Linear index of the cell that holds a world point; `None` outside.
+    /// Linear index of the cell that contains a world point; `None` outside.
     #[inline(always)]
     pub fn index_of(&self, p_world: [f64; D]) -> Option<usize> {
         self.index(self.lattice.cell_of(p_world)?)
     }
 
-    /// Distance in memory between neighbours along each axis.
+    /// Distance in memory between neighbors along each axis.
     pub fn strides(&self) -> [usize; D] {
         let mut stride = 1;
         std::array::from_fn(|k| {
@@ -91,19 +91,19 @@ impl<const D: usize> Grid<D> {
         })
     }
 
-    /// Number of blocks along each axis, the last one perhaps only partly inside.
+    /// Number of blocks along each axis; the last one may be partly outside.
     pub fn blocks(&self) -> [usize; D] {
         self.shape.map(|s| s.div_ceil(BLOCK_EDGE))
     }
 
-    /// Whether a block holds at least one cell of the grid.
+    /// Whether a block contains at least one cell of the grid.
     #[inline(always)]
     pub fn has_block(&self, key: BlockKey<D>) -> bool {
         (0..D).all(|k| key.0[k] >= 0 && ((key.0[k] as usize) << 3) < self.shape[k])
     }
 
-    /// The `2^D` cells whose centres surround a world point, and the multilinear weights: the lowest of the
-    /// cells and the fraction in `[0, 1)` along each axis. `None` where one of the cells is outside.
+    /// The `2^D` cells whose centers surround a world point, for multilinear interpolation: the lowest of the cells and the
+    /// fraction in `[0, 1)` along each axis. `None` where one of the cells is outside.
     #[inline(always)]
     pub fn interpolation(&self, p_world: [f64; D]) -> Option<([i32; D], [f64; D])> {
         let c = self.lattice.to_cells(p_world);
@@ -111,7 +111,7 @@ impl<const D: usize> Grid<D> {
         let mut fraction = [0.0; D];
         for k in 0..D {
             let shifted = c[k] - 0.5;
-            // False for NaN; an axis of one cell has no neighbours to interpolate between.
+            // False for NaN; an axis of one cell has no neighbors to interpolate between.
             if !(shifted >= 0.0 && shifted < self.shape[k] as f64 - 1.0) {
                 return None;
             }

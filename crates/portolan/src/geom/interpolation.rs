@@ -1,10 +1,13 @@
-//! Multilinear interpolation between cell centres.
+//! Multilinear interpolation between cell centers.
 
-/// Value at a point between `2^D` neighbouring samples, and its exact derivative per cell (not per metre).
+/// Value at a point between `2^D` neighboring samples, and its exact derivative per cell (not per meter).
 ///
-/// `base` is the linear index of the lowest sample, `strides` the distances in memory between neighbours,
-/// `fraction` the point's place between them, in `[0, 1]` along each axis. The gradient is the derivative of
-/// the same interpolant that the value comes from. NaN samples give NaN. Panics where a sample is outside.
+/// `base` is the linear index of the lowest sample, `strides` the distances in memory between neighbors, `fraction` the
+/// position of the point between them, in `[0, 1]` along each axis. The gradient is the exact derivative of the interpolant.
+/// NaN samples give NaN.
+///
+/// # Panics
+/// Where a sample is outside the array.
 #[inline(always)]
 pub fn interpolate<const D: usize>(
     values: &[f32],

@@ -1,16 +1,16 @@
-//! The correspondence of cell indices and metres.
+//! The mapping between cell indices and meters.
 
 use super::Aabb;
 
 /// An infinite regular lattice: origin (the corner of cell 0) and resolution.
 ///
-/// The origin is `f64`, so that a map far from the world's zero (UTM coordinates) works like one near it:
-/// everything inside a map is computed relative to the origin.
+/// The origin is `f64`, so that a map far from the origin of the world (UTM coordinates) is as accurate as one near it:
+/// everything inside a map is computed relative to its own origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice<const D: usize> {
-    /// World position of the lower corner of cell 0 (metres).
+    /// World position of the lower corner of cell 0 (meters).
     pub origin: [f64; D],
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub resolution: f64,
 }
 
@@ -21,18 +21,18 @@ impl<const D: usize> Lattice<D> {
         Self { origin, resolution }
     }
 
-    /// World point in units of cells from the origin.
+    /// A world point in units of cells from the origin.
     #[inline(always)]
     pub fn to_cells(&self, p_world: [f64; D]) -> [f64; D] {
         let inverse = 1.0 / self.resolution;
         std::array::from_fn(|k| (p_world[k] - self.origin[k]) * inverse)
     }
 
-    /// The cell that holds a world point; `None` where an `i32` cannot hold its index.
+    /// The cell that contains a world point; `None` where its index is out of range.
     #[inline(always)]
     pub fn cell_of(&self, p_world: [f64; D]) -> Option<[i32; D]> {
         let c = self.to_cells(p_world);
-        // Two bits are kept free: neighbours of a valid index and its block arithmetic cannot overflow.
+        // Two bits are kept free, so that arithmetic on neighbors and blocks of a valid index cannot overflow.
         const LIMIT: f64 = (1u32 << 30) as f64;
         let held = c.iter().all(|v| v.abs() < LIMIT); // false for NaN
         // Truncation and a step down: on baseline x86-64 `floor` is a call.
@@ -44,7 +44,7 @@ impl<const D: usize> Lattice<D> {
         })
     }
 
-    /// World position of the centre of a cell, where its sample sits.
+    /// World position of the center of a cell, where its sample lies.
     #[inline(always)]
     pub fn center(&self, cell: [i32; D]) -> [f64; D] {
         std::array::from_fn(|k| self.origin[k] + (f64::from(cell[k]) + 0.5) * self.resolution)
@@ -56,7 +56,7 @@ impl<const D: usize> Lattice<D> {
         std::array::from_fn(|k| self.origin[k] + f64::from(cell[k]) * self.resolution)
     }
 
-    /// World box of the cells from `first` up to, not including, `end`.
+    /// World box of the cells from `first` to `end` (exclusive).
     pub fn aabb(&self, first: [i32; D], end: [i32; D]) -> Aabb<D> {
         Aabb::new(self.corner(first), self.corner(end))
     }

@@ -1,10 +1,10 @@
-//! Lattices, boxes, poses and the walk of a ray through cells. Imports nothing of the rest.
+//! Lattices, boxes, poses and the walk of a ray through cells. Imports no other module of the crate.
 //!
-//! The conventions that hold everywhere, stated once:
+//! Conventions of the whole crate:
 //!
-//! - Metres and radians. World coordinates and poses are `f64`.
+//! - Meters and radians. World coordinates and poses are `f64`.
 //! - Cell `i` of a lattice covers `[i, i + 1) * resolution` from the origin along each axis: a point on
-//!   a face belongs to the cell above it (`floor`). The sample of a cell sits at its centre,
+//!   a face belongs to the cell above it (`floor`). The sample of a cell lies at its center,
 //!   `(i + 1/2) * resolution`.
 //! - x is the fastest axis in memory. Frames are right-handed, angles counter-clockwise.
 //! - A pose is named `target_from_source` and maps points of the source frame into the target frame.

@@ -7,23 +7,23 @@ use super::vector::{add, dot, norm, scale, sub, unit};
 pub struct Pose<const D: usize> {
     /// Rotation matrix, rows first.
     pub rotation: [[f64; D]; D],
-    /// Position of the source frame's zero in the target frame (metres).
+    /// Position of the origin of the source frame in the target frame (meters).
     pub translation: [f64; D],
 }
 
-/// Why a matrix is not a pose.
+/// Why a matrix was refused as a pose.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PoseError {
     /// An entry is NaN or infinite.
     #[error("a pose has an entry that is not finite")]
     NotFinite,
-    /// The rows are not orthonormal to 1e-2, or the matrix mirrors.
+    /// The rows are not orthonormal to 1e-2, or the determinant is negative.
     #[error("a pose is not rigid: its rotation is off by {0:.3e} (1e-2 is tolerated)")]
     NotRigid(f64),
 }
 
 impl<const D: usize> Pose<D> {
-    /// The transform that changes nothing.
+    /// The identity.
     pub const IDENTITY: Self = {
         let mut rotation = [[0.0; D]; D];
         let mut k = 0;
@@ -34,11 +34,11 @@ impl<const D: usize> Pose<D> {
         Self { rotation, translation: [0.0; D] }
     };
 
-    /// A pose from a matrix as files hold it. A rotation that is orthonormal to 1e-2 is made exactly so (by
-    /// Gram-Schmidt); the returned number is how far off it was.
+    /// A pose from a matrix that is nearly rigid, as in files. Rows that are orthonormal to 1e-2 are made orthonormal (by
+    /// Gram-Schmidt); the second value returned is their error before.
     ///
     /// # Errors
-    /// [`PoseError`] where an entry is not finite or the matrix is further off or mirrors.
+    /// [`PoseError`] where an entry is not finite, the error is larger or the determinant is negative.
     pub fn from_matrix(rotation: [[f64; D]; D], translation: [f64; D]) -> Result<(Self, f64), PoseError> {
         let finite = rotation.iter().flatten().chain(&translation).all(|v| v.is_finite());
         if !finite {
@@ -90,7 +90,7 @@ impl<const D: usize> Pose<D> {
         matches!(Self::from_matrix(self.rotation, self.translation), Ok((_, off)) if off < 1e-6)
     }
 
-    /// Distance between the two translations (metres).
+    /// Distance between the two translations (meters).
     pub fn translation_to(&self, other: &Self) -> f64 {
         norm(sub(self.translation, other.translation))
     }
@@ -122,14 +122,14 @@ impl<const D: usize> std::ops::Mul for Pose<D> {
 }
 
 impl Pose<2> {
-    /// Position (metres) and heading (radians, counter-clockwise from x).
+    /// Position (meters) and heading (radians, counter-clockwise from x).
     pub fn new(x: f64, y: f64, theta: f64) -> Self {
         let (sin, cos) = theta.sin_cos();
         Self::from_cos_sin(x, y, cos, sin)
     }
 
-    /// Position and heading given as cosine and sine, for callers that bring their own transcendental
-    /// functions (the simulator does, to be equal on every platform).
+    /// Position and heading, given as cosine and sine, for callers with their own transcendental functions (the simulator,
+    /// whose results are the same on every platform).
     pub fn from_cos_sin(x: f64, y: f64, cos: f64, sin: f64) -> Self {
         Self { rotation: [[cos, -sin], [sin, cos]], translation: [x, y] }
     }
@@ -141,7 +141,7 @@ impl Pose<2> {
 }
 
 impl Pose<3> {
-    /// Position (metres) and quaternion `(x, y, z, w)`, which is normalised; `None` for a quaternion that is
+    /// Position (meters) and quaternion `(x, y, z, w)`, which is normalized; `None` for a quaternion that is
     /// zero or not finite.
     pub fn from_quaternion(translation: [f64; 3], xyzw: [f64; 4]) -> Option<Self> {
         let [x, y, z, w] = unit(xyzw)?;
@@ -154,6 +154,7 @@ impl Pose<3> {
     }
 }
 
+#[cfg(feature = "nalgebra")]
 impl From<nalgebra::Isometry2<f64>> for Pose<2> {
     fn from(i: nalgebra::Isometry2<f64>) -> Self {
         let t = i.translation.vector;
@@ -161,6 +162,7 @@ impl From<nalgebra::Isometry2<f64>> for Pose<2> {
     }
 }
 
+#[cfg(feature = "nalgebra")]
 impl From<nalgebra::Isometry3<f64>> for Pose<3> {
     fn from(i: nalgebra::Isometry3<f64>) -> Self {
         let m = i.rotation.to_rotation_matrix();
@@ -202,6 +204,7 @@ mod tests {
         assert_eq!(Pose::from_matrix([[f64::NAN, 0.0], [0.0, 1.0]], [0.0; 2]), Err(PoseError::NotFinite));
     }
 
+    #[cfg(feature = "nalgebra")]
     #[test]
     fn nalgebra_isometries_are_accepted() {
         let i = nalgebra::Isometry3::new([1.0, 2.0, 3.0].into(), [0.3, -0.4, 0.5].into());

@@ -1,4 +1,4 @@
-//! The few operations on plain arrays that the rest needs: sums, products, lengths.
+//! Operations on plain arrays as vectors: sums, products, lengths.
 
 /// `a + b`.
 #[inline(always)]
@@ -46,25 +46,25 @@ pub fn distance<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
     norm(sub(a, b))
 }
 
-/// `a` at length one, or `None` for the zero vector and for anything that is not finite.
+/// `a` scaled to length one; `None` for the zero vector and where the length is not finite.
 pub fn unit<const D: usize>(a: [f64; D]) -> Option<[f64; D]> {
     let length = norm(a);
     (length > 0.0 && length.is_finite()).then(|| scale(a, 1.0 / length))
 }
 
-/// z component of the cross product of two plane vectors: positive where `b` lies counter-clockwise of `a`.
+/// z component of the cross product of two 2-D vectors: positive where `b` lies counter-clockwise of `a`.
 #[inline(always)]
 pub fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// The cross product of two vectors of space.
+/// The cross product of two 3-D vectors.
 #[inline(always)]
 pub fn cross3(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Distance from `p` to the segment `a`-`b` (metres), and the parameter in `[0, 1]` of the nearest point.
+/// Distance from `p` to the segment `a`-`b` (meters), and the parameter in `[0, 1]` of the nearest point.
 pub fn point_segment<const D: usize>(p: [f64; D], a: [f64; D], b: [f64; D]) -> (f64, f64) {
     let ab = sub(b, a);
     let length_sq = dot(ab, ab);

@@ -1,30 +1,29 @@
-//! The cells that a ray passes through, in order.
+//! The cells that a ray crosses, in order.
 
 use super::Lattice;
 
-/// Walks the cells of a ray from its origin outwards, each once, neighbours by faces
-/// (Amanatides & Woo 1987).
+/// Visits the cells that a ray crosses, each once, from face neighbor to face neighbor (Amanatides & Woo 1987).
 ///
-/// A ray that runs exactly along a face belongs to the cells above it, as points do. Where it passes
-/// exactly through an edge, the axes are taken in order, so that the walk is the same in every run.
+/// A ray exactly along a face belongs to the cells above it, as points do. A ray exactly through an edge steps along the
+/// axes in ascending order.
 #[derive(Clone, Copy, Debug)]
 pub struct RayWalk<const D: usize> {
     cell: [i32; D],
     step: [i32; D],
-    /// Arc length at which the ray leaves the current cell, per axis (metres).
+    /// Arc length at which the ray leaves the current cell, per axis (meters).
     t_next: [f64; D],
     t_delta: [f64; D],
 }
 
 impl<const D: usize> RayWalk<D> {
-    /// A walk from `origin` (world) along the unit vector `dir`. `None` where the origin has no cell index.
+    /// A walk from `origin` (world) along the unit vector `dir`. `None` where the cell index of the origin is out of range.
     #[inline]
     pub fn new(lattice: &Lattice<D>, origin: [f64; D], dir: [f64; D]) -> Option<Self> {
         let cell = lattice.cell_of(origin)?;
         let at = lattice.to_cells(origin);
         let mut walk = Self { cell, step: [0; D], t_next: [f64::INFINITY; D], t_delta: [f64::INFINITY; D] };
         for k in 0..D {
-            // A component so small that a cell is infinitely far along it is no component.
+            // A component whose inverse overflows counts as zero.
             let inverse = lattice.resolution / dir[k].abs();
             if inverse.is_finite() {
                 let inside = at[k] - f64::from(cell[k]);
@@ -42,7 +41,7 @@ impl<const D: usize> RayWalk<D> {
         self.cell
     }
 
-    /// Arc length at which the ray leaves the current cell (metres).
+    /// Arc length at which the ray leaves the current cell (meters).
     #[inline(always)]
     pub fn exit(&self) -> f64 {
         let mut t = self.t_next[0];
@@ -52,8 +51,8 @@ impl<const D: usize> RayWalk<D> {
         t
     }
 
-    /// Current cell, step along each axis, arc length at the next face and from face to face: for sweeps that step in
-    /// their own way, to the same cells.
+    /// Current cell, step along each axis, arc length at the next face and from face to face: for sweeps with a loop of their
+    /// own over the same cells.
     #[inline(always)]
     pub(crate) fn into_parts(self) -> ([i32; D], [i32; D], [f64; D], [f64; D]) {
         (self.cell, self.step, self.t_next, self.t_delta)
@@ -64,7 +63,7 @@ impl<const D: usize> RayWalk<D> {
     pub fn advance(&mut self) {
         let t = &self.t_next;
         // Constant per instance: one arm survives and every index is a literal, which a runtime axis would
-        // not be (three times slower in space).
+        // not be (three times slower in 3-D).
         match D {
             2 => {
                 if t[0] <= t[1] {
@@ -99,7 +98,7 @@ mod tests {
     use crate::geom::vector::{along, unit};
     use proptest::prelude::*;
 
-    /// Every cell of the walk is crossed by the ray, neighbours share a face, and no sample of the ray
+    /// Every cell of the walk is crossed by the ray, neighbors share a face, and no sample of the ray
     /// falls into a cell that the walk left out.
     fn covers_the_ray<const D: usize>(origin: [f64; D], target: [f64; D]) {
         let lattice = Lattice::new([0.0; D], 0.25);

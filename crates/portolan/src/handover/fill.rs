@@ -1,14 +1,14 @@
-//! What unknown becomes in an array that has no word for it.
+//! Values for unknown cells, for consumers without a value for unknown.
 
 use super::reach::{distance_to_boxes, extended};
 use crate::field::UnknownSpace;
 use crate::geom::Grid;
 
-/// Why a field cannot be handed over.
+/// Why a field cannot be exported.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HandoverError {
-    /// The number of samples is not that of the grid, or there is none.
+    /// The number of samples differs from the number of cells, or is 0.
     #[error("a grid of {cells} cells cannot have {samples} samples")]
     Length {
         /// Cells of the grid (saturated).
@@ -16,14 +16,14 @@ pub enum HandoverError {
         /// Samples given.
         samples: usize,
     },
-    /// A setting that is not what it has to be.
+    /// A setting is out of range.
     #[error("{name} is {value}; {advice}")]
     Setting {
         /// The setting.
         name: &'static str,
-        /// What was given.
+        /// Its value.
         value: f64,
-        /// What can be.
+        /// The values allowed.
         advice: &'static str,
     },
 }
@@ -35,30 +35,29 @@ pub(super) fn check_length<const D: usize>(grid: &Grid<D>, samples: usize) -> Re
     }
 }
 
-/// A field without unknown: finite samples everywhere (metres, positive in free space, x fastest), none of them beyond
-/// `far`, with no step at the border of what was seen that an optimiser would take for a wall.
+/// A field without unknown cells: finite samples everywhere (meters, positive in free space, x fastest), limited to `far`,
+/// without a step at the border of observed space that an optimizer would take for a wall.
 ///
 /// - [`UnknownSpace::Pessimistic`]: unknown cells are obstacles. A free cell has the distance to the nearest surface or to
-///   the nearest unknown cell (its box), whichever is nearer; an unknown cell has, negative, the distance to the nearest
-///   cell that is known to be free. The gradient leads out of the unknown.
-/// - [`UnknownSpace::Optimistic`]: unknown cells are free. Known cells keep their distance; unknown cells have the
-///   largest values that rise from there by no more than their distance (in steps between neighbouring cells, which
-///   are up to 8 % longer than straight lines). The unknown inside of a wall becomes a pocket of free space: that is
-///   what was asked for.
+///   the box of the nearest unknown cell, whichever is less; an unknown cell has the negative distance to the nearest free
+///   cell. The gradient points out of unknown space.
+/// - [`UnknownSpace::Optimistic`]: unknown cells are free. Known cells keep their distance; an unknown cell has the least
+///   sum of the value of a known cell and the distance to it (in steps between neighboring cells, up to 8 % longer than
+///   straight lines). Unknown space inside a wall becomes a pocket of free space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filled<const D: usize> {
-    /// Shape and place.
+    /// Shape and position.
     pub grid: Grid<D>,
-    /// Samples at the cell centres (metres), x fastest, finite.
+    /// Samples at the cell centers (meters), x fastest, finite.
     pub values: Vec<f32>,
 }
 
 impl<const D: usize> Filled<D> {
-    /// Fills what is NaN in `distances` (metres, x fastest) and limits all to `far` (metres) on both sides. O(cells x
-    /// cells of `far`) at worst, where everything is unknown.
+    /// Replaces NaN in `distances` (meters, x fastest) and limits all values to `-far..=far` (meters). O(cells x cells of
+    /// `far`) at worst, where everything is unknown.
     ///
     /// # Errors
-    /// Where the number of samples is not that of the grid, or `far` or the resolution is not above zero and finite.
+    /// Where the number of samples is not that of the grid, or `far` or the resolution is not positive and finite.
     pub fn new(
         grid: &Grid<D>,
         distances: &[f32],
@@ -69,11 +68,15 @@ impl<const D: usize> Filled<D> {
         let resolution = grid.lattice.resolution;
         for (name, value) in [("the largest distance", far), ("the resolution", resolution)] {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(HandoverError::Setting { name, value, advice: "give metres above zero" });
+                return Err(HandoverError::Setting {
+                    name,
+                    value,
+                    advice: "give a positive number of meters",
+                });
             }
         }
         let most = far as f32;
-        // Infinite samples are saturated ones.
+        // Saturated samples may be infinite.
         let mut values: Vec<f32> = distances.iter().map(|d| d.clamp(-most, most)).collect();
         if !values.iter().any(|d| d.is_nan()) {
             return Ok(Self { grid: *grid, values });

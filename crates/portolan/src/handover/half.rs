@@ -1,7 +1,7 @@
-//! Half precision, for consumers on graphics cards.
+//! Half precision, for consumers on GPUs.
 
-/// The `f16` (IEEE 754 binary16, as bits) nearest to a number; ties go to the even one. Too large becomes infinite, NaN
-/// stays NaN.
+/// The `f16` (IEEE 754 binary16, as bits) nearest to a number, ties to even. Values that are too large become infinite,
+/// NaN stays NaN.
 pub fn f16_from_f32(value: f32) -> u16 {
     let bits = value.to_bits();
     let sign = ((bits >> 16) & 0x8000) as u16;
@@ -30,7 +30,7 @@ pub fn f16_from_f32(value: f32) -> u16 {
     sign | (kept + u32::from(up)) as u16
 }
 
-/// The number that an `f16` (as bits) is: exact.
+/// The value of an `f16` (as bits), exact.
 pub fn f32_from_f16(bits: u16) -> f32 {
     let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
     let (exponent, fraction) = (i32::from((bits >> 10) & 0x1f), f32::from(bits & 0x3ff));
@@ -64,7 +64,7 @@ mod tests {
         assert_eq!(f16_from_f32(f32::NEG_INFINITY), 0xfc00);
     }
 
-    /// Halfway between two neighbours, and a hair to either side: all of them.
+    /// Halfway between two neighbors, and a hair to either side: all of them.
     #[test]
     fn ties_go_to_even() {
         for low in 0..0x7bff_u16 {

@@ -1,50 +1,50 @@
-//! Costs of Nav2 from distances.
+//! Nav2 costs from distances.
 
 use super::HandoverError;
 
-/// Costs with a name *(nav2_costmap_2d/cost_values.hpp)*.
+/// Special costs *(nav2_costmap_2d/cost_values.hpp)*.
 pub mod cost {
-    /// Nothing near.
+    /// Beyond the inflation radius.
     pub const FREE: u8 = 0;
     /// The largest cost that decays with distance.
     pub const LARGEST_DECAYING: u8 = 252;
-    /// The robot's centre cannot be here without touching: within the inscribed radius.
+    /// Within the inscribed radius: a robot centered here is in collision.
     pub const INSCRIBED: u8 = 253;
     /// An obstacle.
     pub const LETHAL: u8 = 254;
-    /// Nothing known.
+    /// Unknown.
     pub const NO_INFORMATION: u8 = 255;
 }
 
 /// Nav2's inflation layer *(nav2_costmap_2d/inflation_layer.hpp, `computeCost`)* over distances to the surface:
 ///
 /// `252 exp(-cost_scaling_factor (d - inscribed_radius))`, rounded down, between the inscribed and the inflation radius;
-/// 253 up to the inscribed radius, 254 in obstacles, 0 beyond the inflation radius, 255 where nothing is known.
+/// 253 up to the inscribed radius, 254 in obstacles, 0 beyond the inflation radius, 255 where unknown.
 ///
-/// A departure: Nav2 measures from the centre of the nearest obstacle *cell*, here it is the distance to the surface,
-/// which is up to half a cell's diagonal less. So costs here are never lower than Nav2's own for the same surface.
+/// Unlike Nav2, which measures from the center of the nearest obstacle *cell*, the distance here is that to the surface,
+/// which is up to half the diagonal of a cell less: costs are never lower than those of Nav2 for the same surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inflation {
-    /// Radius of the largest circle about the robot's centre that lies within its outline (metres).
+    /// Radius of the largest circle about the robot's center within its footprint (meters).
     pub inscribed_radius: f64,
-    /// Beyond this distance cells cost nothing (metres).
+    /// Distance beyond which the cost is 0 (meters).
     pub inflation_radius: f64,
     /// Decay (1/m): larger is steeper.
     pub cost_scaling_factor: f64,
 }
 
 impl Default for Inflation {
-    /// As Nav2's bring-up has it for a TurtleBot 3: radii 0.22 and 0.55 m, decay 3 per metre.
+    /// The values of Nav2's bring-up for a TurtleBot 3: radii 0.22 m and 0.55 m, decay 3 per meter.
     fn default() -> Self {
         Self { inscribed_radius: 0.22, inflation_radius: 0.55, cost_scaling_factor: 3.0 }
     }
 }
 
 impl Inflation {
-    /// The settings, if they can be.
+    /// The settings, if they are valid.
     ///
     /// # Errors
-    /// Where one is not finite or negative, or the inflation radius is less than the inscribed radius.
+    /// Where a value is negative or not finite, or the inflation radius is less than the inscribed radius.
     pub fn validate(self) -> Result<Self, HandoverError> {
         let wrong = |name, value, advice| Err(HandoverError::Setting { name, value, advice });
         let can_be = |v: f64| v >= 0.0 && v.is_finite();
@@ -67,8 +67,8 @@ impl Inflation {
         Ok(self)
     }
 
-    /// The cost at a signed distance (metres); NaN: nothing known. A saturated distance (at least so far) gives the
-    /// largest cost that there can be.
+    /// The cost at a signed distance (meters); NaN is unknown. A saturated distance, which is a lower bound, gives an upper
+    /// bound of the cost.
     pub fn cost(&self, distance: f64) -> u8 {
         if distance.is_nan() {
             cost::NO_INFORMATION
@@ -84,13 +84,13 @@ impl Inflation {
         }
     }
 
-    /// Costs of many cells.
+    /// The costs at many distances.
     pub fn costs(&self, distances: &[f32]) -> Vec<u8> {
         distances.iter().map(|&d| self.cost(f64::from(d))).collect()
     }
 
-    /// A cost as Nav2 publishes costmaps in an `OccupancyGrid` *(costmap_2d_publisher.cpp)*: 0 free, 1 to 98 decaying, 99
-    /// inscribed, 100 lethal; `None` (-1 there) where nothing is known.
+    /// A cost as Nav2 publishes it in an `OccupancyGrid` *(costmap_2d_publisher.cpp)*: 0 free, 1 to 98 decaying, 99
+    /// inscribed, 100 lethal; `None` (-1 in the message) where unknown.
     pub fn percent(cost: u8) -> Option<u8> {
         match cost {
             cost::NO_INFORMATION => None,

@@ -1,10 +1,10 @@
-//! Layouts of arrays, one consumer each.
+//! The array layouts of several consumers.
 
 use super::Filled;
 use super::half::f16_from_f32;
 use crate::geom::Grid;
 
-/// The same samples with the last axis the fastest (C order of an array indexed `[x, y]` or `[x, y, z]`); `values` are x
+/// The samples with the last axis fastest (C order of an array indexed `[x, y]` or `[x, y, z]`); `values` are x
 /// fastest, which is Fortran order of the same array.
 ///
 /// # Panics
@@ -34,29 +34,29 @@ pub fn c_order<T: Copy, const D: usize>(values: &[T], shape: [usize; D]) -> Vec<
         .collect()
 }
 
-/// What GPMP2's `PlanarSDF(origin, cell_size, data)` and `SignedDistanceField(origin, cell_size, data)` are made of
-/// *(gpmp2/obstacle/SignedDistanceField.h)*: one matrix per z, a row for every y and a column for every x. Positive
-/// outside of obstacles. It interpolates between nodes at `origin + index * cell_size`, so the origin is the centre of
-/// cell 0, half a cell from the grid's corner; a query beyond the outermost nodes throws, and its obstacle factors turn
-/// that into no cost: make the box larger than where the robot can get.
+/// The arguments of GPMP2's `PlanarSDF(origin, cell_size, data)` and `SignedDistanceField(origin, cell_size, data)`
+/// *(gpmp2/obstacle/SignedDistanceField.h)*: one matrix per z, a row for every y and a column for every x, positive outside
+/// obstacles. GPMP2 interpolates between nodes at `origin + index * cell_size`, so the origin is the center of cell 0, half
+/// a cell from the corner of the grid. A query beyond the outermost nodes throws, which its obstacle factors treat as no
+/// cost: the box must be larger than the reach of the robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gpmp2Field<const D: usize> {
-    /// Centre of cell 0 (metres).
+    /// Center of cell 0 (meters).
     pub origin: [f64; D],
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub cell_size: f64,
-    /// Samples along y.
+    /// Number of samples along y.
     pub rows: usize,
-    /// Samples along x.
+    /// Number of samples along x.
     pub columns: usize,
-    /// Samples along z; 1 in the plane.
+    /// Number of samples along z; 1 in 2-D.
     pub layers: usize,
-    /// Layer by layer, row by row (as numpy's C order of `[z, y, x]`).
+    /// Layer by layer, row by row (C order of an array indexed `[z, y, x]`).
     pub values: Vec<f64>,
 }
 
 impl<const D: usize> Gpmp2Field<D> {
-    /// The same samples: row by row is x fastest.
+    /// The samples in their order: row by row is x fastest.
     pub fn of(field: &Filled<D>) -> Self {
         let shape = &field.grid.shape;
         Self {
@@ -72,26 +72,26 @@ impl<const D: usize> Gpmp2Field<D> {
     /// `data[layer](row, column)`.
     ///
     /// # Panics
-    /// Where an index is beyond the array.
+    /// Where an index is out of range.
     pub fn at(&self, row: usize, column: usize, layer: usize) -> f64 {
         assert!(row < self.rows && column < self.columns && layer < self.layers, "an index in the field");
         self.values[(layer * self.rows + row) * self.columns + column]
     }
 }
 
-/// What CasADi's `interpolant(name, 'bspline', knots, values)` is made of, and acados with it: strictly rising vectors of
-/// knots, and the values with the first axis the fastest (`ravel(order='F')` of an array indexed `[x, y, z]`). The knots
-/// are the centres of the cells. Beyond the outermost knots CasADi goes on with the outermost piece.
+/// The arguments of CasADi's `interpolant(name, 'bspline', knots, values)`, which acados uses: strictly increasing vectors
+/// of knots, and the values with the first axis fastest (`ravel(order='F')` of an array indexed `[x, y, z]`). The knots are
+/// the cell centers. Beyond the outermost knots CasADi extrapolates the outermost piece.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnotGrid<const D: usize> {
-    /// Positions along x, y (and z) (metres).
+    /// Positions of the knots along each axis (meters).
     pub knots: [Vec<f64>; D],
-    /// Values at the knots (metres, positive in free space), the first axis fastest.
+    /// Values at the knots (meters, positive in free space), the first axis fastest.
     pub values: Vec<f64>,
 }
 
 impl<const D: usize> KnotGrid<D> {
-    /// The same samples in the same order.
+    /// The samples in their order.
     pub fn of(field: &Filled<D>) -> Self {
         let knots = std::array::from_fn(|k| {
             let position = |i: usize| field.grid.lattice.center([i as i32; D])[k];
@@ -101,37 +101,36 @@ impl<const D: usize> KnotGrid<D> {
     }
 }
 
-/// Which cuRobo: it changed the sign between them.
+/// The version of cuRobo: sign and grid differ between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CuroboVersion {
-    /// Up to 0.7 *(sphere_obb_kernel.cu, `compute_voxel_index`)*: positive **inside** of obstacles, free space is filled
-    /// with `-max_esdf_distance`; the grid has `floor(dims / voxel_size) + 1` samples along an axis, the first at
-    /// `-dims / 2` from its pose; a query takes the sample below it.
+    /// Up to 0.7 *(sphere_obb_kernel.cu, `compute_voxel_index`)*: positive **inside** obstacles, free space is filled with
+    /// `-max_esdf_distance`; the grid has `floor(dims / voxel_size) + 1` samples along an axis, the first at `-dims / 2`
+    /// from its pose; a query rounds down to a sample.
     UpTo07,
-    /// From 0.8 on *(geom/data/data_voxel.py)*: negative inside of obstacles; `dims / voxel_size` samples, at the centres
-    /// of voxels; interpolated.
+    /// From 0.8 on *(geom/data/data_voxel.py)*: negative inside obstacles; `dims / voxel_size` samples at the centers of
+    /// voxels; interpolated.
     #[default]
     From08,
 }
 
-/// What cuRobo's `VoxelGrid(name, pose, dims, voxel_size, feature_tensor)` is made of: the last axis fastest, x the
-/// slowest.
+/// The arguments of cuRobo's `VoxelGrid(name, pose, dims, voxel_size, feature_tensor)`: the last axis fastest, x slowest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CuroboGrid {
-    /// Samples along x, y, z.
+    /// Number of samples along x, y, z.
     pub shape: [usize; 3],
-    /// Lengths along x, y, z (metres) that make cuRobo find this shape.
+    /// Lengths along x, y, z (meters) from which cuRobo computes this shape.
     pub dims: [f64; 3],
-    /// x, y, z (metres) of the grid's middle, and the quaternion w, x, y, z: not turned.
+    /// x, y, z (meters) of the center of the grid, and the identity quaternion w, x, y, z.
     pub pose: [f64; 7],
-    /// Edge of a voxel (metres).
+    /// Edge of a voxel (meters).
     pub voxel_size: f64,
-    /// The samples (metres) with cuRobo's sign, x slowest.
+    /// The samples (meters) with the sign of the version, x slowest.
     pub values: Vec<f32>,
 }
 
 impl CuroboGrid {
-    /// The samples in cuRobo's order, with the sign of that version.
+    /// The samples in the order and with the sign of a version.
     pub fn of(field: &Filled<3>, version: CuroboVersion) -> Self {
         let Grid { lattice, shape } = field.grid;
         let mut values = c_order(&field.values, shape);
@@ -149,7 +148,7 @@ impl CuroboGrid {
         Self { shape, dims, pose, voxel_size: lattice.resolution, values }
     }
 
-    /// The samples as `f16` bits, cuRobo's own precision: right to 0.5 mm up to 2 m, 0.06 mm up to 0.25 m.
+    /// The samples as `f16` bits, the precision of cuRobo: errors up to 0.5 mm at 2 m, 0.06 mm at 0.25 m.
     pub fn half(&self) -> Vec<u16> {
         self.values.iter().map(|&d| f16_from_f32(d)).collect()
     }

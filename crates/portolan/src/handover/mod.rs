@@ -1,20 +1,19 @@
-//! Distance fields as the arrays that planners, optimisers and costmaps take.
+//! Distance fields as arrays in the layouts of planners, optimizers and costmaps.
 //!
-//! A field here is samples at the centres of the cells of a grid: metres, positive in free space, x fastest, NaN where
-//! nothing is known ([`crate::field::EsdfGrid`], [`crate::field::EsdfGrid`]). Consumers differ in each of these, and most
-//! of them have no word for unknown: what it shall mean is decided first ([`Filled`]), by the caller and not here; then
-//! the layout.
+//! A field here is an array of samples at the cell centers of a grid: meters, positive in free space, x fastest, NaN where
+//! unknown ([`crate::field::DenseEsdf`], [`crate::field::Esdf`]). Consumers differ in each of these, and most of them have
+//! no value for unknown: the caller first decides what unknown cells become ([`Filled`]), then the layout.
 //!
-//! | consumer | array | sign | where a sample sits | beyond the array | here |
+//! | consumer | array | sign | position of samples | beyond the array | here |
 //! |---|---|---|---|---|---|
-//! | GPMP2 `SignedDistanceField`, `PlanarSDF` | a matrix per z, row = y, column = x, `f64` | + outside | at `origin + index * cell`: the origin is the *centre* of cell 0 | throws; its factors make that no cost (optimistic) | [`Gpmp2Field`] |
-//! | CasADi, acados `interpolant` | vectors of knots, values with the first axis fastest (Fortran) | any, here + outside | at the knots: the centres | goes on as the last cells do | [`KnotGrid`] |
+//! | GPMP2 `SignedDistanceField`, `PlanarSDF` | a matrix per z, row = y, column = x, `f64` | + outside | at `origin + index * cell`: the origin is the *centre* of cell 0 | throws; its factors treat that as no cost (optimistic) | [`Gpmp2Field`] |
+//! | CasADi, acados `interpolant` | vectors of knots, values with the first axis fastest (Fortran) | any, here + outside | at the knots: the centers | extrapolates the last cells | [`KnotGrid`] |
 //! | cuRobo 0.8 `VoxelGrid` | x slowest (C), `f16` | + outside | at centres, the box `n * voxel` long about its pose | `max_dist`: free (optimistic) | [`CuroboGrid`] |
 //! | cuRobo up to 0.7 | x slowest (C), `f16` or `f32` | **+ inside** | at the ends too: the box is `(n - 1) * voxel` long | free (optimistic) | [`CuroboGrid`] |
 //! | numpy, C or Fortran | any | + outside | at centres | | [`c_order`] |
 //! | Nav2 costmap | a byte, row = y, column = x | cost, not distance | at centres | | [`Inflation`] |
 //!
-//! What unknown becomes: see [`Filled`]; in a costmap it is a value of its own, 255.
+//! A costmap has a value for unknown, 255; for the others see [`Filled`].
 //!
 //! ```
 //! use portolan::field::UnknownSpace;

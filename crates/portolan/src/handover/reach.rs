@@ -1,4 +1,4 @@
-//! Distances to sets of cells, and values that spread into what is unknown.
+//! Distances to sets of cells, and extension of values into unknown cells.
 
 use crate::geom::Grid;
 
@@ -11,7 +11,7 @@ pub(super) fn distance_to_boxes<const D: usize>(
     reach: f64,
 ) -> Vec<f32> {
     let cells: usize = shape.iter().product();
-    // A reach beyond the array's diagonal says no more than one at it, and its square stays finite.
+    // A reach beyond the diagonal of the array has the same result as the diagonal, whose square is finite.
     let most = reach.min(shape.iter().map(|&n| n as f64).sum::<f64>());
     let most_sq = (most * most) as f32;
     let mut sq: Vec<f32> = (0..cells).map(|i| if in_set(i) { 0.0 } else { most_sq }).collect();
@@ -46,10 +46,10 @@ pub(super) fn distance_to_boxes<const D: usize>(
     sq.iter().map(|v| if *v < most_sq { v.sqrt() } else { reach as f32 }).collect()
 }
 
-/// Gives every NaN the smallest sum of a neighbour's value and the way from there (metres), no more than `most`: sweeps
-/// forward and backward until nothing changes (Rosenfeld & Pfaltz 1966, with Euclidean steps).
+/// Replaces every NaN by the least sum of a neighbor's value and the distance to it (meters), at most `most`: sweeps forward
+/// and backward until nothing changes (Rosenfeld & Pfaltz 1966, with Euclidean steps).
 pub(super) fn extended<const D: usize>(values: &mut [f32], grid: &Grid<D>, most: f32) {
-    // Half of the 3^D - 1 neighbours: those that lie before a cell in memory.
+    // Half of the 3^D - 1 neighbors: those before a cell in memory.
     let before: Vec<([i32; D], f32)> = (0..3usize.pow(D as u32) / 2)
         .map(|code| {
             let offset: [i32; D] = std::array::from_fn(|k| (code / 3usize.pow(k as u32) % 3) as i32 - 1);
@@ -61,16 +61,16 @@ pub(super) fn extended<const D: usize>(values: &mut [f32], grid: &Grid<D>, most:
     unknown.iter().for_each(|&i| values[i] = most);
     let mut settle = |i: usize, side: i32| {
         let cell = grid.cell(i);
-        let neighbours = before.iter().filter_map(|(offset, step)| {
+        let neighbors = before.iter().filter_map(|(offset, step)| {
             let at = grid.index(std::array::from_fn(|k| cell[k] + side * offset[k]))?;
             Some(values[at] + step)
         });
-        let best = neighbours.fold(values[i], f32::min);
+        let best = neighbors.fold(values[i], f32::min);
         let lower = best < values[i];
         values[i] = best;
         lower
     };
-    // Two sweeps do for what is convex; winding corridors of unknown take a few more.
+    // Two sweeps suffice for convex unknown regions; winding ones take a few more.
     for _ in 0..8 {
         let forward = unknown.iter().fold(false, |any, &i| settle(i, 1) | any);
         let backward = unknown.iter().rev().fold(false, |any, &i| settle(i, -1) | any);

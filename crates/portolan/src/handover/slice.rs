@@ -1,21 +1,21 @@
-//! A field of space seen by something that moves in the plane.
+//! The 2-D field of a height range of a 3-D field.
 
 use super::HandoverError;
 use super::fill::check_length;
 use crate::field::UnknownSpace;
 use crate::geom::Grid;
 
-/// The lowest distance of every column between two heights (metres): a function of the plane that is negative where
-/// there is an obstacle at any of these heights. Cells count whose centre lies in `[low, high]`.
+/// The least distance of every column between two heights (meters): a 2-D array that is negative where there is an
+/// obstacle at any of these heights. Cells with their center in `[low, high]` count.
 ///
-/// It is a distance to what is below and above as well (the floor), so that only its zeros are obstacles of the plane:
-/// make a field of them again for distances in the plane.
+/// The values are also distances to surfaces below and above, such as the floor; only their sign is meaningful in 2-D.
+/// For 2-D distances compute a distance field of it.
 ///
-/// NaN where nothing is known: with [`UnknownSpace::Optimistic`] where no cell of the column is known, with
-/// [`UnknownSpace::Pessimistic`] where one is not known and no other one is in an obstacle.
+/// NaN where unknown: with [`UnknownSpace::Optimistic`] where all cells of the column are unknown, with
+/// [`UnknownSpace::Pessimistic`] where one is unknown and none lies in an obstacle.
 ///
 /// # Errors
-/// Where the number of samples is not that of the grid, or no centre lies between the heights.
+/// Where the number of samples is not that of the grid, or no cell center lies between the heights.
 pub fn lowest_between(
     grid: &Grid<3>,
     distances: &[f32],
@@ -34,7 +34,7 @@ pub fn lowest_between(
         let (low, high) =
             (grid.lattice.origin[2], grid.lattice.origin[2] + nz as f64 * grid.lattice.resolution);
         let value = if heights[0] > high || !(heights[0] >= low) { heights[0] } else { heights[1] };
-        let advice = "no cell's centre lies between the heights; give a range that meets the map";
+        let advice = "no cell center lies between the heights; choose heights within the map";
         return Err(HandoverError::Setting { name: "the height range", value, advice });
     }
     let column = |i: usize| {

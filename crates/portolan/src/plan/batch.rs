@@ -1,12 +1,12 @@
-//! Many poses, many motions, on all cores.
+//! Checks of many poses or motions, on all cores.
 
 use super::{Body, BodyCheck, Demand, Motion, MotionCheck, check_motion, check_pose};
 use crate::field::ClearanceField;
 use crate::geom::Pose;
 use crate::parallel;
 
-/// [`check_pose`] of many poses (world from body), in their order. On all cores with the feature `parallel`: the same
-/// answers.
+/// [`check_pose`] of many poses (world from body), in their order. Runs on all cores with the feature `parallel`; results
+/// do not depend on it.
 ///
 /// ```
 /// use portolan::geom::Pose;
@@ -24,7 +24,7 @@ use crate::parallel;
 /// #     fn resolution(&self) -> f64 { 0.05 }
 /// # }
 /// # let field = &Wall;
-/// // A field that knows of a wall at x = 4 m.
+/// // A field with a wall at x = 4 m.
 /// let robot = Body::of(&[([0.0, 0.0], 0.3)])?;
 /// let poses: Vec<_> = (0..5).map(|i| Pose::<2>::new(f64::from(i), 0.0, 0.0)).collect();
 /// let free: Vec<_> = check_poses(field, &robot, &poses, &Demand::new(0.1)).iter().map(|c| c.is_free()).collect();
@@ -40,8 +40,8 @@ pub fn check_poses<const D: usize>(
     parallel::map(poses, 64, |pose| check_pose(field, body, pose, demand))
 }
 
-/// [`check_motion`] of many motions, in their order: the edges of a roadmap. On all cores with the feature `parallel`: the
-/// same answers.
+/// [`check_motion`] of many motions, in their order, such as the edges of a roadmap. Runs on all cores with the feature
+/// `parallel`; results do not depend on it.
 pub fn check_motions<const D: usize>(
     field: &(impl ClearanceField<D> + ?Sized),
     body: &Body<D>,

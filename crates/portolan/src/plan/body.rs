@@ -1,25 +1,25 @@
-//! Robots as spheres that move together.
+//! A robot as a rigid set of spheres.
 
 use super::PlanError;
 use crate::geom::vector::{along, distance};
 
-/// A ball of a body; in the plane a disc.
+/// A sphere of a body; in 2-D a disc.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere<const D: usize> {
-    /// In the body's frame (metres).
+    /// Center in the frame of the body (meters).
     pub center: [f64; D],
-    /// Metres; 0: a point.
+    /// Radius (meters); 0 for a point.
     pub radius: f64,
 }
 
-/// A robot: spheres in its own frame. It is free where all of them are.
+/// A rigid robot as a union of spheres in its own frame. It is free at a pose where all spheres are free.
 ///
 /// ```
 /// use portolan::plan::Body;
 ///
 /// // A round robot with a bumper.
 /// let robot = Body::of(&[([0.0, 0.0], 0.2), ([0.15, 0.0], 0.12)])?;
-/// // An arm of 60 cm, 5 cm thick, by spheres that stick out by 5 mm at most.
+/// // A capsule, 60 cm long with a radius of 5 cm, covered by spheres that extend it by 5 mm at most.
 /// let arm = Body::default().with_capsule([0.0, 0.0, 0.2], [0.6, 0.0, 0.2], 0.05, 0.005)?;
 /// assert_eq!((robot.spheres().len(), arm.spheres().len()), (2, 15));
 /// # Ok::<(), portolan::plan::PlanError>(())
@@ -29,14 +29,14 @@ pub struct Body<const D: usize> {
     spheres: Vec<Sphere<D>>,
 }
 
-/// Spheres of a body, at most.
+/// Largest number of spheres of a body.
 const MOST: usize = 100_000;
 
 impl<const D: usize> Body<D> {
-    /// Spheres of these centres (in the body's frame) and radii, all in metres.
+    /// A body of spheres with these centers (frame of the body) and radii (meters).
     ///
     /// # Errors
-    /// [`PlanError::Empty`] without a sphere, and as [`Body::with_sphere`].
+    /// [`PlanError::Empty`] without spheres, and as [`Body::with_sphere`].
     pub fn of(spheres: &[([f64; D], f64)]) -> Result<Self, PlanError> {
         if spheres.is_empty() {
             return Err(PlanError::Empty("a body"));
@@ -44,11 +44,11 @@ impl<const D: usize> Body<D> {
         spheres.iter().try_fold(Self::default(), |body, &(center, radius)| body.with_sphere(center, radius))
     }
 
-    /// With one sphere more.
+    /// The body with another sphere.
     ///
     /// # Errors
-    /// [`PlanError::NotFinite`] where its centre is not, [`PlanError::Range`] where its radius is negative or not finite,
-    /// [`PlanError::TooMany`] beyond a hundred thousand.
+    /// [`PlanError::NotFinite`] for a center that is not finite, [`PlanError::Range`] for a radius that is negative or
+    /// not finite, [`PlanError::TooMany`] beyond 100,000 spheres.
     pub fn with_sphere(mut self, center: [f64; D], radius: f64) -> Result<Self, PlanError> {
         if !center.iter().all(|v| v.is_finite()) {
             return Err(PlanError::NotFinite { what: "sphere", index: self.spheres.len() });
@@ -64,12 +64,11 @@ impl<const D: usize> Body<D> {
         Ok(self)
     }
 
-    /// With a capsule: everything within `radius` of the segment from `a` to `b` (the body's frame, metres).
+    /// The body with a capsule: all points within `radius` of the segment from `a` to `b` (frame of the body, meters).
     ///
-    /// It is covered by equal spheres along the segment: with centres `h` apart, a point of the capsule is no further
-    /// than `h / 2` along and `radius` across from the next centre, so spheres of `sqrt(radius^2 + h^2 / 4)` hold all of
-    /// it. `h` is chosen so that they are larger than the capsule's radius by no more than `excess` (metres): nothing of
-    /// the capsule is left out, and no space is called occupied further than `excess` from it.
+    /// The capsule is covered by equal spheres along the segment: with centers `h` apart, each of its points is at most
+    /// `h / 2` along and `radius` across from the nearest center, so spheres of radius `sqrt(radius^2 + h^2 / 4)` contain
+    /// it. `h` is chosen so that this radius exceeds that of the capsule by at most `excess` (meters).
     ///
     /// # Errors
     /// As [`Body::with_sphere`]; [`PlanError::Range`] where `excess` is not positive.
@@ -95,13 +94,13 @@ impl<const D: usize> Body<D> {
         let half = if gaps > 0 { 0.5 * length / gaps as f64 } else { 0.0 };
         let ab = std::array::from_fn(|k| b[k] - a[k]);
         (0..=gaps).try_fold(self, |body, i| {
-            // A touch more than the root, which is rounded.
+            // Slightly more than the root, which is rounded.
             let covering = radius.hypot(half) * (1.0 + 4.0 * f64::EPSILON);
             body.with_sphere(along(a, ab, i as f64 / gaps.max(1) as f64), covering)
         })
     }
 
-    /// The spheres, in the order in which they were given.
+    /// The spheres, in the order in which they were added.
     pub fn spheres(&self) -> &[Sphere<D>] {
         &self.spheres
     }

@@ -1,21 +1,21 @@
-//! Anything that moves at a known speed at most.
+//! Curves with a bounded speed.
 
 use super::PlanError;
 
-/// A curve that knows how far it goes: what a path check needs of a path.
+/// A curve with bounds of its arc length: what a path check needs of a path.
 pub trait Curve<const D: usize> {
-    /// The parameter at which it ends; it begins at 0. Finite, not negative.
+    /// The parameter of its end; that of its start is 0. Finite, not negative.
     fn end(&self) -> f64;
 
     /// The point (world) at a parameter from 0 to [`Curve::end`].
     fn point(&self, t: f64) -> [f64; D];
 
-    /// A parameter beyond `t`, up to which the curve is no longer than `length` (metres, positive); the end at most. The
-    /// further, the fewer steps; further than is true, and paths are certified that are not free.
+    /// A parameter beyond `t`, at most [`Curve::end`], such that the curve from `t` to there is no longer than `length`
+    /// (meters, positive). A larger parameter makes for fewer steps; one that is too large makes certificates false.
     fn advance(&self, t: f64, length: f64) -> f64;
 }
 
-/// A function of a parameter, with a promise about its speed.
+/// A function of a parameter with a given bound of its speed.
 ///
 /// ```
 /// use portolan::plan::{Curve, SpeedLimited};
@@ -36,8 +36,8 @@ pub struct SpeedLimited<F> {
 }
 
 impl<F> SpeedLimited<F> {
-    /// The curve `at(t)` for `t` from 0 to `end`, which moves no more than `speed` metres per unit of `t`, anywhere.
-    /// Nobody checks the promise: what is certified holds if it does.
+    /// The curve `at(t)` for `t` from 0 to `end`, which nowhere moves faster than `speed` meters per unit of `t`.
+    /// The bound is not verified; certificates hold only if it does.
     ///
     /// # Errors
     /// [`PlanError::Range`] where `end` or `speed` is negative or not finite.
@@ -68,7 +68,7 @@ impl<const D: usize, F: Fn(f64) -> [f64; D]> Curve<D> for SpeedLimited<F> {
     }
 }
 
-/// How far a constant speed comes; one that does not move is at its end.
+/// The parameter after `length` at a constant speed; the end at speed 0.
 pub(super) fn at_speed(t: f64, length: f64, speed: f64, end: f64) -> f64 {
     if speed > 0.0 { (t + length / speed).min(end) } else { end }
 }

@@ -1,36 +1,37 @@
-//! What is demanded of a place, and what a field says to it.
+//! The clearance demanded of a point, and the verdict of a field about it.
 
 use crate::answer::Answer;
 use crate::field::{Clearance, ClearanceField, UnknownSpace};
 
-/// How far from everything a place must be, and what counts as everything.
+/// The clearance that a check demands, what counts as an obstacle, and the limits of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// Least clearance (metres). Negative or NaN: nothing is certified.
+    /// Least clearance (meters). With a negative value or NaN nothing is certified.
     pub clearance: f64,
     /// Whether unknown space is an obstacle.
     pub unknown: UnknownSpace,
-    /// Paths are certified in steps no shorter than this (metres): where less than `clearance + tolerance` is certified, a
-    /// path is refused, at worst as undecided. A thousandth of a cell where it is smaller.
+    /// Shortest step along a path (meters): a path is refused, possibly as [`Cause::Undecided`], where the certified
+    /// clearance is below `clearance + tolerance`. At least a thousandth of a cell is used.
     pub tolerance: f64,
-    /// A check of one path or one motion of one sphere gives up after so many questions to the field, and says undecided.
+    /// Largest number of queries to the field for one path, or for one sphere in one motion; beyond it the result is
+    /// [`Cause::Undecided`].
     pub max_queries: usize,
 }
 
 impl Demand {
-    /// This clearance (metres), unknown space an obstacle; steps of at least 1 mm, up to a million of them.
+    /// This clearance (meters), unknown space an obstacle, a tolerance of 1 mm, at most a million queries.
     pub fn new(clearance: f64) -> Self {
         Self { clearance, unknown: UnknownSpace::Pessimistic, tolerance: 1e-3, max_queries: 1_000_000 }
     }
 
-    /// The same about unknown space that is no obstacle.
+    /// The same demand, with unknown space as free ([`UnknownSpace::Optimistic`]).
     pub fn optimistic(self) -> Self {
         Self { unknown: UnknownSpace::Optimistic, ..self }
     }
 
-    /// The same with this much more clearance (metres): for a sphere of this radius.
+    /// The demand of the center of a sphere of this radius (meters).
     pub(super) fn beyond(&self, radius: f64) -> Self {
-        // A demand that certifies nothing must not become one that does.
+        // A negative demand, which certifies nothing, must stay negative.
         let clearance = if self.clearance >= 0.0 { self.clearance + radius } else { f64::NAN };
         Self { clearance, ..*self }
     }
@@ -40,7 +41,7 @@ impl Demand {
         self.tolerance.max(1e-3 * field.resolution()).max(1e-9)
     }
 
-    /// What the field says of a point, as exactly as it can.
+    /// The verdict about a point, from bounds as tight as the field has.
     pub(super) fn at<const D: usize>(
         &self,
         field: &(impl ClearanceField<D> + ?Sized),
@@ -49,7 +50,7 @@ impl Demand {
         self.judge(field, p_world, || field.clearance(p_world, self.unknown))
     }
 
-    /// What the field says of a point, where only the verdict counts: bounds may be wider.
+    /// The verdict about a point, from bounds that may be wider.
     pub(super) fn met_at<const D: usize>(
         &self,
         field: &(impl ClearanceField<D> + ?Sized),
@@ -92,14 +93,14 @@ impl Demand {
             return Verdict::Free(found);
         }
         if found.upper < self.clearance {
-            // The distance changes by no more than one goes.
+            // The distance is 1-Lipschitz.
             let cause = self.near_what(field, p_world);
             return Verdict::Refused { cause, reach: self.clearance - found.upper };
         }
         Verdict::Refused { cause: Cause::Undecided, reach: 0.0 }
     }
 
-    /// Which of the two obstacles is too near. A second question, of refused places alone.
+    /// Which of the two kinds of obstacle is too near. A second query, for refused points alone.
     fn near_what<const D: usize>(
         &self,
         field: &(impl ClearanceField<D> + ?Sized),
@@ -115,27 +116,27 @@ impl Demand {
     }
 }
 
-/// Why a place is not certified.
+/// Why a point is not certified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
-    /// A surface is nearer than demanded, or the place is inside of one.
+    /// The surface is nearer than demanded, or the point lies behind it.
     TooNear,
-    /// It lies in unknown space; with [`UnknownSpace::Pessimistic`] also: nearer to it than demanded.
+    /// The point lies in unknown space, or, with [`UnknownSpace::Pessimistic`], nearer to it than demanded.
     Unknown,
-    /// It lies outside of the map, or is no place at all (NaN).
+    /// The point lies outside the map, or has a coordinate that is NaN.
     Outside,
-    /// What the field knows lies on both sides of what is demanded: within the tolerance of the limit, or further than
-    /// the field maintains distances; or the check gave up.
+    /// The demand lies between the bounds of the field: the clearance is within the tolerance of it, the field maintains
+    /// distances only up to less than it, or the check reached [`Demand::max_queries`].
     Undecided,
 }
 
-/// What a field says of one point.
+/// The verdict of a field about one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Verdict {
     Free(Clearance),
     Refused {
         cause: Cause,
-        /// Nothing within this distance (metres) can be certified either.
+        /// Nothing within this distance (meters) can be certified either.
         reach: f64,
     },
 }

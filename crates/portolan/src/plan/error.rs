@@ -1,36 +1,36 @@
-//! What is wrong with a path or a body before any map is asked.
+//! Errors in paths, bodies and settings.
 
-/// A path, a body or a setting that makes no sense.
+/// Why a path, a body or a setting was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// A path without a point, a body without a sphere.
+    /// A path without points or a body without spheres.
     #[error("{0} is empty")]
     Empty(&'static str),
-    /// A coordinate is NaN or infinite, or so large that lengths are.
-    #[error("{what} {index} is not finite, or lengths are not")]
+    /// A coordinate is NaN or infinite, or so large that a length overflows.
+    #[error("{what} {index} has a coordinate or a length that is not finite")]
     NotFinite {
-        /// What it belongs to.
+        /// Point, piece or sphere.
         what: &'static str,
-        /// The how-manieth.
+        /// Its index, from 0.
         index: usize,
     },
-    /// A number outside of its range.
+    /// A number is outside its range.
     #[error("{what} is {value}: it must be {must}")]
     Range {
-        /// Which number.
+        /// The name of the number.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         value: f64,
-        /// What it must be.
+        /// The range allowed.
         must: &'static str,
     },
-    /// More pieces than anyone needs.
+    /// The result would have too many pieces.
     #[error("{what} would take more than {limit} pieces")]
     TooMany {
-        /// What would.
+        /// The thing in question.
         what: &'static str,
-        /// As many are allowed.
+        /// The largest number allowed.
         limit: usize,
     },
 }

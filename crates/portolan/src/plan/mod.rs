@@ -1,10 +1,10 @@
-//! What a planner asks of a field that certifies clearance: is this path free, this body at this pose, this motion; and
-//! where is the nearest place that is.
+//! Certified collision checks for planners: of a path, of a body at a pose, of a motion; and the search for the nearest
+//! free point or pose.
 //!
-//! Everything here rests on [`ClearanceField`](crate::field::ClearanceField) alone: a place is *certified* where the
-//! lower bound of its clearance is as large as demanded, and a path where every point of it is. What is not certified is
-//! refused with its [`Cause`], and never passed over: a check says where and why. Distances are those to the surface that
-//! the map extracts; what the map gets wrong is not seen here.
+//! Everything here uses [`ClearanceField`](crate::field::ClearanceField) alone: a point is *certified* where the lower
+//! bound of its clearance is at least the demand, a path where all its points are. Whatever is not certified is refused,
+//! with the place and the [`Cause`]. Distances are those to the surface extracted from the map: errors of the map are not
+//! covered by a certificate.
 
 mod batch;
 mod body;

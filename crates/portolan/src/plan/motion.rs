@@ -1,4 +1,4 @@
-//! A body that moves from one pose to another.
+//! The straight motion of a body from one pose to another, and its check.
 
 use super::demand::{Cause, Demand};
 use super::path::Walk;
@@ -8,8 +8,8 @@ use crate::field::ClearanceField;
 use crate::geom::Pose;
 use crate::geom::vector::{along, distance, norm, sub};
 
-/// The straight motion between two poses: the body's zero along a line, its rotation about one axis, both at constant
-/// speed. The shorter way around; half a turn goes either way.
+/// The straight motion between two poses: the origin of the body moves along a line while the body turns about one axis,
+/// both at constant speed. It turns the shorter way; at half a turn either way.
 ///
 /// ```
 /// use portolan::geom::Pose;
@@ -38,17 +38,17 @@ impl<const D: usize> Motion<D> {
         Self { from, to, angle, turn }
     }
 
-    /// Where it starts.
+    /// The first pose.
     pub fn start(&self) -> &Pose<D> {
         &self.from
     }
 
-    /// Where it ends.
+    /// The last pose.
     pub fn goal(&self) -> &Pose<D> {
         &self.to
     }
 
-    /// The pose at a share `u` of the way, 0 to 1. By Rodrigues' formula, in the plane too:
+    /// The pose at the fraction `u` of the motion, 0 to 1. By Rodrigues' formula, also in 2-D:
     /// `R(u) = R0 (I + sin(u a) K + (1 - cos(u a)) K^2)`.
     pub fn pose(&self, u: f64) -> Pose<D> {
         let (sin, cos) = (u * self.angle).sin_cos();
@@ -64,8 +64,8 @@ impl<const D: usize> Motion<D> {
         Pose { translation: along(self.from.translation, offset_world, u), ..rotated }
     }
 
-    /// No point at this place of the body (its frame) moves further than this in all (metres): the way of the body's zero,
-    /// and an arc about the axis.
+    /// A bound of the path length (meters) of a point of the body (frame of the body): the path of the body's origin plus
+    /// an arc about the axis.
     pub fn length_of(&self, p_body: [f64; D]) -> f64 {
         let arm: [f64; D] = std::array::from_fn(|i| (0..D).map(|j| self.turn[i][j] * p_body[j]).sum());
         distance(self.from.translation, self.to.translation) + self.angle * norm(arm)
@@ -81,7 +81,7 @@ fn angle_and_turn<const D: usize>(m: &[[f64; D]; D]) -> (f64, [[f64; D]; D]) {
     let cos = 0.5 * (trace - (D as f64 - 2.0));
     let angle = sin.atan2(cos);
     if cos > -0.5 {
-        // Without a turn any axis does, and none is the safest.
+        // Without a rotation the axis is arbitrary: zero.
         let inverse = if sin > 0.0 { 1.0 / sin } else { 0.0 };
         turn.as_flattened_mut().iter_mut().for_each(|v| *v *= inverse);
         return (angle, turn);
@@ -97,7 +97,7 @@ fn angle_and_turn<const D: usize>(m: &[[f64; D]; D]) -> (f64, [[f64; D]; D]) {
         |i: usize, j: usize| (0.5 * (m[i][j] + m[j][i]) - if i == j { cos } else { 0.0 }) / (1.0 - cos);
     let largest = (0..D).fold(0, |best, k| if outer(k, k) > outer(best, best) { k } else { best });
     let n: [f64; D] = std::array::from_fn(|k| outer(k, largest));
-    // The skew part knows which way around.
+    // The skew part has the sign of the rotation.
     let skew = |k: usize| turn[(k + 2) % D][(k + 1) % D];
     let way: f64 = (0..D).map(|k| n[k] * skew(k)).sum();
     let scale = sign_of(way) / norm(n);
@@ -108,7 +108,7 @@ fn angle_and_turn<const D: usize>(m: &[[f64; D]; D]) -> (f64, [[f64; D]; D]) {
     (angle, unit)
 }
 
-/// One point of a body on its way; its parameter is the share of the motion.
+/// The path of one point of a body; its parameter is the fraction of the motion.
 struct Carried<'a, const D: usize> {
     motion: &'a Motion<D>,
     p_body: [f64; D],
@@ -129,32 +129,32 @@ impl<const D: usize> Curve<D> for Carried<'_, D> {
     }
 }
 
-/// What a check of a motion found.
+/// The result of [`check_motion`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionCheck {
-    /// The whole motion keeps what was demanded.
+    /// The whole motion has the clearance demanded.
     Free(BodyClearance),
-    /// Not all of it does, as far as the field knows.
+    /// A part of the motion is not certified.
     Refused {
-        /// Shares of the motion, 0 to 1: it is certified up to the first, and the sphere that ends it is not from there up
-        /// to the second.
+        /// Fractions of the motion, 0 to 1: up to the first the body is certified; from the first to the second the sphere
+        /// below is not.
         from_to: [f64; 2],
-        /// The sphere that ends it first.
+        /// Index of the sphere that is refused first.
         sphere: usize,
-        /// Why.
+        /// Why it is refused.
         cause: Cause,
     },
 }
 
 impl MotionCheck {
-    /// Whether the whole motion is certified to be free.
+    /// Whether the whole motion is certified.
     pub fn is_free(&self) -> bool {
         matches!(self, Self::Free(_))
     }
 }
 
-/// Checks all poses of a motion: every sphere is followed by certified steps, as a path is by
-/// [`check_path`](super::check_path); how far it moves at most is [`Motion::length_of`] its centre.
+/// Checks all poses of a motion: the center of every sphere is followed in certified steps as by
+/// [`check_path`](super::check_path), with [`Motion::length_of`] as the bound of its path length.
 ///
 /// ```
 /// use portolan::geom::Pose;
@@ -172,7 +172,7 @@ impl MotionCheck {
 /// #     fn resolution(&self) -> f64 { 0.05 }
 /// # }
 /// # let field = &Wall;
-/// // A field that knows of a wall at x = 4 m; a robot whose nose swings over it: free before and after, but not between.
+/// // A field with a wall at x = 4 m; the front of the robot swings through it: free at both ends, but not in between.
 /// let robot = Body::of(&[([0.0, 0.0], 0.3), ([0.5, 0.0], 0.1)])?;
 /// let swing = Motion::new(Pose::<2>::new(3.5, 0.0, 1.5), Pose::<2>::new(3.5, 0.0, -1.5));
 /// let MotionCheck::Refused { from_to: [from, to], sphere, cause } = check_motion(field, &robot, &swing, &Demand::new(0.05))
@@ -192,11 +192,11 @@ pub fn check_motion<const D: usize>(
     for (sphere, s) in body.spheres().iter().enumerate() {
         let path = Carried { motion, p_body: s.center, length: motion.length_of(s.center) };
         let demand = demand.beyond(s.radius);
-        // Of the others only the part before the first refusal matters.
+        // For the other spheres only the part before the first refusal matters.
         let mut walk = Walk { field, path: &path, demand: &demand, end, queries: demand.max_queries };
         match walk.free() {
             Ok(found) => free.include(sphere, found.lower - s.radius, found.upper - s.radius),
-            // At the same place the sphere that was found first stays.
+            // Of two spheres refused at the same place the first one is reported.
             Err(stop) if first.is_none() || stop.at < end => {
                 walk.end = 1.0;
                 first = Some((sphere, walk.violation(stop)));
@@ -220,7 +220,7 @@ mod tests {
     use crate::plan::{Demand, check_motions, check_pose, check_poses};
     use proptest::prelude::*;
 
-    /// Poses of the plane turn by the first number, those of space as a quaternion.
+    /// 2-D poses turn by the first number, 3-D poses by a quaternion.
     fn pose<const D: usize>(t: [f64; 3], q: [f64; 4]) -> Pose<D> {
         let rotation: [[f64; D]; D] = if D == 2 {
             let flat = Pose::<2>::new(0.0, 0.0, 7.0 * q[0]).rotation;
@@ -347,7 +347,7 @@ mod tests {
             panic!("a ball is in the way")
         };
         assert_eq!((sphere, cause), (1, Cause::TooNear));
-        // The nose meets the ball after one metre and leaves it after 2.2, beyond the end.
+        // The nose meets the ball after one meter and leaves it after 2.2, beyond the end.
         assert!((from_to[0] - 0.5).abs() < 1e-3 && from_to[1] == 1.0, "{from_to:?}");
         let at = check_pose(&scene, &body, drive.goal(), &Demand::new(0.0));
         assert_eq!(at, crate::plan::BodyCheck::Refused { sphere: 0, cause: Cause::TooNear });

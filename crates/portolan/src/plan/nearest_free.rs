@@ -1,4 +1,4 @@
-//! The nearest place that is free, for a start that is not.
+//! The search for the nearest free point or pose, for a start in collision.
 
 use super::demand::{Demand, Verdict};
 use super::{Body, check_pose};
@@ -6,44 +6,44 @@ use crate::field::ClearanceField;
 use crate::geom::Pose;
 use crate::geom::vector::{add, norm, scale};
 
-/// How far and how long to look.
+/// Limits of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchLimits {
-    /// No further than this (metres).
+    /// Largest distance from the start (meters).
     pub radius: f64,
-    /// No more than so many places.
-    pub most: usize,
+    /// Largest number of points checked.
+    pub max_points: usize,
 }
 
 impl Default for SearchLimits {
-    /// Two metres, a million places.
+    /// 2 m, a million points.
     fn default() -> Self {
-        Self { radius: 2.0, most: 1_000_000 }
+        Self { radius: 2.0, max_points: 1_000_000 }
     }
 }
 
-/// Where the nearest free place is.
+/// The result of [`nearest_free`] and [`nearest_free_pose`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NearestFree<const D: usize> {
-    /// The place asked about is free itself.
+    /// The start is free.
     Here,
-    /// Here (world).
+    /// A free point was found.
     At {
         /// The free place: of a point itself, of a body the position of its zero.
         point: [f64; D],
-        /// From the place asked about (metres).
+        /// From the place asked about (meters).
         distance: f64,
     },
-    /// There is none on the search's lattice within this distance (metres), which is less than was asked for where there
-    /// were too many places; 0 where the place asked about is none (NaN).
+    /// All points of the search lattice within this distance (meters) are refused. Less than [`SearchLimits::radius`] where
+    /// [`SearchLimits::max_points`] was reached; 0 for a start that is not finite.
     NoneWithin(f64),
 }
 
-/// The nearest point with the demanded clearance certified, for a start in collision.
+/// The nearest point at which the demanded clearance is certified, for a start in collision.
 ///
-/// Looks at the points of a lattice about `p_world` with the field's resolution, from near to far, and goes back from the
-/// first that is free towards the start as far as that stays free. So no point of the lattice is nearer; between its points
-/// a free pocket smaller than a cell may be missed. O(cells of the ball up to the result), at most `limits.most`.
+/// Checks the points of a lattice around `p_world` with the resolution of the field, from near to far, and moves the first
+/// free one toward the start by bisection while it stays free. No point of the lattice is nearer; a free pocket smaller
+/// than a cell may be missed between its points. O(cells of the ball up to the result), at most `limits.max_points`.
 ///
 /// ```
 /// use portolan::plan::{Demand, NearestFree, SearchLimits, nearest_free};
@@ -60,12 +60,12 @@ pub enum NearestFree<const D: usize> {
 /// #     fn resolution(&self) -> f64 { 0.05 }
 /// # }
 /// # let field = &Wall;
-/// // A field that knows of a wall at x = 4 m.
+/// // A field with a wall at x = 4 m.
 /// let (demand, limits) = (Demand::new(0.3), SearchLimits::default());
 /// assert_eq!(nearest_free(field, [3.0, 1.0], &demand, &limits), NearestFree::Here);
 /// let NearestFree::At { point, distance } = nearest_free(field, [3.9, 1.0], &demand, &limits) else { panic!("a way back") };
 /// assert!(point[0] <= 3.7 && distance < 0.201);
-/// // In space, from inside of the wall.
+/// // In 3-D, from inside the wall.
 /// let NearestFree::At { point, .. } = nearest_free(field, [4.1, 1.0, 2.0], &demand, &limits) else { panic!("a way back") };
 /// assert!(point[0] <= 3.7 && point[0] > 3.69);
 /// ```
@@ -85,8 +85,8 @@ pub fn nearest_free<const D: usize>(
     })
 }
 
-/// The nearest position of a body, turned as it is, at which all of it is certified to be free. As [`nearest_free`], with a
-/// [`check_pose`] at every place.
+/// The nearest position of a body at which it is certified to be free, with its orientation unchanged. As [`nearest_free`],
+/// with [`check_pose`] at every point.
 pub fn nearest_free_pose<const D: usize>(
     field: &(impl ClearanceField<D> + ?Sized),
     body: &Body<D>,
@@ -103,7 +103,7 @@ pub fn nearest_free_pose<const D: usize>(
     search(field.resolution(), world_from_body.translation, 0.0, limits, free)
 }
 
-/// Places of a search, whatever the limits say: what one shell of them may take of the memory.
+/// Largest number of points of a search, above any limit of the caller: it bounds the memory of one shell.
 const MOST: usize = 1 << 26;
 
 fn search<const D: usize>(
@@ -114,13 +114,13 @@ fn search<const D: usize>(
     free: impl Fn([f64; D]) -> bool,
 ) -> NearestFree<D> {
     let sane = start.iter().all(|v| v.is_finite()) && spacing > 0.0 && spacing.is_finite();
-    // Beyond this, squares of whole numbers are no longer whole; nobody comes so far.
+    // Beyond this the squares of integers are not exact in f64.
     let last = (limits.radius / spacing).min(1e6);
     if !sane || !(limits.radius >= 0.0) {
         return NearestFree::NoneWithin(0.0);
     }
     let first = (reach / spacing * (1.0 - 1e-9)).min(last) as i64;
-    let mut left = limits.most.min(MOST);
+    let mut left = limits.max_points.min(MOST);
     let mut shell: Vec<(i64, [i32; D])> = Vec::new();
     for from in first..=last as i64 {
         // Half open shells of one cell: nearer ones are done before farther ones begin.
@@ -180,7 +180,7 @@ fn offsets<const D: usize>(sq: [i64; 2], most: usize, found: &mut Vec<(i64, [i32
     axis(D - 1, &mut [0; D], 0, sq, most, found)
 }
 
-/// Twelve halvings of the way between what is not free and the free place found: to a five thousandth of it.
+/// Twelve bisections between a refused point and the free point found: to 1/4096 of their distance.
 fn go_back<const D: usize>(
     start: [f64; D],
     offset_world: [f64; D],
@@ -286,8 +286,9 @@ mod tests {
         let mut scene = Scene::<3>::empty();
         scene.hole = crate::geom::Aabb::new([-4.0; 3], [4.0; 3]);
         let demand = Demand::new(0.1);
-        let search =
-            |p: [f64; 3], radius, most| nearest_free(&scene, p, &demand, &SearchLimits { radius, most });
+        let search = |p: [f64; 3], radius, max_points| {
+            nearest_free(&scene, p, &demand, &SearchLimits { radius, max_points })
+        };
         let NearestFree::NoneWithin(searched) = search([0.0; 3], 1e9, 10_000) else {
             panic!("all is unknown")
         };

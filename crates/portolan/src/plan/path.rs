@@ -1,15 +1,15 @@
-//! Is a path free, all of it?
+//! The certified check of a path.
 
 use super::Curve;
 use super::demand::{Cause, Demand, Verdict};
 use crate::field::{Clearance, ClearanceField};
 
-/// What a check of a path found.
+/// The result of [`check_path`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathCheck {
-    /// Every point of the path keeps what was demanded.
+    /// Every point of the path has the clearance demanded.
     Certified(PathClearance),
-    /// Not all of it does, as far as the field knows.
+    /// A part of the path is not certified.
     Violated(PathViolation),
 }
 
@@ -20,43 +20,43 @@ impl PathCheck {
     }
 }
 
-/// The least clearance along a path, at least and at most (metres).
+/// Bounds of the least clearance along a path (meters).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathClearance {
-    /// No point of the path has less; at least what was demanded. Shorter steps, which a larger demand makes, narrow it.
+    /// Lower bound, at least the demand. A larger demand makes shorter steps and so a tighter bound.
     pub lower: f64,
-    /// Some point of the path has no more; infinite where nothing is near.
+    /// Upper bound; infinite where no obstacle is within the range of the field.
     pub upper: f64,
-    /// The parameter of that point: for [`Waypoints`](super::Waypoints) its arc length (metres).
+    /// The parameter of the point with the upper bound: for [`Waypoints`](super::Waypoints) its arc length (meters).
     pub at: f64,
 }
 
 /// The first part of a path that is not certified, in parameters of the curve: for [`Waypoints`](super::Waypoints) arc
-/// lengths (metres).
+/// lengths (meters).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathViolation {
-    /// The path is certified up to here; 0: not even its start.
+    /// The path is certified up to here; 0 where the start is not certified.
     pub from: f64,
-    /// The first place beyond that was looked at and is certified again; the end of the path where there is none.
+    /// The next parameter checked that is certified again, else the end of the path.
     pub to: f64,
-    /// The first cause on the way from `from` to `to` that decides: undecided only where all of it is.
+    /// The first cause between `from` and `to` other than [`Cause::Undecided`], which is given only where it is the only one.
     pub cause: Cause,
 }
 
-/// Checks every point of a path by conservative advancement *(Mirtich 1996, section 2.3)*: where a distance of `c` is
-/// certified and `m` demanded, the next `c - m` metres are free. Each step is as long as that, so the cost is one question
-/// to the field per step: few in the open, `1 / tolerance` a metre at most.
+/// Checks every point of a path by conservative advancement *(Mirtich 1996, section 2.3)*: from a point with certified
+/// clearance `c` under a demand `m`, the next `c - m` meters are free. That is the length of each step, with one query per
+/// step: few in open space, at most `1 / tolerance` per meter.
 ///
-/// Never certifies a path that comes nearer than demanded to the surface (or to unknown space where that is an obstacle),
-/// anywhere between the places looked at.
+/// A certified path has the demanded distance to the surface (and to unknown space where that is an obstacle) everywhere,
+/// also between the points queried.
 ///
 /// ```
 /// use portolan::field::{Esdf, EsdfSettings};
 /// use portolan::map::{Tsdf2, Tsdf2Config, Tsdf3, TsdfConfig};
 /// use portolan::plan::{Cause, Demand, PathCheck, Waypoints, check_path};
 ///
-/// // A wall at x = 4 m; the space before it was seen.
-/// let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [84, 60]), TsdfConfig::default())?;
+/// // A wall at x = 4 m; the space before it was observed.
+/// let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [84, 60], resolution: 0.05, ..Default::default() })?;
 /// for i in 0..tsdf.grid().len() {
 ///     let cell = tsdf.grid().cell(i);
 ///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
@@ -74,8 +74,8 @@ pub struct PathViolation {
 /// let PathCheck::Violated(first) = check_path(&field, &path, &Demand::new(0.3)) else { panic!("a wall") };
 /// assert!((first.from - 2.7).abs() < 5e-3 && first.cause == Cause::TooNear);
 ///
-/// // The same in space.
-/// let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; 3], 0.1, [44, 20, 20]), TsdfConfig::default())?;
+/// // The same in 3-D.
+/// let mut tsdf = Tsdf3::new(TsdfConfig { cells: [44, 20, 20], resolution: 0.1, ..Default::default() })?;
 /// for i in 0..tsdf.grid().len() {
 ///     let cell = tsdf.grid().cell(i);
 ///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
@@ -97,14 +97,14 @@ pub fn check_path<const D: usize>(
     }
 }
 
-/// A check on its way.
+/// A check in progress.
 pub(super) struct Walk<'a, F: ?Sized, C: ?Sized> {
     pub(super) field: &'a F,
     pub(super) path: &'a C,
     pub(super) demand: &'a Demand,
     /// No further than this parameter.
     pub(super) end: f64,
-    /// Questions that are left.
+    /// Queries left.
     pub(super) queries: usize,
 }
 
@@ -117,7 +117,7 @@ pub(super) struct Stop {
 }
 
 impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
-    /// Goes on in certified steps.
+    /// Advances in certified steps to the end.
     pub(super) fn free<const D: usize>(&mut self) -> Result<PathClearance, Stop>
     where
         F: ClearanceField<D>,
@@ -134,7 +134,7 @@ impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
                 Verdict::Refused { cause, reach } => return Err(Stop { at: t, cause, reach }),
             };
             if let Some((lower, length)) = step.filter(|s| s.1.is_finite()) {
-                // Clearance falls and rises no faster than one goes: the lowest point of both slopes.
+                // Clearance is 1-Lipschitz: the lowest point that both ends of the step allow.
                 least.lower = least.lower.min(0.5 * (lower + found.lower - length));
             }
             least.lower = least.lower.min(found.lower);
@@ -163,7 +163,7 @@ impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
         let mut found = PathViolation { from: stop.at, to: self.end, cause: stop.cause };
         let Stop { at: mut t, mut cause, mut reach } = stop;
         while t < self.end && self.queries > 0 {
-            // In unknown space there is nothing to be found by looking closely.
+            // In unknown space short steps find nothing more.
             let least = match cause {
                 Cause::Unknown | Cause::Outside => tolerance.max(0.25 * self.field.resolution()),
                 Cause::TooNear | Cause::Undecided => tolerance,
@@ -199,7 +199,7 @@ impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
         }
     }
 
-    /// How far one may go from a free place, less what rounding may have added to points and parameters.
+    /// Length of the certified step from a free point, less the rounding errors of points and parameters.
     fn room<const D: usize>(&self, t: f64, found: Clearance) -> f64
     where
         C: Curve<D>,
@@ -240,7 +240,7 @@ mod tests {
         match check_path(scene, path, demand) {
             PathCheck::Certified(least) => {
                 assert!(least.lower >= demand.clearance);
-                // Rounding of coordinates of up to five metres.
+                // Rounding of coordinates of up to five meters.
                 free_from(0.0, path.end(), least.lower - 1e-14);
                 assert!(truth(least.at).is_some_and(|d| d <= least.upper));
                 true
@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn passes_between_balls_where_there_is_room_and_not_where_there_is_none() {
-        // A gap of 0.6 m between two balls of one metre.
+        // A gap of 0.6 m between two balls of one meter.
         let mut scene = Scene::<3>::empty();
         scene.balls = vec![([0.0, 1.3, 0.0], 1.0), ([0.0, -1.3, 0.0], 1.0)];
         let through = Waypoints::new(vec![[-3.0, 0.0, 0.0], [3.0, 0.0, 0.0]]).unwrap();
@@ -369,7 +369,7 @@ mod tests {
 
     #[test]
     fn along_a_wall_at_the_limit_the_check_ends() {
-        // A ball so large that it is a wall, 0.3 m away, over ten kilometres.
+        // A ball so large that it is a wall, 0.3 m away, over ten kilometers.
         let mut scene = Scene::<2>::empty();
         scene.bounds = crate::geom::Aabb::new([-1e9; 2], [1e9; 2]);
         let circle = |r: f64| SpeedLimited::new(move |t: f64| [r * t.cos(), r * t.sin()], 6.0, r).unwrap();

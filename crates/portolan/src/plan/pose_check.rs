@@ -1,46 +1,46 @@
-//! Is a body free at a pose?
+//! The certified check of a body at a pose.
 
 use super::demand::{Cause, Demand, Verdict};
 use super::{Body, Sphere};
 use crate::field::ClearanceField;
 use crate::geom::Pose;
 
-/// What a check of a body at a pose found.
+/// The result of [`check_pose`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BodyCheck {
-    /// Every sphere keeps what was demanded.
+    /// Every sphere has the clearance demanded.
     Free(BodyClearance),
-    /// Not all of them do, as far as the field knows.
+    /// A sphere is not certified.
     Refused {
-        /// The first sphere that does not.
+        /// Index of the first sphere that is refused.
         sphere: usize,
-        /// Why not.
+        /// Why it is refused.
         cause: Cause,
     },
 }
 
 impl BodyCheck {
-    /// Whether the body is certified to be free.
+    /// Whether the body is certified.
     pub fn is_free(&self) -> bool {
         matches!(self, Self::Free(_))
     }
 }
 
-/// Between the body's surface and the nearest obstacle, at least and at most (metres).
+/// Bounds of the distance between the surface of the body and the nearest obstacle (meters).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyClearance {
-    /// At least so much; at least what was demanded, and no more than it takes to tell that.
+    /// Lower bound, at least the demand; not tighter than the check needs.
     pub lower: f64,
-    /// At most so much; infinite where nothing is near, or the body has no sphere.
+    /// Upper bound; infinite where no obstacle is within the range of the field, and for a body without spheres.
     pub upper: f64,
-    /// The sphere of the least lower bound.
+    /// Index of the sphere with the least lower bound.
     pub sphere: usize,
 }
 
 impl BodyClearance {
     pub(super) const NOTHING: Self = Self { lower: f64::INFINITY, upper: f64::INFINITY, sphere: 0 };
 
-    /// With the clearance of one sphere's surface.
+    /// Includes the clearance of the surface of one sphere.
     pub(super) fn include(&mut self, sphere: usize, lower: f64, upper: f64) {
         if lower < self.lower {
             (self.lower, self.sphere) = (lower, sphere);
@@ -49,8 +49,8 @@ impl BodyClearance {
     }
 }
 
-/// Checks a body at a pose: the centre of every sphere must have the demanded clearance beyond its radius. A sphere lies
-/// in free space, all of it, if that is certified: the demand may be 0. O(spheres).
+/// Checks a body at a pose: the center of every sphere must have the demanded clearance plus its radius. With a demand of 0
+/// a certified sphere lies entirely in free space. O(spheres).
 ///
 /// ```
 /// use portolan::geom::Pose;
@@ -68,13 +68,13 @@ impl BodyClearance {
 /// #     fn resolution(&self) -> f64 { 0.05 }
 /// # }
 /// # let field = &Wall;
-/// // A field that knows of a wall at x = 4 m; a robot with a long nose.
+/// // A field with a wall at x = 4 m; a robot with a long front.
 /// let robot = Body::of(&[([0.0, 0.0], 0.3), ([0.5, 0.0], 0.1)])?;
 /// let facing = |theta| check_pose(field, &robot, &Pose::<2>::new(3.5, 0.0, theta), &Demand::new(0.05));
 /// assert!(facing(std::f64::consts::PI).is_free());
 /// assert_eq!(facing(0.0), BodyCheck::Refused { sphere: 1, cause: Cause::TooNear });
 ///
-/// // The same in space.
+/// // The same in 3-D.
 /// let drone = Body::of(&[([0.0, 0.0, 0.0], 0.4)])?;
 /// let hovering = Pose::<3> { translation: [3.5, 0.0, 1.0], ..Pose::IDENTITY };
 /// assert!(check_pose(field, &drone, &hovering, &Demand::new(0.05)).is_free());

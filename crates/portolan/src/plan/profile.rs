@@ -1,30 +1,29 @@
-//! Clearance along a path, as it is drawn.
+//! Samples of the clearance along a path, for plots.
 
 use super::{Curve, PlanError};
 use crate::answer::Answer;
 use crate::field::{Clearance, ClearanceField, UnknownSpace};
 
-/// What a field knows at one place of a path.
+/// The clearance at one point of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProfileSample<const D: usize> {
-    /// Parameter of the curve: for [`Waypoints`](super::Waypoints) the arc length (metres).
+    /// Parameter of the curve: for [`Waypoints`](super::Waypoints) the arc length (meters).
     pub at: f64,
-    /// World, metres.
+    /// The point (world, meters).
     pub point: [f64; D],
-    /// Lower and upper bound, with their status.
+    /// Lower and upper bound of the clearance.
     pub clearance: Answer<Clearance>,
 }
 
-/// Samples of a profile, at most.
+/// Largest number of samples of a profile.
 const MOST: usize = 1_000_000;
 
-/// Clearance at places of a path no further than `spacing` metres apart, both ends included: for
-/// [`Waypoints`](super::Waypoints) exactly so far, but for the last step. Between the samples it is what
-/// [`check_path`](super::check_path) says. O(length / spacing).
+/// Clearance at points of a path at most `spacing` meters apart, both ends included; for
+/// [`Waypoints`](super::Waypoints) exactly `spacing` apart, except for the last step. Between the samples use
+/// [`check_path`](super::check_path). O(length / spacing).
 ///
 /// # Errors
-/// [`PlanError::Range`] where `spacing` is not positive, [`PlanError::TooMany`] where it would take more than a million
-/// samples.
+/// [`PlanError::Range`] where `spacing` is not positive, [`PlanError::TooMany`] for more than a million samples.
 ///
 /// ```
 /// use portolan::field::UnknownSpace;
@@ -42,7 +41,7 @@ const MOST: usize = 1_000_000;
 /// #     fn resolution(&self) -> f64 { 0.05 }
 /// # }
 /// # let field = &Wall;
-/// // A field that knows of a wall at x = 4 m.
+/// // A field with a wall at x = 4 m.
 /// let path = Waypoints::new(vec![[1.0, 0.0], [3.0, 0.0]])?;
 /// let profile = clearance_profile(field, &path, 0.5, UnknownSpace::Pessimistic)?;
 /// let lower: Vec<f64> = profile.iter().filter_map(|s| Some(s.clearance.known()?.lower)).collect();

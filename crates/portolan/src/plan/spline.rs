@@ -1,13 +1,13 @@
-//! Cubic curves: Bezier pieces, and Catmull-Rom through points.
+//! Cubic splines: Bezier pieces, and Catmull-Rom splines through points.
 
 use super::curve::at_speed;
 use super::{Curve, PlanError};
 use crate::geom::vector::{along, norm, scale, sub};
 
-/// Cubic Bezier pieces, one after the other. Its parameter counts pieces: `2.5` is the middle of the third.
+/// A sequence of cubic Bezier pieces. The parameter counts pieces: `2.5` is the middle of the third.
 ///
-/// Its speed is bounded piece by piece by the control points of its derivative, which lies in their hull; from a place in
-/// a piece on, by those of the rest.
+/// The speed of a piece is bounded by the control points of its derivative, which lies in their convex hull; from a point
+/// within a piece on, by those of the remaining part.
 ///
 /// ```
 /// use portolan::plan::{Curve, Spline};
@@ -25,11 +25,11 @@ pub struct Spline<const D: usize> {
 }
 
 impl<const D: usize> Spline<D> {
-    /// Pieces of four control points each (world, metres). Each should begin where the one before ends: a gap is jumped
-    /// over, and not checked.
+    /// Pieces of four control points each (world, meters). Each should start where the previous one ends: a gap between
+    /// them is not checked.
     ///
     /// # Errors
-    /// [`PlanError::Empty`] without a piece; [`PlanError::NotFinite`] where a coordinate or the length of a piece is not.
+    /// [`PlanError::Empty`] without pieces; [`PlanError::NotFinite`] for a coordinate or a length that is not finite.
     pub fn bezier(pieces: Vec<[[f64; D]; 4]>) -> Result<Self, PlanError> {
         if pieces.is_empty() {
             return Err(PlanError::Empty("a spline"));
@@ -41,11 +41,11 @@ impl<const D: usize> Spline<D> {
         }
     }
 
-    /// Through all points (world, metres), uniform *(Catmull & Rom 1974)*: in each the direction is that from the point
-    /// before to the point after; the first and the last point have one neighbour and take the direction to it.
+    /// The uniform spline through all points (world, meters) *(Catmull & Rom 1974)*: the tangent at a point is parallel to
+    /// the line from the previous to the next point; at the first and the last point, to the line to the neighbor.
     ///
     /// # Errors
-    /// As [`Spline::bezier`]; fewer than two points are none.
+    /// As [`Spline::bezier`]; [`PlanError::Empty`] for fewer than two points.
     pub fn catmull_rom(points: &[[f64; D]]) -> Result<Self, PlanError> {
         let last = points.len().saturating_sub(1);
         let slope = |i: usize| {
@@ -64,8 +64,8 @@ impl<const D: usize> Spline<D> {
         &self.pieces
     }
 
-    /// Length of the curve up to a parameter (metres), by Gauss' quadrature with five points on every eighth of a piece:
-    /// to about 1e-6 of it where the curve has no cusps. For reports; no check rests on it. O(pieces).
+    /// Arc length up to a parameter (meters), by Gauss quadrature with five points on every eighth of a piece: relative
+    /// error about 1e-6 where the curve has no cusps. For reports; no check uses it. O(pieces).
     pub fn arc_length(&self, t: f64) -> f64 {
         let t = t.clamp(0.0, self.end());
         let mut sum = 0.0;
@@ -122,7 +122,7 @@ impl<const D: usize> Curve<D> for Spline<D> {
     }
 }
 
-/// Bound of a piece's speed (metres per piece).
+/// Bound of a piece's speed (meters per piece).
 fn speed<const D: usize>(piece: &[[f64; D]; 4]) -> f64 {
     piece.windows(2).map(|p| 3.0 * norm(sub(p[1], p[0]))).fold(0.0, f64::max)
 }

@@ -1,4 +1,4 @@
-//! A field of balls whose bounds are deliberately slack, and which knows the truth.
+//! A field of balls with deliberately slack bounds and exact ground truth.
 
 use crate::answer::Answer;
 use crate::field::{Clearance, ClearanceField, UnknownSpace};
@@ -12,9 +12,9 @@ pub(super) struct Scene<const D: usize> {
     pub(super) balls: Vec<([f64; D], f64)>,
     pub(super) hole: Aabb<D>,
     pub(super) bounds: Aabb<D>,
-    /// Bounds are off by up to so much (metres), differently at every point.
+    /// Bounds are off by up to so much (meters), differently at every point.
     pub(super) slack: f64,
-    /// Distances are maintained up to here (metres).
+    /// Distances are maintained up to here (meters).
     pub(super) most: f64,
 }
 
@@ -91,7 +91,7 @@ pub(super) fn scenes<const D: usize>() -> impl Strategy<Value = Scene<D>> {
     )
 }
 
-/// A point of the plane or of space.
+/// The first `D` coordinates.
 pub(super) fn point<const D: usize>(p: [f64; 3]) -> [f64; D] {
     std::array::from_fn(|k| p[k])
 }

@@ -1,9 +1,9 @@
-//! A path of straight legs.
+//! A path of straight segments.
 
 use super::{Curve, PlanError};
 use crate::geom::vector::{along, distance, sub};
 
-/// Straight legs from point to point. Its parameter is the arc length (metres).
+/// Straight segments from point to point. The parameter is the arc length (meters).
 ///
 /// ```
 /// use portolan::plan::{Curve, Waypoints};
@@ -22,10 +22,10 @@ pub struct Waypoints<const D: usize> {
 }
 
 impl<const D: usize> Waypoints<D> {
-    /// A path through points (world, metres); one point is a path too.
+    /// A path through points (world, meters), at least one.
     ///
     /// # Errors
-    /// [`PlanError::Empty`] without a point; [`PlanError::NotFinite`] where a coordinate is not, or the length.
+    /// [`PlanError::Empty`] without points; [`PlanError::NotFinite`] for a coordinate or a length that is not finite.
     pub fn new(points: Vec<[f64; D]>) -> Result<Self, PlanError> {
         if points.is_empty() {
             return Err(PlanError::Empty("a path"));
@@ -36,7 +36,7 @@ impl<const D: usize> Waypoints<D> {
             if i > 0 {
                 length += distance(points[i - 1], *p);
             }
-            // An infinite coordinate alone makes no infinite length: it may be the only point.
+            // The length alone does not show an infinite coordinate of a single point.
             if !(length.is_finite() && p.iter().all(|v| v.is_finite())) {
                 return Err(PlanError::NotFinite { what: "point", index: i });
             }
@@ -50,12 +50,12 @@ impl<const D: usize> Waypoints<D> {
         &self.points
     }
 
-    /// Arc length at which each point is reached (metres).
+    /// Arc length at which each point is reached (meters).
     pub fn reached(&self) -> &[f64] {
         &self.reached
     }
 
-    /// The whole length (metres).
+    /// The total length (meters).
     pub fn length(&self) -> f64 {
         self.reached[self.reached.len() - 1]
     }

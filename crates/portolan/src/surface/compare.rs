@@ -1,29 +1,29 @@
-//! How far two surfaces are from each other.
+//! Comparison of two surfaces: accuracy, completeness and F-score.
 
 use super::{Mesh, NearestSurface};
 use crate::geom::vector::{along, cross3, norm, sub};
 use crate::parallel;
 
-/// What a map is compared with.
+/// The surface that a map is compared with.
 #[derive(Clone, Copy, Debug)]
 pub enum Reference<'a> {
     /// Triangles.
     Mesh(&'a Mesh),
-    /// Points (metres, about `origin`).
+    /// Points (meters, about `origin`).
     Points {
-        /// World position of the point (0, 0, 0) (metres).
+        /// World position of the point (0, 0, 0) (meters).
         origin: [f64; 3],
         /// The points.
         points: &'a [[f32; 3]],
     },
 }
 
-/// How surfaces are compared.
+/// Settings of [`compare_surfaces`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompareSettings {
-    /// Points of each surface, at most.
+    /// Largest number of points sampled on each surface.
     pub samples: usize,
-    /// Distances (metres) for which shares and F-scores are given.
+    /// Distances (meters) for which shares and F-scores are computed.
     pub thresholds: Vec<f64>,
 }
 
@@ -34,44 +34,43 @@ impl Default for CompareSettings {
     }
 }
 
-/// Distances from points of one surface to another one (metres).
+/// Statistics of the distances from points of one surface to another surface (meters).
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceDistances {
-    /// Points measured.
+    /// Number of points.
     pub samples: usize,
-    /// Mean.
+    /// The mean.
     pub mean: f64,
-    /// Half of the points are no further away.
+    /// The median.
     pub median: f64,
-    /// 95 % of the points are no further away.
+    /// The 95th percentile.
     pub p95: f64,
-    /// The largest.
+    /// The maximum.
     pub largest: f64,
     /// Share of the points within each threshold.
     pub within: Vec<f64>,
 }
 
-/// Two surfaces compared both ways.
+/// The distances between two surfaces in both directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceComparison {
-    /// From the map's surface to the reference: is what the map says true?
+    /// From the surface of the map to the reference.
     pub accuracy: SurfaceDistances,
-    /// From the reference to the map's surface: does the map say all that is true?
+    /// From the reference to the surface of the map.
     pub completeness: SurfaceDistances,
     /// For each threshold, the harmonic mean of the two shares within it *(Knapitsch et al. 2017, section 4)*.
     pub f_scores: Vec<f64>,
-    /// Points of the reference that were left out.
+    /// Number of points of the reference rejected by `keep`.
     pub cropped: usize,
-    /// Triangles and points of both that were not looked at, since they have a coordinate that is not finite.
+    /// Number of triangles and points of both surfaces skipped because of a coordinate that is not finite.
     pub unusable: usize,
 }
 
-/// Compares the surface of a map with a reference: distances between evenly spread points of the one and the nearest
-/// triangle (or point) of the other, both ways. Only points of the reference that `keep` wants are measured, so that
-/// what a sensor could not see need not count.
+/// Compares the surface of a map with a reference: distances from evenly spread points of one to the nearest triangle (or
+/// point) of the other, in both directions. Points of the reference are measured only where `keep` is true, to exclude
+/// parts that a sensor could not see.
 ///
-/// What is not finite is skipped and counted. `None` where a surface has no area or point, or nothing of the reference
-/// is kept. Deterministic.
+/// `None` where a surface is empty, or all points of the reference are rejected. Deterministic.
 /// O((samples + elements) log elements).
 pub fn compare_surfaces(
     map: &Mesh,
@@ -110,9 +109,9 @@ fn unusable_triangles(mesh: &Mesh) -> usize {
     mesh.triangles.iter().filter(|t| !usable(t)).count()
 }
 
-/// `count` points of a mesh (world), as many on each piece of surface as its area asks for: one per equal share of the
-/// area in the order of the triangles, placed inside its triangle by a low-discrepancy sequence. Triangles with a corner
-/// that is not finite have no area. None where the mesh has none.
+/// `count` points of a mesh (world), uniform by area: one per equal share of the area in the order of the triangles, placed
+/// inside its triangle by a low-discrepancy sequence. Triangles with a corner that is not finite are skipped. Empty for a
+/// mesh without area.
 pub fn area_samples(mesh: &Mesh, count: usize) -> Vec<[f64; 3]> {
     let areas: Vec<f64> = mesh
         .triangles
@@ -135,7 +134,7 @@ pub fn area_samples(mesh: &Mesh, count: usize) -> Vec<[f64; 3]> {
             passed += areas[triangle];
             triangle += 1;
         }
-        // The plastic number's sequence *(Roberts 2018)*, spread evenly over the triangle by the root.
+        // The sequence of the plastic number *(Roberts 2018)*, made uniform over the triangle by the root.
         let [u, v] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2].map(|a| (0.5 + i as f64 * a).fract());
         let [a, b, c] = mesh.corners_world(mesh.triangles[triangle]);
         let root = u.sqrt();
@@ -144,7 +143,7 @@ pub fn area_samples(mesh: &Mesh, count: usize) -> Vec<[f64; 3]> {
     samples
 }
 
-/// At most `count` of the finite points (world), evenly taken.
+/// At most `count` of the finite points (world), evenly spaced in their order.
 fn thinned(origin: [f64; 3], points: &[[f32; 3]], count: usize) -> Vec<[f64; 3]> {
     let finite: Vec<&[f32; 3]> = points.iter().filter(|p| is_finite(p)).collect();
     let taken = count.min(finite.len());
@@ -228,7 +227,7 @@ mod tests {
         let c = compare_surfaces(&map, Reference::Mesh(&truth), &settings, |_| true).unwrap();
         for way in [&c.accuracy, &c.completeness] {
             assert_eq!(way.samples, 20_000);
-            // Chords of two degrees lie 0.15 mm inside of a ball of a metre.
+            // Chords of two degrees lie 0.15 mm inside of a ball of a meter.
             for d in [way.median, way.mean, way.p95, way.largest] {
                 assert!((d - 0.03).abs() < 5e-4, "{d}");
             }
@@ -251,7 +250,7 @@ mod tests {
         let all = compare_surfaces(&map, Reference::Mesh(&truth), &settings, |_| true).unwrap();
         assert!((all.accuracy.median - 0.015).abs() < 1e-6 && (all.accuracy.largest - 0.015).abs() < 1e-6);
         assert_eq!(all.accuracy.within, [0.0, 1.0, 1.0]);
-        // A quarter of the reference lies below the map; the furthest corner is a diagonal metre away.
+        // A quarter of the reference lies below the map; the farthest corner is a diagonal meter away.
         assert!((all.completeness.within[1] - 0.25).abs() < 0.01, "{:?}", all.completeness.within);
         assert!((all.completeness.largest - 2f64.sqrt()).abs() < 0.03);
         let f = 2.0 * all.completeness.within[1] / (1.0 + all.completeness.within[1]);

@@ -1,4 +1,4 @@
-//! Contours: oriented segments in the plane.
+//! Contours: oriented 2-D segments.
 
 use super::Polyline;
 use crate::geom::vector::{distance, point_segment};
@@ -6,7 +6,7 @@ use crate::geom::vector::{distance, point_segment};
 /// Segments with shared vertices; free space lies on the left of every segment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contour {
-    /// World positions (metres).
+    /// World positions (meters).
     pub vertices: Vec<[f64; 2]>,
     /// Pairs of vertex indices, from start to end.
     pub segments: Vec<[u32; 2]>,
@@ -18,13 +18,13 @@ impl Contour {
         self.segments.iter().map(|s| s.map(|i| self.vertices[i as usize]))
     }
 
-    /// Length of all segments (metres).
+    /// Length of all segments (meters).
     pub fn length(&self) -> f64 {
         self.ends().map(|[a, b]| distance(a, b)).sum()
     }
 
-    /// Distance from a point to the nearest segment (metres), unsigned. `None` where there is no segment.
-    /// O(segments): the contour has no index; where many distances are asked for, the ESDF is the map to ask.
+    /// Unsigned distance from a point to the nearest segment (meters). `None` for an empty contour.
+    /// O(segments): the contour has no index; for many queries use an ESDF.
     pub fn nearest_distance(&self, p_world: impl Into<[f64; 2]>) -> Option<f64> {
         let p = p_world.into();
         let mut best = f64::INFINITY;
@@ -38,31 +38,24 @@ impl Contour {
         (best < f64::INFINITY).then(|| best.sqrt())
     }
 
-    /// Index of the nearest segment, and the distance to it (metres). O(segments).
+    /// Index of the nearest segment, and the distance to it (meters). O(segments).
     pub fn nearest_segment(&self, p_world: impl Into<[f64; 2]>) -> Option<(usize, f64)> {
         let p = p_world.into();
         let distances = self.ends().map(|[a, b]| point_segment(p, a, b).0).enumerate();
         distances.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Crossings of the ray to the right: odd is inside where the contour is closed and was seen from outside.
-    /// A building that was seen from its rooms only has no outer face, and every count is off by one:
-    /// [`Contour::is_inside`] does not depend on it. O(segments).
-    pub fn crossing_number(&self, p_world: impl Into<[f64; 2]>) -> usize {
-        self.crossings(p_world.into()).count()
-    }
-
-    /// Whether a point lies inside: the first crossing of the ray to the right shows the point either its free
-    /// side or its back. Agrees with the crossing number where that is right, and needs nothing of the contour
-    /// but the nearest wall. `None` where no segment lies to the right. Through a gap in the contour it looks at
-    /// the next wall, and a contour cannot tell free from unknown. O(segments).
+    /// Whether a point lies behind the surface, from the side that the first segment along the ray to the right faces to
+    /// it. Needs no closed contour, unlike a crossing number: a building observed only from its rooms has no outer face.
+    /// `None` where the ray meets no segment. Through a gap in the contour the next wall decides; unknown space is not
+    /// distinguished from free space. O(segments).
     pub fn is_inside(&self, p_world: impl Into<[f64; 2]>) -> Option<bool> {
         let first = self.crossings(p_world.into()).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        // Free space lies on the left of a segment: one that runs up shows its free side to the left.
+        // Free space lies on the left of a segment: one that runs up has it toward the point.
         Some(!first.1)
     }
 
-    /// Where the ray to the right crosses segments (x), and whether they run upwards.
+    /// Where the ray to the right crosses segments (x), and whether they run upward.
     fn crossings(&self, p: [f64; 2]) -> impl Iterator<Item = (f64, bool)> + '_ {
         self.ends().filter_map(move |[a, b]| {
             // Half-open in y, so that a ray through a vertex counts once.
@@ -74,8 +67,29 @@ impl Contour {
         })
     }
 
-    /// Bytes held, measured.
-    pub fn memory_bytes(&self) -> usize {
+    /// The segments joined end to end.
+    pub fn polylines(&self) -> Vec<Polyline> {
+        super::polyline::join(self)
+    }
+}
+
+impl DerivedField<2> for Contour {
+    type Settings = ContourSettings;
+
+    fn derive(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Self {
+        marching_squares(tsdf, settings)
+    }
+
+    fn occupancy(&self, p_world: [f64; 2]) -> Option<f64> {
+        self.is_inside(p_world).map(|inside| if inside { 1.0 } else { 0.0 })
+    }
+
+    /// `None`: a contour needs a search ([`Contour::nearest_distance`]).
+    fn distance(&self, _: [f64; 2]) -> Option<f64> {
+        None
+    }
+
+    fn memory_bytes(&self) -> usize {
         self.vertices.capacity() * size_of::<[f64; 2]>() + self.segments.capacity() * size_of::<[u32; 2]>()
     }
 
@@ -96,19 +110,24 @@ mod tests {
         }
     }
 
+    /// Odd inside a closed contour that has an outer face.
+    fn crossing_number(c: &Contour, p: [f64; 2]) -> usize {
+        c.crossings(p).count()
+    }
+
     #[test]
     fn distance_and_crossing_number() {
         let c = square();
         assert_eq!(c.nearest_distance([1.0, 0.5]), Some(0.5));
         assert_eq!(c.nearest_distance([5.0, 6.0]), Some(5.0));
         assert_eq!(c.nearest_segment([1.0, 1.9]).unwrap().0, 1);
-        assert_eq!((c.is_inside([1.0, 1.0]), c.crossing_number([1.0, 1.0])), (Some(true), 1));
-        assert_eq!((c.is_inside([-1.0, 0.0]), c.crossing_number([-1.0, 0.0])), (Some(false), 2));
-        assert_eq!((c.is_inside([3.0, 1.0]), c.crossing_number([3.0, 1.0])), (None, 0));
-        // A room seen from inside has no outer face: the count is odd in its free space.
+        assert_eq!((c.is_inside([1.0, 1.0]), crossing_number(&c, [1.0, 1.0])), (Some(true), 1));
+        assert_eq!((c.is_inside([-1.0, 0.0]), crossing_number(&c, [-1.0, 0.0])), (Some(false), 2));
+        assert_eq!((c.is_inside([3.0, 1.0]), crossing_number(&c, [3.0, 1.0])), (None, 0));
+        // A room observed from inside has no outer face: the count is odd in its free space.
         let mut room = square();
         room.segments.iter_mut().for_each(|s| s.reverse());
-        assert_eq!((room.is_inside([1.0, 1.0]), room.crossing_number([1.0, 1.0])), (Some(false), 1));
+        assert_eq!((room.is_inside([1.0, 1.0]), crossing_number(&room, [1.0, 1.0])), (Some(false), 1));
         assert_eq!(c.length(), 8.0);
         assert_eq!(Contour::default().nearest_distance([0.0, 0.0]), None);
         assert_eq!(Contour::default().is_inside([0.0, 0.0]), None);

@@ -1,4 +1,4 @@
-//! What a contour tells about the quality of its map.
+//! Measures of the quality of a map, computed from its contour.
 
 use super::Contour;
 use crate::geom::interpolate;
@@ -6,24 +6,24 @@ use crate::geom::vector::{add, along, distance, dot, scale, sub, unit};
 use crate::map::Tsdf2;
 use rustc_hash::FxHashMap;
 
-/// Contour with a second, parallel contour near it: the mark of poses that do not agree.
+/// Length of contour with a second, parallel contour near it: a sign of inconsistent poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DoubledLength {
-    /// Length of the contour with a second one of the same orientation within reach (metres).
+    /// Length of the contour with a second one of the same orientation within reach (meters).
     pub doubled: f64,
-    /// Length of the whole contour (metres).
+    /// Length of the whole contour (meters).
     pub total: f64,
 }
 
 impl DoubledLength {
-    /// Share of the contour that is doubled; 0 without contour.
+    /// Share of the contour that is doubled; 0 for an empty contour.
     pub fn share(&self) -> f64 {
         if self.total > 0.0 { self.doubled / self.total } else { 0.0 }
     }
 }
 
 /// Measures how much of a contour has a second contour of the same orientation (within 30 degrees) straight
-/// behind or in front of it, no further than `reach` metres. Both sides of a wall face opposite ways and do not
+/// behind or in front of it, no further than `reach` meters. Both sides of a wall face opposite ways and do not
 /// count; two images of one wall face the same way and do. O(segments) with a hash of cells of edge `reach`.
 pub fn doubled_length(contour: &Contour, reach: f64) -> DoubledLength {
     let bucket = |p: [f64; 2]| p.map(|v| (v / reach).floor() as i64);
@@ -58,21 +58,21 @@ pub fn doubled_length(contour: &Contour, reach: f64) -> DoubledLength {
     measured
 }
 
-/// Walls that are thinner than twice the truncation and were seen from both sides: the claims of one side
-/// reach through to the other and displace its surface.
+/// Walls thinner than twice the truncation and observed from both sides: the updates from one side reach the surface of
+/// the other and displace it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ThinWalls {
-    /// Length of contour with free space less than twice the truncation behind it (metres).
+    /// Length of contour with free space less than twice the truncation behind it (meters).
     pub thin: f64,
-    /// Length of the whole contour (metres).
+    /// Length of the whole contour (meters).
     pub total: f64,
-    /// The smallest thickness seen (metres); infinite where there is none.
+    /// The least thickness found (meters); infinite without thin walls.
     pub thinnest: f64,
 }
 
-/// Looks behind every segment of a contour, in steps of half a cell along the normal, for free space within
-/// twice the truncation. O(segments).
-pub fn thin_walls(tsdf: &Tsdf2, contour: &Contour) -> ThinWalls {
+/// Searches behind every segment of a contour, in steps of half a cell along the normal, for free space within twice the
+/// truncation. O(segments).
+pub fn thin_walls(tsdf: &Tsdf<2>, contour: &Contour) -> ThinWalls {
     let grid = tsdf.grid();
     let strides = grid.strides();
     let planes = tsdf.store().planes();

@@ -1,33 +1,33 @@
-//! Triangle meshes, and what can be counted in them.
+//! Triangle meshes and their measures.
 
 use crate::geom::Aabb;
 
 /// Triangles with shared vertices; the normal of every triangle (counter-clockwise) points to free space.
 ///
-/// Vertices are `f32` relative to an `f64` origin near them, so that a mesh at UTM coordinates is as fine as one at the
-/// world's zero: within 1 km of the origin a vertex is placed to 0.06 mm.
+/// Vertices are `f32` relative to an `f64` origin near them, so that a mesh at UTM coordinates is as accurate as one at the
+/// origin of the world: within 1 km of its own origin a vertex is placed to 0.06 mm.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// World position of the vertex (0, 0, 0) (metres).
+    /// World position of the vertex (0, 0, 0) (meters).
     pub origin: [f64; 3],
-    /// Positions relative to the origin (metres).
+    /// Positions relative to the origin (meters).
     pub vertices: Vec<[f32; 3]>,
     /// Triples of vertex indices.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normals per vertex, towards free space; zero where a vertex has none. Empty: not asked for.
+    /// Unit normal of each vertex, toward free space; zero where undefined. Empty where not requested.
     pub normals: Vec<[f32; 3]>,
-    /// Red, green, blue per vertex. Empty: not asked for, or not there.
+    /// Red, green, blue of each vertex. Empty where not requested or not available.
     pub colors: Vec<[u8; 3]>,
 }
 
-/// How many triangles the edges of a mesh have.
+/// The edges of a mesh by their number of triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EdgeCounts {
     /// Edges of one triangle: the border of what was observed.
     pub border: usize,
     /// Edges between two triangles of one orientation.
     pub inner: usize,
-    /// All others: more than two triangles, or two that disagree about the side of free space. 0 in a manifold.
+    /// All others: edges of more than two triangles, or of two with opposite orientation. 0 in a manifold.
     pub faulty: usize,
 }
 
@@ -39,24 +39,24 @@ impl EdgeCounts {
 }
 
 impl Mesh {
-    /// World position of a vertex (metres).
+    /// World position of a vertex (meters).
     pub fn vertex_world(&self, i: usize) -> [f64; 3] {
         std::array::from_fn(|k| self.origin[k] + f64::from(self.vertices[i][k]))
     }
 
-    /// World positions of a triangle's corners (metres).
+    /// World positions of a triangle's corners (meters).
     pub fn corners_world(&self, triangle: [u32; 3]) -> [[f64; 3]; 3] {
         triangle.map(|v| self.vertex_world(v as usize))
     }
 
-    /// World box of all vertices; empty without vertices. O(vertices).
+    /// Bounding box of all vertices (world); empty without vertices. O(vertices).
     pub fn bounds(&self) -> Aabb<3> {
         let mut bounds = Aabb::EMPTY;
         (0..self.vertices.len()).for_each(|i| bounds.include(self.vertex_world(i)));
         bounds
     }
 
-    /// Area of all triangles (square metres). O(triangles).
+    /// Area of all triangles (square meters). O(triangles).
     pub fn area(&self) -> f64 {
         let doubled = |t: &[u32; 3]| {
             let n = self.area_normal(*t);
@@ -65,7 +65,7 @@ impl Mesh {
         0.5 * self.triangles.iter().map(doubled).sum::<f64>()
     }
 
-    /// Volume on the side away from free space (cubic metres), where the mesh is closed. O(triangles).
+    /// Enclosed volume, on the side away from free space (cubic meters), of a closed mesh. O(triangles).
     pub fn volume(&self) -> f64 {
         let corners = |t: &[u32; 3]| t.map(|v| self.vertices[v as usize].map(f64::from));
         let six_fold = |t: &[u32; 3]| {
@@ -77,7 +77,7 @@ impl Mesh {
         self.triangles.iter().map(six_fold).sum::<f64>() / 6.0
     }
 
-    /// Normal of a triangle with twice its area as length.
+    /// Normal of a triangle, of a length twice its area.
     pub fn area_normal(&self, triangle: [u32; 3]) -> [f64; 3] {
         let [a, b, c] = triangle.map(|v| self.vertices[v as usize].map(f64::from));
         let (u, v): ([f64; 3], [f64; 3]) =
@@ -85,7 +85,7 @@ impl Mesh {
         [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
     }
 
-    /// Counts edges by their triangles. O(triangles log triangles).
+    /// Counts the edges by their number of triangles. O(triangles log triangles).
     pub fn edge_counts(&self) -> EdgeCounts {
         let mut counts = EdgeCounts::default();
         let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * self.triangles.len());
@@ -106,12 +106,13 @@ impl Mesh {
     }
 
     /// Vertices - edges + triangles: 2 for every sphere, 0 for every torus. O(triangles log triangles).
-    pub fn euler_characteristic(&self) -> i64 {
+    #[cfg(test)]
+    pub(crate) fn euler_characteristic(&self) -> i64 {
         self.vertices.len() as i64 - self.edge_counts().total() as i64 + self.triangles.len() as i64
     }
 
-    /// The connected component of every vertex, numbered in the order of their first vertices, and their number.
-    /// Vertices without triangle are components of their own. O(triangles), nearly.
+    /// The connected component of every vertex, numbered in the order of their first vertices, and the number of
+    /// components. A vertex without triangles is a component of its own. Nearly O(triangles).
     pub fn components(&self) -> (Vec<u32>, usize) {
         let mut parent: Vec<u32> = (0..self.vertices.len() as u32).collect();
         fn root(parent: &mut [u32], mut v: u32) -> u32 {
@@ -141,7 +142,7 @@ impl Mesh {
         (number, count as usize)
     }
 
-    /// Bytes that the arrays hold.
+    /// Memory of the arrays (bytes).
     pub fn memory_bytes(&self) -> usize {
         (self.vertices.capacity() + self.triangles.capacity() + self.normals.capacity()) * 12
             + self.colors.capacity() * 3

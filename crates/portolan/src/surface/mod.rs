@@ -1,4 +1,4 @@
-//! Surfaces extracted from distance fields, and the questions they answer.
+//! Surfaces extracted from distance fields: contours, meshes, ray casting and comparison.
 
 mod compare;
 mod contour;
@@ -9,6 +9,7 @@ mod nearest;
 mod polyline;
 mod predict;
 mod ray_cast;
+mod ray_caster;
 pub(crate) mod squares;
 
 pub use compare::{
@@ -22,5 +23,6 @@ pub use nearest::NearestSurface;
 pub(crate) use nearest::point_triangle_sq;
 pub use polyline::Polyline;
 pub use predict::{PredictionScore, RangeNoise, RangePredictions};
-pub use ray_cast::{RayCast, RayCastSettings, RayCaster, RayTrace, cast_ray, trace_ray};
+pub use ray_cast::{RayCast, RayCastSettings, RayTrace, cast_ray, trace_ray};
+pub use ray_caster::RayCaster;
 pub use squares::{Ambiguity, ContourSettings, level_set, marching_squares};

@@ -1,12 +1,12 @@
-//! The nearest point of a surface, by a tree of boxes.
+//! The distance to the nearest point of a surface, by a tree of boxes.
 
 use super::Mesh;
 use crate::geom::vector::{cross3, dot, point_segment, sub};
 
-/// Triangles, or points, under a tree of boxes: how far is the nearest one?
+/// Triangles or points under a tree of bounding boxes, for queries of the distance to the nearest one.
 ///
-/// A point is a triangle of one vertex; degenerate triangles are segments or points. Corners are `f32` about an `f64`
-/// origin, distances are computed in `f64`.
+/// Degenerate triangles are segments or points. Corners are `f32` relative to an `f64` origin, distances are computed in
+/// `f64`.
 #[derive(Clone, Debug)]
 pub struct NearestSurface {
     origin: [f64; 3],
@@ -14,28 +14,28 @@ pub struct NearestSurface {
     nodes: Vec<Node>,
 }
 
-/// A box, and what is in it: its two halves follow, the first directly behind it; a leaf names its triangles.
+/// A box, and its content: an inner node has two children, the first directly after it; a leaf has triangles.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     low: [f32; 3],
     high: [f32; 3],
-    /// Leaf: first triangle. Else: the second half's node.
+    /// Leaf: first triangle. Else: index of the second child.
     first: u32,
-    /// Triangles of a leaf; 0: no leaf.
+    /// Number of triangles of a leaf; 0 for an inner node.
     count: u32,
 }
 
-/// Triangles of a leaf, at most.
+/// Largest number of triangles of a leaf.
 const LEAF: usize = 4;
 
 impl NearestSurface {
-    /// The triangles of a mesh. Those with a corner that is not finite are left out. O(n log n).
+    /// The triangles of a mesh. Those with a corner that is not finite are skipped. O(n log n).
     pub fn of_mesh(mesh: &Mesh) -> Self {
         let corners = mesh.triangles.iter().map(|t| t.map(|v| mesh.vertices[v as usize]));
         Self::of(mesh.origin, corners.collect())
     }
 
-    /// Points (metres, about `origin`). O(n log n).
+    /// Points (meters, about `origin`). O(n log n).
     pub fn of_points(origin: [f64; 3], points: &[[f32; 3]]) -> Self {
         Self::of(origin, points.iter().map(|&p| [p; 3]).collect())
     }
@@ -49,13 +49,13 @@ impl NearestSurface {
         Self { origin, corners, nodes }
     }
 
-    /// Whether there is nothing.
+    /// Whether it has no triangles and no points.
     pub fn is_empty(&self) -> bool {
         self.corners.is_empty()
     }
 
-    /// Distance from a point (world) to the nearest triangle (metres), unsigned. `None` where there is none, or the
-    /// point is not finite. About O(log n) near the surface.
+    /// Unsigned distance from a point (world) to the nearest triangle (meters). `None` for an empty surface, or a point that
+    /// is not finite. About O(log n) near the surface.
     pub fn distance(&self, p_world: [f64; 3]) -> Option<f64> {
         let p = sub(p_world, self.origin);
         if self.corners.is_empty() || !p.iter().all(|v| v.is_finite()) {
@@ -85,7 +85,7 @@ impl NearestSurface {
         Some(best.sqrt())
     }
 
-    /// Bytes held.
+    /// Memory of the tree (bytes).
     pub fn memory_bytes(&self) -> usize {
         self.corners.capacity() * size_of::<[[f32; 3]; 3]>()
             + self.nodes.capacity() * size_of::<Node>()
@@ -101,7 +101,7 @@ impl Node {
     }
 }
 
-/// Adds the tree of `corners`, the first of which is number `first` of all, splitting at the median of the longest axis.
+/// Appends the tree of `corners`, the first of which has the index `first`, split at the median of the longest axis.
 fn build(corners: &mut [[[f32; 3]; 3]], first: usize, nodes: &mut Vec<Node>) {
     let mut node =
         Node { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], first: first as u32, count: 0 };
@@ -127,8 +127,7 @@ fn build(corners: &mut [[[f32; 3]; 3]], first: usize, nodes: &mut Vec<Node>) {
     build(high, first + half, nodes);
 }
 
-/// Squared distance from a point to a triangle *(Ericson 2005, section 5.1.5)*; a degenerate one is the nearest of its
-/// sides.
+/// Squared distance from a point to a triangle *(Ericson 2005, section 5.1.5)*; to the nearest side of a degenerate one.
 pub(crate) fn point_triangle_sq(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
     let (ab, ac, ap) = (sub(b, a), sub(c, a), sub(p, a));
     let normal = cross3(ab, ac);

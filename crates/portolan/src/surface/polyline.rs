@@ -2,7 +2,7 @@
 
 use super::Contour;
 
-/// A chain of points (world, metres). A closed one does not repeat its first point.
+/// A chain of points (world, meters). A closed one does not repeat its first point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polyline {
     /// The points in order, free space on the left.

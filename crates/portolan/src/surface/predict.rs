@@ -1,4 +1,4 @@
-//! How well a map predicts the ranges of scans that it was not made of.
+//! Evaluation of a map by the ranges it predicts for scans that were not fused into it.
 
 use super::{RayCast, RayCaster};
 use crate::geom::Pose;
@@ -6,24 +6,24 @@ use crate::geom::vector::{distance, sub, unit};
 use crate::parallel;
 use crate::scan::Frame;
 
-/// How measured ranges spread about predicted ones: a Gaussian for the surface that was predicted and a uniform share for
-/// everything else *(Thrun, Burgard & Fox 2005, section 6.3, without short readings)*:
+/// The distribution of measured ranges given predicted ones: a Gaussian around the predicted surface and a uniform part for
+/// outliers *(Thrun, Burgard & Fox 2005, section 6.3, without short readings)*:
 ///
 /// `p(r) = (1 - outliers) N(r; predicted, sigma^2) + outliers / max_range`.
 ///
-/// A ray for which the map predicts nothing is uniform: `1 / max_range`.
+/// A ray without a predicted surface is uniform: `1 / max_range`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeNoise {
-    /// Standard deviation of the sensor and the map together (metres).
+    /// Standard deviation of the sensor and the map together (meters).
     pub sigma: f64,
-    /// Share of readings that the map cannot explain.
+    /// Share of outliers.
     pub outliers: f64,
-    /// The uniform part reaches so far (metres).
+    /// Range of the uniform part (meters).
     pub max_range: f64,
 }
 
 impl RangeNoise {
-    /// Half a cell, 5 % unexplained, within this range.
+    /// A standard deviation of half a cell, 5 % outliers, this range (meters).
     pub fn of_cells(resolution: f64, max_range: f64) -> Self {
         Self { sigma: 0.5 * resolution, outliers: 0.05, max_range }
     }
@@ -43,41 +43,40 @@ impl RangeNoise {
     }
 }
 
-/// What a map predicted of some scans, ray by ray.
+/// Predicted and measured ranges of scans, ray by ray.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RangePredictions {
-    /// Predicted and measured range of each ray that the map lets end at a surface (metres), in order.
+    /// Predicted and measured range of each ray with a predicted surface (meters), in order.
     pub pairs: Vec<[f64; 2]>,
-    /// Measured ranges of rays that run into unknown space.
+    /// Measured ranges of rays that end in unknown space (meters).
     pub unknown: Vec<f64>,
-    /// Measured ranges of rays that leave the map.
+    /// Measured ranges of rays that leave the map (meters).
     pub outside: Vec<f64>,
-    /// Measured ranges of rays that meet nothing up to the largest range.
+    /// Measured ranges of rays in free space up to the largest range (meters).
     pub free: Vec<f64>,
 }
 
-/// How good predictions were.
+/// The errors of predicted ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictionScore {
-    /// Median of |predicted - measured| (metres).
+    /// Median of |predicted - measured| (meters).
     pub median_error: f64,
-    /// 95 % are no larger (metres).
+    /// 95th percentile of |predicted - measured| (meters).
     pub p95_error: f64,
-    /// Median of predicted - measured (metres).
+    /// Median of predicted - measured (meters).
     pub bias: f64,
-    /// Share of the predicted within one cell.
+    /// Share of the predicted ranges within one cell of the measured ones.
     pub within_one_cell: f64,
-    /// Share of the predicted within two cells.
+    /// Share of the predicted ranges within two cells of the measured ones.
     pub within_two_cells: f64,
-    /// Mean negative log-likelihood of all rays, predicted or not (nats).
+    /// Mean negative log-likelihood of all rays, with or without a predicted surface (nats).
     pub negative_log_likelihood: f64,
 }
 
 impl RangePredictions {
-    /// Casts a ray for each surface that a frame saw, or for `at_most` of them, evenly taken, and adds what the map
-    /// predicts. Rays are shared out to all cores with the feature `parallel`; their order is kept. Of an image that
-    /// contradicts itself ([`RangeImage::check`](crate::scan::RangeImage::check)) nothing is cast, and no point without
-    /// an origin.
+    /// Casts a ray for each hit of a frame, or for `at_most` of them, evenly spaced, and appends the predictions in order. Runs
+    /// on all cores with the feature `parallel`. An image that fails
+    /// [`RangeImage::check`](crate::scan::RangeImage::check) and points without an origin are skipped.
     pub fn add(
         &mut self,
         rays: &RayCaster<'_, 3>,
@@ -85,7 +84,7 @@ impl RangePredictions {
         frame: &Frame,
         at_most: usize,
     ) {
-        let seen = seen(frame);
+        let seen = hit_rays(frame);
         let taken = at_most.min(seen.len());
         let taken: Vec<_> = (0..taken).map(|i| seen[i * seen.len() / taken]).collect();
         let casts = parallel::map(&taken, 64, |&(origin, end)| {
@@ -103,12 +102,12 @@ impl RangePredictions {
         }
     }
 
-    /// Rays cast.
+    /// Number of rays cast.
     pub fn rays(&self) -> usize {
         self.pairs.len() + self.unknown.len() + self.outside.len() + self.free.len()
     }
 
-    /// How good they were, in cells of `resolution` (metres); `None` where nothing was predicted.
+    /// The errors, with a cell size of `resolution` (meters); `None` without predicted surfaces.
     pub fn score(&self, resolution: f64, noise: &RangeNoise) -> Option<PredictionScore> {
         let n = self.pairs.len();
         if n == 0 {
@@ -136,8 +135,8 @@ impl RangePredictions {
     }
 }
 
-/// Origin and end of every ray of a frame that met a surface, in the sensor's frame.
-fn seen(frame: &Frame) -> Vec<([f64; 3], [f64; 3])> {
+/// Origin and end of every ray of a frame with a hit, in the sensor's frame.
+fn hit_rays(frame: &Frame) -> Vec<([f64; 3], [f64; 3])> {
     match frame {
         Frame::Image(image) if image.check().is_err() => Vec::new(),
         Frame::Image(image) => image.readings().filter(|r| r.2).map(|r| (r.0, r.1)).collect(),

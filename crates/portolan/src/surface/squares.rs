@@ -1,34 +1,40 @@
-//! Marching squares over cell centres.
+//! Marching squares over cell centers.
 
 use super::Contour;
 use crate::geom::Grid;
 use crate::map::{DistanceMap, Tsdf};
 
-/// What to do with a square whose diagonal corners agree and whose neighbours differ.
+/// Treatment of ambiguous squares: those whose diagonal corners have equal signs and neighboring corners different ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Ambiguity {
     /// The sign of the bilinear field at its saddle decides (asymptotic decider, Nielson & Hamann 1991),
     /// computed exactly.
     #[default]
     Decide,
-    /// Always keep the inside corners apart, as the textbook's table does.
+    /// The inside corners are always kept apart, as with a fixed table of 16 cases.
     FixedTable,
 }
 
-/// How a contour is extracted.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Settings of [`marching_squares`].
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContourSettings {
-    /// A square with a corner of smaller weight has no sign and gets no segment: no geometry is invented. `None`: what
-    /// fits the map ([`Thresholds::surface`](crate::map::Thresholds::surface)).
-    pub min_weight: Option<f32>,
-    /// Ambiguous squares.
+    /// Cells of smaller weight are unknown; a square with an unknown corner gets no segment.
+    pub min_weight: f32,
+    /// Treatment of ambiguous squares.
     pub ambiguity: Ambiguity,
 }
 
+impl Default for ContourSettings {
+    /// A least weight of 0.5, half an observation.
+    fn default() -> Self {
+        Self { min_weight: 0.5, ambiguity: Ambiguity::Decide }
+    }
+}
+
 impl ContourSettings {
-    /// The default, with the weight that fits a map written out.
-    pub fn of(map: &impl DistanceMap<2>) -> Self {
-        Self { min_weight: Some(map.thresholds().surface), ..Self::default() }
+    /// The default with a least weight of half the weight of a typical beam of this map (0.5 where all beams weigh 1).
+    pub fn of(tsdf: &Tsdf<2>) -> Self {
+        Self { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..Self::default() }
     }
 }
 
@@ -45,10 +51,9 @@ struct RowEdges {
 
 /// The zero level set of a TSDF as oriented segments, free space on the left.
 ///
-/// Squares join the centres of four neighbouring cells; a crossing is placed on an edge by linear
-/// interpolation, `t = D_a / (D_a - D_b)`, which is exact for the piecewise-linear field of the samples.
-/// Negative is inside, zero is free. O(cells).
-pub fn marching_squares(tsdf: &Tsdf2, settings: &ContourSettings) -> Contour {
+/// The corners of a square are the centers of four neighboring cells; a vertex is placed on an edge by linear interpolation,
+/// `t = D_a / (D_a - D_b)`. Negative is inside, zero is free. O(cells).
+pub fn marching_squares(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Contour {
     let planes = tsdf.store().planes();
     let weight = planes.weights();
     let min_weight = settings.min_weight.unwrap_or(tsdf.thresholds().surface);
@@ -56,8 +61,8 @@ pub fn marching_squares(tsdf: &Tsdf2, settings: &ContourSettings) -> Contour {
     level_set(tsdf.grid(), planes.distances(), observed, settings.ambiguity)
 }
 
-/// [`marching_squares`] over any samples at cell centres, x fastest; squares with a corner that is not
-/// `observed` have no sign and get no segment.
+/// [`marching_squares`] over any samples at cell centers, x fastest; a square with a corner that is not `observed` gets no
+/// segment.
 pub fn level_set(
     grid: &Grid<2>,
     samples: &[f32],
@@ -153,7 +158,7 @@ fn vertex(
     *slot
 }
 
-/// Where between two centres with these values of different sign the contour crosses: in cells from the lower one.
+/// Position of the zero crossing between two cell centers with these values of different sign, in cells from the lower one.
 #[inline]
 pub(crate) fn crossing_place(a: f32, b: f32) -> f64 {
     let (a, b) = (f64::from(a), f64::from(b));

@@ -3,7 +3,7 @@
 use portolan::map::Tsdf3;
 use portolan::store::Store;
 use portolan::surface::Mesh;
-use portolan_sim::space::SpaceWorld;
+use portolan_sim::building::World3;
 use serde_json::{Value, json};
 
 use super::ask::ColorBy;
@@ -13,7 +13,13 @@ const ERROR_CELLS: f64 = 1.0;
 
 /// Four bytes per vertex: red, green, blue, 255 for colours as they were seen; else a step of a ramp, 0, 0, and 255 where
 /// there is a value. Nothing but zeros for heights, which the places tell.
-pub(super) fn shades(by: ColorBy, piece: &Mesh, tsdf: &Tsdf3, world: Option<&SpaceWorld>, out: &mut Vec<u8>) {
+pub(super) fn shades(
+    by: ColorBy,
+    piece: &Mesh,
+    tsdf: &SparseTsdf,
+    world: Option<&World3>,
+    out: &mut Vec<u8>,
+) {
     let known = |share: f64| [step(share), 0, 0, 255];
     for i in 0..piece.vertices.len() {
         let shade = match by {

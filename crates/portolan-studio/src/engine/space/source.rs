@@ -8,8 +8,8 @@ use portolan::map::Tsdf3;
 use portolan::scan::Frame;
 use portolan_io::scan_log::ScanLog;
 use portolan_sim::SEED;
-use portolan_sim::space::{
-    BuildingConfig, DepthCamera, SpaceLidar, SpaceSensor, SpaceWorld, building_poses, building_world,
+use portolan_sim::building::{
+    BuildingConfig, BuildingSensor, DepthCamera, SpinningLidar, World3, building_poses, building_world,
     camera_frame, lidar_frame,
 };
 
@@ -33,9 +33,9 @@ pub(super) struct Source {
 
 /// A walk through the building; its frames are made when they are first asked for.
 struct Walk {
-    sensor: SpaceSensor,
+    sensor: BuildingSensor,
     kind: Sensor,
-    world: SpaceWorld,
+    world: World3,
     poses: Vec<Pose<3>>,
     directions: Vec<[f64; 3]>,
     frames: Vec<Option<Arc<Frame>>>,
@@ -126,7 +126,7 @@ impl Source {
     }
 
     /// What there is in truth; `None` where nobody knows.
-    pub(super) fn world(&self) -> Option<&SpaceWorld> {
+    pub(super) fn world(&self) -> Option<&World3> {
         self.walk.as_ref().map(|walk| &walk.world)
     }
 
@@ -165,19 +165,23 @@ impl Walk {
     fn new(kind: Sensor) -> Self {
         // Downwards further than most lidars look, so that floors are whole; what escapes through the windows is not followed
         // far, since it is not what one wants to see.
-        let lidar =
-            SpaceLidar { columns: 600, elevation: [-0.95, 0.4], max_range: 9.0, ..SpaceLidar::default() };
+        let lidar = SpinningLidar {
+            columns: 600,
+            elevation: [-0.95, 0.4],
+            max_range: 9.0,
+            ..SpinningLidar::default()
+        };
         let (scans, sensor) = match kind {
-            Sensor::Lidar => (LIDAR_SCANS, SpaceSensor::Lidar(lidar)),
+            Sensor::Lidar => (LIDAR_SCANS, BuildingSensor::Lidar(lidar)),
             Sensor::Camera => {
-                (CAMERA_FRAMES, SpaceSensor::Camera(DepthCamera::default().scaled(CAMERA_SHARE)))
+                (CAMERA_FRAMES, BuildingSensor::Camera(DepthCamera::default().scaled(CAMERA_SHARE)))
             }
         };
         let building = building_world(SEED);
         let poses = building_poses(&building, &BuildingConfig { scans, sensor, seed: SEED });
         let directions = match &sensor {
-            SpaceSensor::Lidar(lidar) => lidar.directions(),
-            SpaceSensor::Camera(_) => Vec::new(),
+            BuildingSensor::Lidar(lidar) => lidar.directions(),
+            BuildingSensor::Camera(_) => Vec::new(),
         };
         let frames = vec![None; poses.len()];
         Self { sensor, kind, world: building.world, poses, directions, frames, bytes: 0 }
@@ -188,8 +192,10 @@ impl Walk {
         if place.is_none() {
             let noise = (SEED, i as u64);
             let frame = match &self.sensor {
-                SpaceSensor::Lidar(lidar) => lidar_frame(&self.world, pose, lidar, &self.directions, noise),
-                SpaceSensor::Camera(camera) => camera_frame(&self.world, pose, camera, noise),
+                BuildingSensor::Lidar(lidar) => {
+                    lidar_frame(&self.world, pose, lidar, &self.directions, noise)
+                }
+                BuildingSensor::Camera(camera) => camera_frame(&self.world, pose, camera, noise),
             };
             self.bytes += frame_bytes(&frame);
             *place = Some(Arc::new(frame));

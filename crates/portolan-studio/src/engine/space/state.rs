@@ -354,7 +354,7 @@ impl Space {
     }
 
     #[cfg(test)]
-    pub(super) fn world_for_tests(&self) -> Option<&portolan_sim::space::SpaceWorld> {
+    pub(super) fn world_for_tests(&self) -> Option<&portolan_sim::building::World3> {
         self.source.world()
     }
 

@@ -1,27 +1,28 @@
 //! Pieces of bricks joined into one mesh.
 
-use super::piece::{Attributes, Part, Piece, WORDS, bits, place_of};
+use super::piece::{Part, Piece, WORDS, bits, place_of};
+use super::vertex::Attributes;
 use crate::parallel;
 use crate::surface::Mesh;
 
-/// Where nodes sit: node `i` at `origin + (i + offset) * resolution`.
+/// Positions of nodes: node `i` lies at `origin + (i + offset) * resolution`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placement {
     pub(super) origin: [f64; 3],
     pub(super) resolution: f64,
     pub(super) offset: f64,
-    /// The brick whose lower corner is the mesh's origin; `None`: the corner of the box of all bricks with a piece.
+    /// The brick whose lower corner is the origin of the mesh; `None` for the lower corner of all bricks with a piece.
     pub(super) first: Option<[i32; 3]>,
 }
 
-/// Pieces that one worker fills in before it asks for more.
+/// Pieces in one task.
 const TOGETHER: usize = 128;
 
 /// No piece, or no vertex.
 const NONE: u32 = u32::MAX;
 
-/// Joins pieces, which come in ascending order of keys. Every crossing belongs to the brick where its edge starts, and
-/// pieces below find it by its place there: no positions are compared.
+/// Joins pieces in ascending order of keys. Every crossing belongs to the brick where its edge starts; lower neighbors find
+/// it by its place there, without comparing positions.
 pub(super) fn assemble(pieces: &[(&Part, &Piece)], placement: &Placement, want: Attributes) -> Mesh {
     let lowest = |k: usize| pieces.iter().map(|(_, p)| p.key.0[k]).min().unwrap_or(0);
     let first = placement.first.unwrap_or_else(|| [0, 1, 2].map(lowest));
@@ -59,17 +60,17 @@ pub(super) fn assemble(pieces: &[(&Part, &Piece)], placement: &Placement, want: 
     mesh
 }
 
-/// The vertices of a brick where not every crossing is one.
+/// The crossings of a brick that are vertices, for bricks with others.
 struct Kept {
     words: [u64; WORDS],
     rank: [u16; WORDS],
     count: u32,
 }
 
-/// Everything that is known before vertices and triangles are written.
+/// The layout of the mesh, computed before vertices and triangles are written.
 struct Joint<'a> {
     pieces: &'a [(&'a Part, &'a Piece)],
-    /// By piece and octant: the piece of the upper neighbour.
+    /// By piece and octant: the piece of the upper neighbor.
     owners: Vec<[u32; 8]>,
     kept: Vec<Option<Box<Kept>>>,
     /// First vertex and first triangle of every piece, and the totals.
@@ -108,7 +109,7 @@ impl Joint<'_> {
         }
     }
 
-    /// The vertices of a piece of which all are the mesh's: they follow each other there too, from `to` on.
+    /// Writes the vertices of a piece whose crossings are all vertices of the mesh, contiguous from `to` on.
     fn fill_all(&self, i: usize, to: usize, place: &mut Place) {
         let (part, piece) = self.pieces[i];
         let (from, count) = (piece.first_vertex as usize, (piece.own + piece.centres) as usize);
@@ -126,7 +127,7 @@ impl Joint<'_> {
         }
     }
 
-    /// The vertices of a piece that some cube uses.
+    /// Writes those vertices of a piece that some cube uses.
     fn fill_kept(&self, i: usize, vertex_0: u32, numbers: &[u32], place: &mut Place) {
         let (part, piece) = self.pieces[i];
         let (own, foreign, from) = (piece.own as usize, piece.foreign as usize, piece.first_vertex as usize);
@@ -147,7 +148,7 @@ impl Joint<'_> {
         }
     }
 
-    /// From cells of a brick to metres from the mesh's origin.
+    /// From cells of a brick to meters from the origin of the mesh.
     #[inline(always)]
     fn position(&self, piece: &Piece) -> impl Fn(&[f32; 3]) -> [f32; 3] {
         let base = [0, 1, 2]
@@ -156,7 +157,7 @@ impl Joint<'_> {
         move |p| [0, 1, 2].map(|k| ((base[k] + f64::from(p[k])) * scale) as f32)
     }
 
-    /// The mesh's numbers of a piece's vertices.
+    /// The indices in the mesh of the vertices of a piece.
     fn number(&self, i: usize, numbers: &mut Vec<u32>) {
         let (part, piece) = self.pieces[i];
         let start = self.starts[i].0;
@@ -193,7 +194,7 @@ impl Joint<'_> {
     }
 }
 
-/// The upper neighbours of every piece. Keys ascend, so that one walk per octant finds those of many pieces.
+/// The upper neighbors of every piece. Keys ascend, so that one pass per octant finds those of many pieces.
 fn owners(pieces: &[(&Part, &Piece)]) -> Vec<[u32; 8]> {
     let order = |key: [i32; 3]| (key[2], key[1], key[0]);
     let mut owners = vec![[NONE; 8]; pieces.len()];
@@ -225,7 +226,7 @@ fn owners(pieces: &[(&Part, &Piece)]) -> Vec<[u32; 8]> {
     owners
 }
 
-/// Where a piece has crossings that its own cubes do not use: those that some cube uses.
+/// For pieces with crossings that their own cubes do not use: the crossings that some cube uses.
 fn kept(pieces: &[(&Part, &Piece)], owners: &[[u32; 8]]) -> Vec<Option<Box<Kept>>> {
     let kept = |(_, piece): &(&Part, &Piece)| {
         let words = piece.used.as_deref().copied()?;

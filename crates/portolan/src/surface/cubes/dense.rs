@@ -1,18 +1,21 @@
 //! Meshes of dense arrays.
 
 use super::assemble::{Placement, assemble};
-use super::piece::{Attributes, Numbers, Part};
+use super::numbers::Numbers;
+use super::piece::Part;
 use super::samples::DenseSamples;
 use super::signs::{Layers, Signs, byte};
+use super::vertex::Attributes;
 use crate::geom::BlockKey;
 use crate::parallel;
 use crate::surface::Mesh;
 
 /// The level set of samples on a grid as triangles whose normals point to larger values.
 ///
-/// `samples` are x fastest, `shape` of them along each axis; the mesh is in units of the grid with sample (0, 0, 0) at
-/// the origin. Otherwise [`marching_cubes`](super::marching_cubes): samples below the level are inside, those that are
-/// not finite were not observed; the same code does the work. O(samples), at the speed of memory where no surface is.
+/// `samples` are x fastest, `shape` of them along each axis; the mesh is in units of the grid with sample (0, 0, 0) at the
+/// origin. Samples below the level are inside, samples that are not finite are unknown; otherwise as
+/// [`marching_cubes`](super::marching_cubes), with the same code. O(samples), limited by memory bandwidth away from the
+/// surface.
 ///
 /// # Panics
 /// Where the length of `samples` is not the product of `shape`, or an axis has more than 2^30 samples.
@@ -26,7 +29,7 @@ pub fn isosurface(samples: &[f32], shape: [usize; 3], level: f32, normals: bool)
     let parts = parallel::map_numbers(tiles.count(), scratch, |i, (signs, numbers, sizes)| {
         let tile = tiles.tile(i);
         tile.read(samples, shape, level, signs);
-        // As much as the tile before: arrays seldom grow.
+        // The sizes of the previous tile: arrays seldom grow.
         let mut part = Part::like(sizes);
         tile.mesh(&DenseSamples { samples, shape, level, first: [0; 3] }, want, signs, numbers, &mut part);
         *sizes = part.sizes();
@@ -37,8 +40,8 @@ pub fn isosurface(samples: &[f32], shape: [usize; 3], level: f32, normals: bool)
     assemble(&pieces, &placement, want)
 }
 
-/// Samples of a tile, of which signs are read first and values where there is surface: few enough to stay in the
-/// second level of cache in between.
+/// Samples of a tile. Their signs are read first, then values near the surface: few enough to stay in the second level of
+/// cache in between.
 const TILE: usize = 1 << 17;
 
 /// The bricks of an array in tiles: whole rows of bricks along x, some beside each other along y. In ascending order of
@@ -77,12 +80,12 @@ impl Tiles {
 }
 
 impl Tile {
-    /// Place of a brick's signs: those of the tile, and of its upper neighbours along y and z.
+    /// Index of the signs of a brick, of the tile or of its upper neighbors along y and z.
     fn place(&self, x: usize, y: usize, z: usize) -> usize {
         x + self.nx * (y - self.y.start + (self.y.len() + 1) * (z - self.z))
     }
 
-    /// Signs of the tile's nodes, and of the nearest ones of its upper neighbours.
+    /// Signs of the tile's nodes, and of the nearest ones of its upper neighbors.
     fn read(&self, samples: &[f32], shape: [usize; 3], level: f32, signs: &mut Vec<Signs>) {
         signs.clear();
         signs.resize(2 * self.nx * (self.y.len() + 1), Signs::NOTHING);

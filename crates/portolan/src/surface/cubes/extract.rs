@@ -1,9 +1,11 @@
 //! Meshes of bricks of signed distances.
 
 use super::assemble::{Placement, assemble};
-use super::piece::{Attributes, Numbers, Part};
+use super::numbers::Numbers;
+use super::piece::Part;
 use super::samples::{BrickSamples, MIDDLE, threshold};
 use super::signs::{Layers, Signs, signs_of_brick};
+use super::vertex::Attributes;
 use crate::cell::{Color, DistanceBrick, SignedDistance};
 use crate::geom::BlockKey;
 use crate::map::DistanceMap;
@@ -11,20 +13,19 @@ use crate::parallel;
 use crate::store::{Bricks, Store};
 use crate::surface::Mesh;
 
-/// How a mesh is extracted.
+/// Settings of [`marching_cubes`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshSettings {
-    /// A cube with a corner of smaller weight has no sign and gets no triangle: no geometry is invented. `None`: what fits
-    /// the map ([`Thresholds::surface`](crate::map::Thresholds::surface)), and any weight above 0 where cells alone are given.
-    pub min_weight: Option<f32>,
+    /// Cells of smaller weight are unknown; a cube with an unknown corner gets no triangles.
+    pub min_weight: f32,
     /// Whether vertices get normals.
     pub normals: bool,
-    /// Whether vertices get colours, where there are any.
+    /// Whether vertices get colors, if the map has any.
     pub colors: bool,
 }
 
 impl Default for MeshSettings {
-    /// The weight that fits the map; normals and colors.
+    /// A least weight of 0.5, half an observation; normals and colors.
     fn default() -> Self {
         Self { min_weight: None, normals: true, colors: true }
     }
@@ -42,28 +43,27 @@ impl MeshSettings {
 }
 
 impl Placement {
-    /// Samples sit at the centres of cells.
+    /// Samples lie at cell centers.
     pub(super) fn of(store: &Bricks<SignedDistance, 3>) -> Self {
         let lattice = store.lattice();
         Self { origin: lattice.origin, resolution: lattice.resolution, offset: 0.5, first: None }
     }
 }
 
-/// Bricks that one worker meshes before it asks for more.
+/// Bricks in one task.
 const TOGETHER: usize = 64;
 
 /// The zero level set of the distances as triangles whose normals point to free space.
 ///
-/// Cubes join the centres of eight neighbouring cells. Negative is inside, zero is free; a vertex lies on an edge
-/// between two cells of different sign by linear interpolation, 1/256 of a cell away from both at least. What eight
-/// signs leave open is decided as the trilinear field has it: faces by the exact sign at their saddle, so that both
-/// cubes at a face agree (asymptotic decider, Nielson & Hamann 1991), and the inside by following the level set through
-/// the cube; the triangles have the topology of the trilinear level set. A cube with a corner that was not observed, or
-/// by less than `min_weight`, gets no triangle.
+/// The corners of a cube are the centers of eight neighboring cells *(Lorensen & Cline 1987)*. Negative is inside, zero is
+/// free; a vertex is placed on an edge between two cells of different sign by linear interpolation, at least 1/256 of a cell
+/// from both. Cases that the eight signs leave ambiguous have the topology of the trilinear field: faces by the exact sign
+/// at their saddle, so that both cubes at a face agree (asymptotic decider, Nielson & Hamann 1991), and the interior by
+/// following the level set through the cube. A cube with a corner of weight 0 or less than `min_weight` gets no triangles.
 ///
-/// The mesh is a manifold: every edge lies between two triangles, or between one and what was not observed. It has no
-/// cracks between bricks: a vertex belongs to its edge. The order of everything is that of the bricks' keys and the same
-/// for any number of threads. `map` is a [`SparseTsdf`](crate::map::SparseTsdf), or the cells of one. O(cells), a few nanoseconds each where no surface is near; see the bench `mesh`.
+/// The mesh is a manifold: every edge has two triangles, or one at the border of observed space. There are no cracks between
+/// bricks. Vertices and triangles are in the order of the bricks' keys and do not depend on the number of threads. O(cells),
+/// a few nanoseconds per cell away from the surface; see the bench `mesh`.
 pub fn marching_cubes(
     map: &impl DistanceMap<3>,
     colors: Option<&Bricks<Color, 3>>,
@@ -103,7 +103,7 @@ fn mesh_of(
                 continue;
             }
             for (i, _) in &upper.walks {
-                let color = colors.and_then(|colors| colors.brick(neighbour(key, *i)));
+                let color = colors.and_then(|colors| colors.brick(neighbor(key, *i)));
                 samples.set(*i, upper.found[*i].map(|at| bricks[at].1), color);
             }
             part.add(key, &layers, &samples, want, numbers);
@@ -114,39 +114,38 @@ fn mesh_of(
     assemble(&pieces, &Placement::of(store), want)
 }
 
-/// The order of keys in one comparison.
+/// The order of keys as a tuple.
 pub(super) fn order(key: BlockKey<3>) -> (i32, i32, i32) {
     (key.0[2], key.0[1], key.0[0])
 }
 
-/// The key of a brick's neighbour in the order of [`BrickSamples`].
-pub(super) fn neighbour(key: BlockKey<3>, i: usize) -> BlockKey<3> {
+/// The key of a brick's neighbor in the order of [`BrickSamples`].
+pub(super) fn neighbor(key: BlockKey<3>, i: usize) -> BlockKey<3> {
     let offset = [i % 3, i / 3 % 3, i / 9];
     BlockKey(std::array::from_fn(|k| key.0[k] + offset[k] as i32 - 1))
 }
 
-/// Finds the neighbours of bricks in ascending order of keys: one walk per neighbour.
+/// Finds the neighbors of bricks in ascending order of keys: one pass per neighbor.
 struct Walk<'a> {
     bricks: &'a [(BlockKey<3>, &'a DistanceBrick)],
-    /// Neighbours looked for, and how far each walk is.
+    /// The neighbors to find, and the position of each pass.
     walks: Vec<(usize, usize)>,
-    /// Positions of the neighbours of the brick that was stepped to.
+    /// Positions of the neighbors of the current brick.
     found: [Option<usize>; 27],
 }
 
 impl<'a> Walk<'a> {
-    /// `all`: all 26 neighbours, not only the upper ones.
+    /// With `all`, finds all 26 neighbors, else the upper ones.
     fn new(bricks: &'a [(BlockKey<3>, &'a DistanceBrick)], range: std::ops::Range<usize>, all: bool) -> Self {
         let wanted = (0..27).filter(|&i| all || [i % 3, i / 3 % 3, i / 9].iter().all(|&k| k > 0));
         let start = bricks[range.start].0;
-        let walk =
-            |i: usize| (i, bricks.partition_point(|(key, _)| order(*key) < order(neighbour(start, i))));
+        let walk = |i: usize| (i, bricks.partition_point(|(key, _)| order(*key) < order(neighbor(start, i))));
         Self { bricks, walks: wanted.map(walk).collect(), found: [None; 27] }
     }
 
     fn step(&mut self, key: BlockKey<3>) {
         for (i, at) in &mut self.walks {
-            let wanted = neighbour(key, *i);
+            let wanted = neighbor(key, *i);
             while *at < self.bricks.len() && order(self.bricks[*at].0) < order(wanted) {
                 *at += 1;
             }

@@ -1,10 +1,12 @@
-//! A mesh that follows a map: only bricks near a change are meshed again.
+//! A mesh that is updated with its map: only bricks near a change are meshed again.
 
 use super::assemble::{Placement, assemble};
-use super::extract::{MeshSettings, neighbour, order};
-use super::piece::{Attributes, Numbers, Part, Piece, place_of};
+use super::extract::{MeshSettings, neighbor, order};
+use super::numbers::Numbers;
+use super::piece::{Part, Piece, place_of};
 use super::samples::{BrickSamples, threshold};
 use super::signs::{Layers, Signs, signs_of_brick};
+use super::vertex::Attributes;
 use crate::cell::{Color, SignedDistance};
 use crate::geom::BlockKey;
 use crate::parallel;
@@ -14,30 +16,30 @@ use rustc_hash::FxHashMap;
 
 /// The pieces of a mesh, brick by brick, kept between changes of the map.
 ///
-/// [`IncrementalMesh::update`] meshes again what changed since the last call; [`IncrementalMesh::mesh`] joins the pieces
-/// and gives the same bytes as [`marching_cubes`](super::marching_cubes) over the whole map.
+/// [`IncrementalMesh::update`] meshes the bricks that changed since the last call; [`IncrementalMesh::mesh`] joins the
+/// pieces. The result is equal, byte for byte, to [`marching_cubes`](super::marching_cubes) over the whole map.
 #[derive(Debug)]
 pub struct IncrementalMesh {
     settings: MeshSettings,
-    /// Whether the pieces have colours: whether the last update was given any.
+    /// Whether the pieces have colors: whether the last update had.
     colored: bool,
     pieces: FxHashMap<BlockKey<3>, Part>,
-    /// Epochs of distances and colours up to which the pieces are.
+    /// Epochs of distances and colors of the pieces.
     seen: [u64; 2],
     placement: Option<Placement>,
 }
 
 impl IncrementalMesh {
-    /// A mesh of nothing yet. [`MeshSettings::of`] are the settings that fit a map; without a weight any above 0 counts.
+    /// An empty mesh.
     pub fn new(settings: MeshSettings) -> Self {
         Self { settings, colored: false, pieces: FxHashMap::default(), seen: [0; 2], placement: None }
     }
 
-    /// Meshes the bricks again that changed since the last call, and those of their neighbours that read their cells:
-    /// the lower ones, and with normals, which come from differences between cells, all. Returns the keys of the pieces
-    /// that were made again, ascending. O(bricks) to look for changes, then O(changed bricks).
+    /// Meshes the bricks that changed since the last call, and the neighbors that read their cells: the lower ones, or all
+    /// for normals, which are differences between cells. Returns the keys of the pieces meshed, ascending. O(bricks) to find
+    /// changes, then O(changed bricks).
     ///
-    /// `store` and `colors` must be those of the last call, changed since; another map needs another `IncrementalMesh`.
+    /// `store` and `colors` must be those of the last call; use another `IncrementalMesh` for another map.
     pub fn update(
         &mut self,
         store: &Bricks<SignedDistance, 3>,
@@ -45,7 +47,7 @@ impl IncrementalMesh {
     ) -> Vec<BlockKey<3>> {
         let want = self.settings.attributes(colors.is_some());
         if want.colors != self.colored {
-            // Nothing of the pieces without colours can be kept.
+            // Pieces without colors cannot be kept.
             self.pieces.clear();
             self.seen = [0; 2];
             self.colored = want.colors;
@@ -54,9 +56,9 @@ impl IncrementalMesh {
         let mut dirty: Vec<BlockKey<3>> = Vec::new();
         let mut mark = |changed: Vec<BlockKey<3>>, all: bool| {
             for key in changed {
-                // A neighbour whose upper neighbour changed is a lower neighbour of the change.
+                // A neighbor whose upper neighbor changed is a lower neighbor of the change.
                 let lower = |i: &usize| all || [i % 3, i / 3 % 3, i / 9].iter().all(|&k| k < 2);
-                dirty.extend((0..27).filter(lower).map(|i| neighbour(key, i)));
+                dirty.extend((0..27).filter(lower).map(|i| neighbor(key, i)));
             }
         };
         mark(store.changed_since(self.seen[0]), want.normals);
@@ -100,15 +102,15 @@ impl IncrementalMesh {
         keys
     }
 
-    /// How many vertices and triangles [`IncrementalMesh::piece`] has; zeros where there is no surface. O(1).
+    /// The numbers of vertices and triangles of [`IncrementalMesh::piece`]; zeros for a brick without surface. O(1).
     pub fn piece_size(&self, key: BlockKey<3>) -> [usize; 2] {
         let piece = self.pieces.get(&key).and_then(|part| part.pieces.first());
         piece.map_or([0; 2], |p| [(p.own + p.foreign + p.centres) as usize, p.triangles as usize])
     }
 
-    /// The piece of one brick as a mesh that stands alone, for who draws a map brick by brick: triangles and places are those
-    /// of [`IncrementalMesh::mesh`], but vertices at the brick's upper sides are there once more than in the whole. Relative
-    /// to the corner of the brick `first`. Empty where there is no surface. O(triangles of the brick).
+    /// The piece of one brick as a mesh of its own, for drawing a map brick by brick: triangles and positions are those of
+    /// [`IncrementalMesh::mesh`]; vertices at the upper sides of the brick are duplicates of its neighbors'. The origin is
+    /// the lower corner of the brick `first`. Empty for a brick without surface. O(triangles of the brick).
     pub fn piece(&self, key: BlockKey<3>, first: BlockKey<3>) -> Mesh {
         let (Some(placement), Some(part)) = (&self.placement, self.pieces.get(&key)) else {
             return Mesh::default();
@@ -121,7 +123,7 @@ impl IncrementalMesh {
             ..Mesh::default()
         };
         let mut add = |part: &Part, piece: &Piece, i: usize| {
-            // The same operations as where pieces are joined, so that vertices have the same bits.
+            // The same operations as in `assemble`, so that vertices have the same bits.
             let place = |k: usize| {
                 let base = 8.0 * (f64::from(piece.key.0[k]) - f64::from(first.0[k])) + placement.offset;
                 ((base + f64::from(part.vertices[i][k])) * scale) as f32
@@ -141,7 +143,7 @@ impl IncrementalMesh {
             let octant = i32::from(code >> 11);
             let at = BlockKey(std::array::from_fn(|k| key.0[k] + (octant >> k & 1)));
             let owner = self.pieces.get(&at).and_then(|part| Some((part, part.pieces.first()?)));
-            // A crossing that a cube uses is its owner's, too: both were meshed from the same cells.
+            // A crossing that a cube uses exists in its owner: both were meshed from the same cells.
             let Some((part, owner)) = owner else { return Mesh::default() };
             let (word, bit) = place_of(code);
             let below = (owner.crossing[word] & ((1 << bit) - 1)).count_ones();
@@ -155,7 +157,7 @@ impl IncrementalMesh {
         mesh
     }
 
-    /// Bytes that the pieces hold.
+    /// Memory of the pieces (bytes).
     pub fn memory_bytes(&self) -> usize {
         self.pieces.values().map(Part::memory_bytes).sum::<usize>()
             + self.pieces.capacity() * (size_of::<(BlockKey<3>, Part)>() + 1)
@@ -181,7 +183,7 @@ fn mesh_brick(
     if layers.any_crossing() {
         let mut samples = BrickSamples::new(threshold);
         for i in 0..27 {
-            let at = neighbour(key, i);
+            let at = neighbor(key, i);
             samples.set(i, store.brick(at), colors.and_then(|colors| colors.brick(at)));
         }
         part.add(key, &layers, &samples, want, numbers);

@@ -2,8 +2,8 @@
 
 use super::numbering::{EDGES, edge_between, face_corners};
 
-/// Faces whose diagonal corners agree and whose neighbours differ, a bit each: the signs alone do not tell which
-/// diagonal is joined.
+/// Ambiguous faces, a bit each: their diagonal corners have equal signs, neighboring corners different ones, so that the
+/// signs do not determine which diagonal is joined.
 pub(super) fn ambiguous_faces(case: u8) -> u8 {
     (0..6)
         .filter(|&face| is_ambiguous(face_corners(face).map(|c| case >> c & 1 == 1)))

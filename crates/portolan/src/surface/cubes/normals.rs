@@ -1,8 +1,8 @@
-//! Normals: from the field, and where the field has none, from the triangles.
+//! Normals: from the gradient of the field, or from the triangles where that is zero.
 
 use crate::surface::Mesh;
 
-/// A derivative at length one; zero where it has no direction.
+/// A gradient scaled to length one; zero where undefined.
 pub(super) fn unit(gradient: [f32; 3]) -> [f32; 3] {
     let square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2];
     if square > f32::MIN_POSITIVE && square.is_finite() {

@@ -1,4 +1,4 @@
-//! How corners, edges and faces of a cube are numbered.
+//! The numbering of corners, edges and faces of a cube.
 //!
 //! ```text
 //!        6 ------- 7          corner = x + 2 y + 4 z
@@ -24,7 +24,7 @@ pub(crate) const fn edge_start(edge: u8) -> (usize, u8) {
     (axis, corner)
 }
 
-/// The edge between two neighbouring corners.
+/// The edge between two neighboring corners.
 pub(super) const fn edge_between(c: u8, d: u8) -> u8 {
     let (low, axis) = (c & d, (c ^ d).trailing_zeros() as u8);
     axis << 2

@@ -1,7 +1,7 @@
 //! Triangles between the loops of a cube: discs over one loop, tubes between two.
 //!
-//! The rule that makes meshes of neighbouring cubes fit: **no triangle edge lies in a face of the cube, save the pieces
-//! of the loops.** Such an edge could be made by the neighbour as well, and would then have four triangles.
+//! The rule by which meshes of neighboring cubes fit: **no triangle edge lies in a face of the cube, except the segments
+//! of the loops.** The neighbor could have the same edge, which would then have four triangles.
 
 use super::numbering::{middle, share_face};
 
@@ -21,7 +21,7 @@ fn length(a: u8, b: u8) -> f64 {
 
 impl Patch {
     /// Adds a disc over a loop: the triangulation of the polygon with the shortest diagonals of which none lies in a
-    /// face; where there is no such triangulation, a fan around a centre.
+    /// face; if no such triangulation exists, a fan around a center.
     pub(super) fn disc(&mut self, line: &[u8]) {
         let n = line.len();
         // best[i][j]: cheapest triangulation of the polygon from vertex i to vertex j, and the apex of its triangle at
@@ -57,8 +57,8 @@ impl Patch {
         }
     }
 
-    /// Adds a tube between two loops: with the shortest edges between them of which none lies in a face; where there is
-    /// no such tube, with a ring of vertices inside the cube half way, one for each vertex of `a`.
+    /// Adds a tube between two loops: with the shortest edges between them of which none lies in a face; if no such tube
+    /// exists, with a ring of vertices inside the cube half way, one for each vertex of `a`.
     pub(super) fn tube(&mut self, a: &[u8], b: &[u8]) {
         if let Some(steps) = walk(a, b, true) {
             self.triangles.extend(steps.iter().map(|step| step.triangle(a, b)));
@@ -98,8 +98,8 @@ impl Step {
     }
 }
 
-/// The way once around two loops, forward along `a` and backward along `b`, with the shortest edges between them;
-/// `apart`: none of them in a face. `None` where there is no way.
+/// The path once around two loops, forward along `a` and backward along `b`, with the shortest edges between them; with
+/// `apart`, none of them in a face. `None` if no such path exists.
 fn walk(a: &[u8], b: &[u8], apart: bool) -> Option<Vec<Step>> {
     let (n, m) = (a.len(), b.len());
     let mut shortest: Option<(f64, Vec<Step>)> = None;

@@ -1,21 +1,16 @@
 //! The surface in the 8 x 8 x 8 cubes whose lowest nodes are one brick's.
 
+use super::numbers::Numbers;
 use super::samples::Samples;
 use super::signs::{LAST_COLUMN, LAST_ROW, Layers, next_column};
-use super::table::{ASK, MOST, Plain, TABLE, Table, local};
+use super::table::{AMBIGUOUS, TABLE, Table, local};
+use super::vertex::{Attributes, Vertex, centre, crossing};
 use crate::geom::BlockKey;
-
-/// What vertices carry beside their position.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Attributes {
-    pub(super) normals: bool,
-    pub(super) colors: bool,
-}
 
 /// Words of edge bits of a brick: axis + 3 z, a bit per node where an edge starts.
 pub(super) const WORDS: usize = 24;
 
-/// Place of an edge among those of its brick: 64 word + bit. An edge of an upper neighbour has the neighbour's octant
+/// Place of an edge among those of its brick: 64 word + bit. An edge of an upper neighbor has the neighbor's octant
 /// in the bits from 11 on.
 pub(super) type EdgeCode = u16;
 
@@ -27,7 +22,7 @@ pub(super) fn place_of(code: EdgeCode) -> (usize, u32) {
 /// What one brick adds to a [`Part`]: how many entries, and where they start.
 ///
 /// The vertices of a piece are numbered: crossings of its own edges (those that start at its nodes) in the order of the
-/// words, then crossings of its upper neighbours' edges that its cubes use, then centres of cubes.
+/// words, then crossings of its upper neighbors' edges that its cubes use, then centres of cubes.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
     pub(super) key: BlockKey<3>,
@@ -35,8 +30,8 @@ pub(super) struct Piece {
     pub(super) crossing: [u64; WORDS],
     /// Number of crossings in the words before each.
     pub(super) rank: [u16; WORDS],
-    /// Own edges that the piece's own cubes use; `None`: all crossings. Those that no cube uses, of this brick or of a
-    /// neighbour, are no vertices.
+    /// Own edges that the piece's own cubes use; `None` for all crossings. Crossings that no cube uses, of this brick or of
+    /// a neighbor, do not become vertices.
     pub(super) used: Option<Box<[u64; WORDS]>>,
     pub(super) own: u32,
     pub(super) foreign: u32,
@@ -53,101 +48,11 @@ pub(super) struct Part {
     pub(super) pieces: Vec<Piece>,
     /// Own crossings, then centres, of each piece: in cells from the brick's lowest node.
     pub(super) vertices: Vec<[f32; 3]>,
-    /// Derivatives of the field there, not yet of length one; empty if not asked for.
+    /// Gradients of the field there, not normalized; empty if not requested.
     pub(super) gradients: Vec<[f32; 3]>,
     pub(super) colors: Vec<[u8; 3]>,
     pub(super) foreign: Vec<EdgeCode>,
     pub(super) triangles: Vec<[u16; 3]>,
-}
-
-/// A crossing keeps this much of its edge away from both nodes: a value of exactly zero makes no triangles without area
-/// and no two vertices in one place. It moves a vertex by 1/256 of a cell at most.
-const MARGIN: f32 = 1.0 / 256.0;
-
-/// Colour of a vertex of which no node has one.
-const NO_COLOR: [u8; 3] = [128; 3];
-
-#[derive(Clone, Copy, Default)]
-struct Vertex {
-    position: [f32; 3],
-    gradient: [f32; 3],
-    color: [u8; 3],
-}
-
-/// Where between two nodes with these values of different sign the surface crosses: in cells from the lower one.
-#[inline(always)]
-pub(crate) fn crossing_place(a: f32, b: f32) -> f32 {
-    (a / (a - b)).clamp(MARGIN, 1.0 - MARGIN)
-}
-
-/// The crossing of the edge that starts at `node`: linear between its ends, from the lower one to the upper one, so
-/// that every cube at the edge computes the same bits.
-#[inline(always)]
-fn crossing(samples: &impl Samples, node: [i32; 3], axis: usize, want: Attributes) -> Vertex {
-    let mut end = node;
-    end[axis] += 1;
-    let (a, b) = (samples.value(node), samples.value(end));
-    let t = crossing_place(a, b);
-    let mut vertex =
-        Vertex { position: [node[0] as f32, node[1] as f32, node[2] as f32], ..Vertex::default() };
-    vertex.position[axis] += t;
-    if want.normals {
-        let (ga, gb) = (samples.gradient(node), samples.gradient(end));
-        for k in 0..3 {
-            vertex.gradient[k] = ga[k] + t * (gb[k] - ga[k]);
-        }
-    }
-    if want.colors {
-        vertex.color = color(samples, node, end, t);
-    }
-    vertex
-}
-
-/// The colour between two nodes: each counts by its weight and its nearness.
-fn color(samples: &impl Samples, node: [i32; 3], end: [i32; 3], t: f32) -> [u8; 3] {
-    let ends = [(samples.color(node), 1.0 - t), (samples.color(end), t)];
-    let (mut sum, mut total) = ([0.0f32; 3], 0.0);
-    for (c, near) in ends.into_iter().filter_map(|(c, near)| Some((c?, near))) {
-        let w = f32::from(c.weight) * near;
-        total += w;
-        (0..3).for_each(|k| sum[k] += w * f32::from(c.rgb[k]));
-    }
-    if total > 0.0 { sum.map(|s| (s / total / 257.0 + 0.5) as u8) } else { NO_COLOR }
-}
-
-/// Vertex numbers by place of the edge ([`local`]), and the triangles of one layer; reused from brick to brick.
-pub(super) struct Numbers {
-    edges: Box<[u16; 4096]>,
-    triangles: Box<[[u16; 3]; 64 * MOST]>,
-}
-
-impl Numbers {
-    pub(super) fn new() -> Self {
-        Self { edges: Box::new([0; 4096]), triangles: Box::new([[0; 3]; 64 * MOST]) }
-    }
-
-    #[inline(always)]
-    fn at(&mut self, axis: usize, node: usize) -> &mut u16 {
-        &mut self.edges[(axis << 10 | node) & 4095]
-    }
-
-    #[inline(always)]
-    fn get(&self, node: usize, edge: u16) -> u16 {
-        self.edges[(node + usize::from(edge)) & 4095]
-    }
-
-    /// Triangles of a cube from place `at` on. Always [`MOST`] of them: what is too many the next cube overwrites, and
-    /// no branch depends on how many there are.
-    #[inline(always)]
-    fn put(&mut self, at: usize, node: usize, plain: &Plain) {
-        if let Some(out) = self.triangles.get_mut(at..at + MOST) {
-            for k in 0..MOST {
-                for v in 0..3 {
-                    out[k][v] = self.edges[(node + usize::from(plain.corners[k][v])) & 4095];
-                }
-            }
-        }
-    }
 }
 
 #[inline(always)]
@@ -161,7 +66,7 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
 }
 
 impl Part {
-    /// An empty part with room for as much as another one holds, and a little more.
+    /// An empty part with a capacity of the sizes of another one and an eighth more.
     pub(super) fn like(other: &[usize; 4]) -> Self {
         let [pieces, vertices, foreign, triangles] = other.map(|n| n + n / 8);
         Self {
@@ -173,12 +78,12 @@ impl Part {
         }
     }
 
-    /// How many pieces, vertices, edges of neighbours and triangles it holds.
+    /// Numbers of pieces, vertices, edges of neighbors and triangles.
     pub(super) fn sizes(&self) -> [usize; 4] {
         [self.pieces.len(), self.vertices.len(), self.foreign.len(), self.triangles.len()]
     }
 
-    /// Adds the piece of a brick, where there is surface.
+    /// Adds the piece of a brick, if it has surface.
     pub(super) fn add(
         &mut self,
         key: BlockKey<3>,
@@ -231,11 +136,11 @@ impl Part {
                 let case = case | bit(high.at, 4) | bit(high.x, 5) | bit(high.y, 6) | bit(high.xy, 7);
                 let node = (i & 7) + 9 * (i >> 3) + 81 * z;
                 let plain = &table.plain[case as usize & 255];
-                if plain.triangles == ASK {
+                if plain.triangles == AMBIGUOUS {
                     self.triangles.extend_from_slice(&numbers.triangles[..count]);
                     count = 0;
                     let at = [(i & 7) as i32, (i >> 3) as i32, z as i32];
-                    self.asked(&mut piece, case as u8, at, table, samples, want, numbers);
+                    self.add_ambiguous(&mut piece, case as u8, at, table, samples, want, numbers);
                     continue;
                 }
                 numbers.put(count, node, plain);
@@ -247,7 +152,7 @@ impl Part {
         self.pieces.push(piece);
     }
 
-    /// Bytes that the arrays hold.
+    /// Memory of the arrays (bytes).
     pub(super) fn memory_bytes(&self) -> usize {
         self.pieces.capacity() * size_of::<Piece>()
             + (self.vertices.capacity() + self.gradients.capacity()) * 12
@@ -282,7 +187,7 @@ impl Part {
         }
     }
 
-    /// The axis is a constant, so that every index is one.
+    /// The axis is a constant, so that indices are constants.
     #[inline(always)]
     fn own_crossings_along<const AXIS: usize>(
         &mut self,
@@ -348,10 +253,10 @@ impl Part {
         piece.foreign = u32::from(count) - piece.own;
     }
 
-    /// A cube whose signs do not tell all.
+    /// Adds the triangles of a cube that its signs leave ambiguous.
     #[cold]
     #[expect(clippy::too_many_arguments, reason = "the state of one loop")]
-    fn asked(
+    fn add_ambiguous(
         &mut self,
         piece: &mut Piece,
         case: u8,
@@ -375,26 +280,7 @@ impl Part {
     }
 }
 
-/// The mean of some crossings of a cube.
-fn centre(around: &[u8], at: [i32; 3], samples: &impl Samples, want: Attributes) -> Vertex {
-    let mut mean = Vertex::default();
-    let mut color = [0u32; 3];
-    let share = 1.0 / around.len() as f32;
-    for &edge in around {
-        let (axis, c) = super::numbering::edge_start(edge);
-        let node = std::array::from_fn(|k| at[k] + i32::from(c >> k & 1));
-        let v = crossing(samples, node, axis, want);
-        for k in 0..3 {
-            mean.position[k] += share * v.position[k];
-            mean.gradient[k] += share * v.gradient[k];
-            color[k] += u32::from(v.color[k]);
-        }
-    }
-    mean.color = color.map(|sum| (sum / around.len() as u32) as u8);
-    mean
-}
-
-/// The crossings that a brick's own cubes use; `None`: all.
+/// The crossings that a brick's own cubes use; `None` for all.
 fn own_used(crossing: &[u64; WORDS], full: &[u64; 9]) -> Option<Box<[u64; WORDS]>> {
     let mut used = *crossing;
     for z in 0..8 {

@@ -1,26 +1,26 @@
-//! Where a brick's cubes read their nodes: bricks of a store, or one dense array.
+//! The nodes of the cubes of a brick: from bricks of a store, or from a dense array.
 
 use crate::cell::{Color, ColorBrick, DistanceBrick};
 
-/// The nodes around a brick. Node (0, 0, 0) is its lowest one; -1 to 9 may be asked for along each axis.
+/// The nodes around a brick. Node (0, 0, 0) is its lowest one; indices are -1 to 9 along each axis.
 pub(super) trait Samples {
-    /// Value at a node that was observed; anything elsewhere.
+    /// Value at an observed node; unspecified elsewhere.
     fn value(&self, node: [i32; 3]) -> f32;
 
-    /// Value at a node, where it was observed.
+    /// Value at a node; `None` where unobserved.
     fn observed(&self, node: [i32; 3]) -> Option<f32>;
 
-    /// Colour at a node, where one was observed.
+    /// Color at a node; `None` where unobserved.
     fn color(&self, node: [i32; 3]) -> Option<Color>;
 
-    /// Derivative of the field per cell at an observed node: half the difference between its two neighbours along an
-    /// axis, the whole one to the neighbour that was observed, 0 where neither was.
+    /// Gradient of the field per cell at an observed node: central differences, one-sided where only one neighbor along an
+    /// axis was observed, 0 where none was.
     fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
         careful_gradient(self, node)
     }
 }
 
-/// [`Samples::gradient`] where anything may be missing.
+/// [`Samples::gradient`] where any node may be unobserved.
 fn careful_gradient(samples: &(impl Samples + ?Sized), node: [i32; 3]) -> [f32; 3] {
     let here = samples.value(node);
     let mut gradient = [0.0; 3];
@@ -38,7 +38,7 @@ fn careful_gradient(samples: &(impl Samples + ?Sized), node: [i32; 3]) -> [f32; 
     gradient
 }
 
-/// A brick and the 26 around it, x fastest; empty slices where there is none or where it is not needed.
+/// A brick and the 26 around it, x fastest; empty slices where missing or not needed.
 pub(super) struct BrickSamples<'a> {
     distances: [&'a [f32]; 27],
     weights: [&'a [f32]; 27],
@@ -49,14 +49,14 @@ pub(super) struct BrickSamples<'a> {
 /// The brick itself in the order of [`BrickSamples`].
 pub(super) const MIDDLE: usize = 13;
 
-/// The weight from which on a cell counts as observed: positive, and at least `min_weight`.
+/// The least weight of an observed cell: positive, and at least `min_weight`.
 pub(super) fn threshold(min_weight: f32) -> f32 {
     const SMALLEST: f32 = f32::from_bits(1);
     if min_weight <= 0.0 { SMALLEST } else { min_weight }
 }
 
 impl<'a> BrickSamples<'a> {
-    /// A cell was observed from a weight of `threshold` on.
+    /// Cells with a weight of at least `threshold` are observed.
     pub(super) fn new(threshold: f32) -> Self {
         Self { distances: [&[]; 27], weights: [&[]; 27], colors: [&[]; 27], threshold }
     }
@@ -91,7 +91,7 @@ impl Samples for BrickSamples<'_> {
         (weight >= self.threshold).then(|| self.distances[brick][i])
     }
 
-    /// Inside of one brick the neighbours are at fixed distances in memory.
+    /// Inside one brick the neighbors are at fixed distances in memory.
     #[inline]
     fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
         let (brick, i) = Self::place(node);
@@ -145,7 +145,7 @@ impl Samples for DenseSamples<'_> {
         inside.then(|| self.value(node)).filter(|v| v.is_finite())
     }
 
-    /// Away from the border the neighbours are at fixed distances in memory.
+    /// Away from the border the neighbors are at fixed distances in memory.
     #[inline]
     fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
         let inner = |k: usize| {
@@ -156,7 +156,7 @@ impl Samples for DenseSamples<'_> {
             let (i, row) = (self.index(node), self.shape[0]);
             let half = |stride: usize| 0.5 * (self.samples[i + stride] - self.samples[i - stride]);
             let gradient = [half(1), half(row), half(row * self.shape[1])];
-            // A neighbour that is not finite makes the difference so.
+            // A neighbor that is not finite makes the difference not finite.
             if gradient.iter().all(|v| v.is_finite()) {
                 return gradient;
             }

@@ -17,11 +17,11 @@ pub(super) struct Signs {
 }
 
 impl Signs {
-    /// What lies beyond everything.
+    /// The signs of a missing brick.
     pub(super) const NOTHING: Self = Self { inside: [0; 8], observed: [0; 8] };
 }
 
-/// One layer of a brick, seen four times: the nodes themselves, and their neighbours at x + 1, at y + 1 and at both.
+/// One layer of a brick, seen four times: the nodes themselves, and their neighbors at x + 1, at y + 1 and at both.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Layer {
     pub(super) at: u64,
@@ -31,7 +31,7 @@ pub(super) struct Layer {
 }
 
 impl Layer {
-    /// From the words of the brick, of its neighbours along x and y, and of the one along both.
+    /// From the words of the brick, of its neighbors along x and y, and of the one along both.
     #[inline(always)]
     pub(super) fn new([own, x, y, xy]: [u64; 4]) -> Self {
         let along_x = |own: u64, next: u64| (own >> 1) & !LAST_COLUMN | (next & FIRST_COLUMN) << 7;
@@ -65,7 +65,7 @@ pub(super) struct Layers {
 }
 
 impl Layers {
-    /// From the signs of a brick and of its seven upper neighbours, by octant (x, y, z as bits).
+    /// From the signs of a brick and of its seven upper neighbors, by octant (x, y, z as bits).
     #[inline]
     pub(super) fn new(octants: [&Signs; 8]) -> Self {
         let layer = |z: usize, word: fn(&Signs) -> &[u64; 8]| {

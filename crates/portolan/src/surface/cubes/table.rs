@@ -2,9 +2,9 @@
 //!
 //! 256 sign patterns; for each, every decision about its ambiguous faces; for each of these the loops on the faces and
 //! discs over them, and where two regions of the faces that hold opposite corners might be connected inside the cube,
-//! the tube instead of two discs. The surface of a trilinear field in a cube knows no other form: one disc per loop, or
-//! one tube between two loops and discs over the rest *(Nielson 2003; Chernyaev 1995 lists the 33 patterns up to
-//! symmetry)*. Nothing is copied from published tables.
+//! the tube instead of two discs. The surface of a trilinear field in a cube has no other form: one disc per loop, or one
+//! tube between two loops and discs over the rest *(Nielson 2003; Chernyaev 1995 lists the 33 patterns up to symmetry)*.
+//! Nothing is copied from published tables.
 
 use super::loops::{ambiguous_faces, inside_joined, loops, regions};
 use super::numbering::{edge_start, face_corners};
@@ -12,18 +12,18 @@ use super::patch::Patch;
 use super::tunnel::connected;
 use std::sync::LazyLock;
 
-/// Triangles of a cube whose signs tell all: four at most.
+/// Largest number of triangles of an unambiguous cube.
 pub(super) const MOST: usize = 4;
 
-/// A cube whose signs tell all: its triangles, as places in the [`local`] numbering, and their number.
+/// An unambiguous cube: its triangles, as places in the [`local`] numbering, and their number.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Plain {
     pub(super) corners: [[u16; 3]; MOST],
     pub(super) triangles: u16,
 }
 
-/// In [`Plain::triangles`]: the signs do not tell all.
-pub(super) const ASK: u16 = u16::MAX;
+/// In [`Plain::triangles`]: the signs leave the cube ambiguous.
+pub(super) const AMBIGUOUS: u16 = u16::MAX;
 
 /// Place of an edge of the cube at node 0 among the edges around a brick: its axis in the bits from 10 on, then the node
 /// where it starts, 9 nodes a row.
@@ -33,14 +33,14 @@ pub(super) const fn local(edge: u8) -> u16 {
     (axis as u16) << 10 | (x as u16 + 9 * y as u16 + 81 * z as u16)
 }
 
-/// What a cube looks like after its ambiguous faces were decided.
+/// The triangles of a cube after its ambiguous faces were decided.
 #[derive(Debug)]
 struct Decided {
     discs: Patch,
     tunnels: Vec<Tunnel>,
 }
 
-/// A tube, and the two opposite corners whose connection through the cube it is.
+/// A tube, and the two opposite corners that it connects through the cube.
 #[derive(Debug)]
 struct Tunnel {
     ends: [u8; 2],
@@ -60,7 +60,7 @@ pub(super) struct Table {
 pub(super) static TABLE: LazyLock<Table> = LazyLock::new(Table::generate);
 
 /// The triangles of a cube with these values at its corners, all observed: the places 0 to 11 are the crossings of its
-/// edges ([`edge_start`]), those from 12 on the means of the crossings that the second list names.
+/// edges ([`edge_start`]), those from 12 on the means of the crossings in the second list.
 pub(crate) fn cube_patch(d: &[f32; 8]) -> (&'static [[u8; 3]], &'static [Vec<u8>]) {
     let case = d.iter().enumerate().fold(0, |case, (c, &v)| case | u8::from(v < 0.0) << c);
     let patch = TABLE.patch(case, d);
@@ -90,7 +90,7 @@ impl Table {
                 }
                 plain.triangles = last.discs.triangles.len() as u16;
             } else {
-                plain.triangles = ASK;
+                plain.triangles = AMBIGUOUS;
             }
         }
         table
@@ -125,7 +125,7 @@ fn spread(mut subset: u8, mask: u8) -> u8 {
 }
 
 impl Decided {
-    /// `anywhere`: with tunnels also where there are none.
+    /// With `anywhere`, also with tunnels that the trilinear field cannot have (for tests).
     fn new(case: u8, joined: u8, anywhere: bool) -> Self {
         let faces = ambiguous_faces(case);
         let lines = loops(case, joined);
@@ -245,9 +245,9 @@ mod tests {
 
     #[test]
     fn half_of_all_sign_patterns_tell_all() {
-        assert_eq!(TABLE.plain.iter().filter(|p| p.triangles != ASK).count(), 128);
+        assert_eq!(TABLE.plain.iter().filter(|p| p.triangles != AMBIGUOUS).count(), 128);
         assert_eq!(TABLE.decided.len(), 656);
-        assert!(TABLE.plain.iter().all(|p| p.triangles == ASK || p.triangles <= 5));
+        assert!(TABLE.plain.iter().all(|p| p.triangles == AMBIGUOUS || p.triangles <= 5));
     }
 
     fn decided_of<'a>(all: &'a BTreeMap<(u8, u8), Decided>, d: &[f32; 8]) -> &'a Decided {
@@ -282,7 +282,7 @@ mod tests {
         assert!(found > 3000, "{found}");
     }
 
-    /// Parts of each sign of the trilinear field, by union of neighbouring samples on a grid of `n` per edge.
+    /// Parts of each sign of the trilinear field, by union of neighboring samples on a grid of `n` per edge.
     fn parts(d: &[f32; 8], n: usize) -> [usize; 2] {
         let at = |i: usize| i as f64 / (n - 1) as f64;
         let value = |x: f64, y: f64, z: f64| {
@@ -322,7 +322,7 @@ mod tests {
         for n in 0..6000 {
             let d = random_cube(&mut random, n);
             let case = (0..8).fold(0u8, |case, c| case | u8::from(d[c] < 0.0) << c);
-            if TABLE.plain[usize::from(case)].triangles != ASK {
+            if TABLE.plain[usize::from(case)].triangles != AMBIGUOUS {
                 continue;
             }
             let faces = (0..6).filter(|f| ambiguous_faces(case) >> f & 1 == 1);

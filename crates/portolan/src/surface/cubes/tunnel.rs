@@ -6,9 +6,9 @@
 /// A plane across the cube at height z sees a bilinear field with a value `v_i(z)`, linear in z, at each of the four
 /// upright edges. Its part of one sign consists of corners joined along sides, and of two diagonal corners joined where
 /// their product is the larger one. That changes only where some `v_i` or `v_0 v_3 - v_1 v_2`, a quadratic, is zero: at
-/// six heights at most. Between two of them one plane tells all, and from one interval to the next parts are connected
-/// along every edge that keeps its sign. So the answer is exact for the interpolant, up to rounding of the heights.
-/// (The classical interior test *(Chernyaev 1995)* looks at one height only, and is wrong in some cubes
+/// six heights at most. Between two of them one plane determines the connections, and from one interval to the next parts
+/// are connected along every edge that keeps its sign. The result is exact for the interpolant, up to rounding of the
+/// heights. (The classical interior test *(Chernyaev 1995)* uses one height only, and is wrong in some cubes
 /// *(Custodio et al. 2013)*.)
 pub(super) fn connected(d: &[f32; 8], a: u8, b: u8) -> bool {
     let sign = if d[a as usize] < 0.0 { -1.0 } else { 1.0 };
@@ -22,7 +22,7 @@ pub(super) fn connected(d: &[f32; 8], a: u8, b: u8) -> bool {
     let linear = low[0] * slope[3] + low[3] * slope[0] - low[1] * slope[2] - low[2] * slope[1];
     let constant = low[0] * low[3] - low[1] * low[2];
     [heights[6], heights[7]] = roots(square, linear, constant);
-    // What is not between 0 and 1 (NaN and infinity too) is no height.
+    // Heights outside 0 to 1, NaN and infinity included, are discarded.
     heights.iter_mut().filter(|z| !(**z >= 0.0 && **z <= 1.0)).for_each(|z| *z = 2.0);
     heights.sort_unstable_by(f64::total_cmp);
 
@@ -62,7 +62,7 @@ pub(super) fn connected(d: &[f32; 8], a: u8, b: u8) -> bool {
     parts[node(a)] == parts[node(b)]
 }
 
-/// Real roots of `a x² + b x + c`, 2 where there is none; without cancellation.
+/// Real roots of `a x² + b x + c`, computed without cancellation; 2 for each missing root.
 fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
     let discriminant = b * b - 4.0 * a * c;
     if !(discriminant >= 0.0) {

@@ -3,7 +3,7 @@
 use portolan::geom::Pose;
 use portolan::geom::vector::{along, distance, scale, sub, unit};
 
-/// Corners are rounded over so much of the path (metres).
+/// Corners are rounded over so much of the path (meters).
 const ROUNDING: f64 = 0.6;
 /// Places that are averaged for it.
 const PLACES: usize = 13;

@@ -8,21 +8,21 @@ use portolan::geom::vector::{along, distance, scale, sub, unit};
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
-/// A solid with a name and a colour.
+/// A solid with a name and a color.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// What it is, for people.
     pub name: String,
     /// Where it is.
     pub shape: Shape,
-    /// Red, green, blue of its light squares; see [`SpaceWorld::color`].
+    /// Red, green, blue of its light squares; see [`World3::color`].
     pub color: [u8; 3],
 }
 
 /// What a ray meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpaceHit {
-    /// Arc length (metres).
+pub struct RayHit3 {
+    /// Arc length (meters).
     pub range: f64,
     /// Unit normal of the surface, towards free space.
     pub normal: [f64; 3],
@@ -32,25 +32,25 @@ pub struct SpaceHit {
 
 /// Bodies in space. Bodies that overlap act as their union: there is no surface inside another body.
 ///
-/// Bodies that belong together must overlap, by centimetres, and not merely touch: then rays cannot slip between them, and
+/// Bodies that belong together must overlap, by centimeters, and not merely touch: then rays cannot slip between them, and
 /// no hidden face lies near to the visible one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SpaceWorld {
+pub struct World3 {
     bodies: Vec<Body>,
     shapes: Vec<Shape>,
     tree: Tree,
 }
 
-/// Edge of the squares of the painted checkerboard (metres).
+/// Edge of the squares of the painted checkerboard (meters).
 pub const CHECKER: f64 = 0.4;
-/// The checkerboard's lattice passes through here, off any wall (metres).
+/// The checkerboard's lattice passes through here, off any wall (meters).
 const CHECKER_ORIGIN: [f64; 3] = [0.137, 0.171, 0.259];
-/// Depths inside unions are found to this (metres).
+/// Depths inside unions are found to this (meters).
 pub const DEPTH_TOLERANCE: f64 = 1e-4;
 /// The search for them looks at no more cells than this.
 const DEPTH_CELLS: usize = 400_000;
 
-impl SpaceWorld {
+impl World3 {
     /// A world of these bodies.
     ///
     /// # Panics
@@ -75,9 +75,9 @@ impl SpaceWorld {
     }
 
     /// The first surface that a ray from free space meets; the direction has length 1. Exact; O(log bodies) as a rule.
-    pub fn cast_ray(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<SpaceHit> {
+    pub fn cast_ray(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<RayHit3> {
         let (body, entry) = self.tree.cast(&self.shapes, origin, direction)?;
-        Some(SpaceHit { range: entry.range, normal: entry.normal, body })
+        Some(RayHit3 { range: entry.range, normal: entry.normal, body })
     }
 
     /// Whether a point lies inside a body.
@@ -85,7 +85,7 @@ impl SpaceWorld {
         self.tree.nearest(&self.shapes, p).is_some_and(|(_, d)| d < 0.0)
     }
 
-    /// Signed distance to the surface of the union of all bodies (metres): positive in free space, negative inside.
+    /// Signed distance to the surface of the union of all bodies (meters): positive in free space, negative inside.
     /// Infinite in a world without bodies.
     ///
     /// Exact in free space, and inside wherever the nearest face of the body in which the point lies deepest is part of
@@ -96,8 +96,8 @@ impl SpaceWorld {
         if d >= 0.0 { d } else { -self.depth(p, body, -d) }
     }
 
-    /// The colour of the surface of a body near a point: the body's own, darker on every other square of a checkerboard
-    /// of [`CHECKER`] metres in space.
+    /// The color of the surface of a body near a point: the body's own, darker on every other square of a checkerboard
+    /// of [`CHECKER`] meters in space.
     pub fn color(&self, body: usize, p: [f64; 3]) -> [u8; 3] {
         let square =
             |k: usize| if ((p[k] - CHECKER_ORIGIN[k]) / CHECKER).floor() as i64 & 1 == 0 { 0 } else { 1 };
@@ -106,7 +106,7 @@ impl SpaceWorld {
         if odd { light.map(|v| (u16::from(v) * 7 / 10) as u8) } else { light }
     }
 
-    /// The colour of the surface nearest to a point of free space, or of the body that a point lies in; black in a
+    /// The color of the surface nearest to a point of free space, or of the body that a point lies in; black in a
     /// world without bodies.
     pub fn color_near(&self, p: [f64; 3]) -> [u8; 3] {
         self.tree.nearest(&self.shapes, p).map_or([0; 3], |(body, _)| self.color(body, p))
@@ -175,7 +175,7 @@ impl SpaceWorld {
         found.max(at_least)
     }
 
-    /// Where the way from inside to a point of free space leaves the bodies for the last time (metres from `p`).
+    /// Where the way from inside to a point of free space leaves the bodies for the last time (meters from `p`).
     fn first_free(&self, p: [f64; 3], free: [f64; 3]) -> f64 {
         let whole = distance(p, free);
         let back = scale(sub(p, free), 1.0 / whole);
@@ -192,7 +192,7 @@ impl SpaceWorld {
     }
 }
 
-impl Truth<3> for SpaceWorld {
+impl Truth<3> for World3 {
     fn signed_distance(&self, p_world: [f64; 3]) -> f64 {
         self.signed_distance(p_world)
     }
@@ -229,7 +229,7 @@ impl Ord for Cube {
 mod tests {
     use super::*;
     use crate::Random;
-    use crate::space::building_world;
+    use crate::building::building_world;
     use portolan::geom::Pose;
     use portolan::geom::vector::{dot, norm};
 
@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// Overlapping shapes of every kind, turned anyhow.
-    fn heap(seed: u64, count: usize) -> SpaceWorld {
+    fn heap(seed: u64, count: usize) -> World3 {
         let mut r = Random::stream(seed, 0);
         let mut bodies = Vec::new();
         for i in 0..count {
@@ -258,7 +258,7 @@ mod tests {
             };
             bodies.push(body(shape));
         }
-        SpaceWorld::new(bodies)
+        World3::new(bodies)
     }
 
     #[test]
@@ -326,7 +326,7 @@ mod tests {
     #[test]
     fn depths_are_those_of_the_union() {
         // Two boxes that share a hidden face: the middle of the union is 0.5 deep, however near to that face.
-        let two = SpaceWorld::new(vec![
+        let two = World3::new(vec![
             body(Shape::between([-2.0, -0.5, -1.0], [0.1, 0.5, 1.0])),
             body(Shape::between([-0.1, -0.5, -1.0], [2.0, 0.5, 1.0])),
         ]);
@@ -367,7 +367,7 @@ mod tests {
         assert!([light, dark].contains(&at(1.0)));
         assert_ne!(at(1.0), at(1.0 + CHECKER));
         assert_eq!(at(1.0), at(1.0 + 2.0 * CHECKER));
-        assert_eq!(SpaceWorld::new(Vec::new()).color_near([0.0; 3]), [0; 3]);
-        assert_eq!(SpaceWorld::new(Vec::new()).signed_distance([0.0; 3]), f64::INFINITY);
+        assert_eq!(World3::new(Vec::new()).color_near([0.0; 3]), [0; 3]);
+        assert_eq!(World3::new(Vec::new()).signed_distance([0.0; 3]), f64::INFINITY);
     }
 }

@@ -14,14 +14,14 @@ use crate::tangent::stepped;
 impl<const D: usize> PoseGraph<D> {
     /// Moves the free vertices to a minimum of the cost, by Levenberg-Marquardt (Madsen, Nielsen & Tingleff 2004,
     /// section 3.2, with the damping scaled by the diagonal). The result is the same bytes on every machine.
-    /// On an error the graph is left as it was.
+    /// On an error the graph is unchanged.
     ///
-    /// Each iteration costs O(edges) and one sparse factorisation.
+    /// Each iteration costs O(edges) and one sparse factorization.
     ///
     /// # Errors
-    /// [`GraphError::Setting`], [`GraphError::Disconnected`] (where asked for), [`GraphError::NotFinite`],
-    /// [`GraphError::Singular`].
-    pub fn optimise(&mut self, settings: &Settings) -> Result<Report, GraphError> {
+    /// [`GraphError::Setting`], [`GraphError::Disconnected`] (only with [`Settings::require_connected`]),
+    /// [`GraphError::NotFinite`], [`GraphError::Singular`].
+    pub fn optimize(&mut self, settings: &Settings) -> Result<Report, GraphError> {
         settings.validate()?;
         let anchors = anchors(self);
         if settings.require_connected && anchors.components > 1 {
@@ -63,7 +63,7 @@ impl Trace {
         Self { stop: Some(stop), ..self }
     }
 
-    /// Adds what came after; its first entry is the moment of our last one, under another kernel.
+    /// Appends a later descent. Its first entry has the poses of the last entry here, under another kernel.
     fn append(&mut self, later: Self) {
         self.chi_square.pop();
         self.cost.pop();
@@ -73,7 +73,7 @@ impl Trace {
         self.stop = later.stop;
     }
 
-    fn tell(self, report: &mut Report, other_iterations: usize) {
+    fn write_to(self, report: &mut Report, other_iterations: usize) {
         report.chi_square = self.chi_square;
         report.cost = self.cost;
         report.iterations = self.iterations + other_iterations;
@@ -81,7 +81,7 @@ impl Trace {
     }
 }
 
-/// Nothing is further from a minimum than this much damping.
+/// A step that fails at this damping will not succeed at a larger one.
 const LARGEST_DAMPING: f64 = 1e12;
 
 struct Descent<const D: usize, const B: usize> {
@@ -104,41 +104,41 @@ impl<const D: usize, const B: usize> Descent<D, B> {
         }
     }
 
-    /// The approaches asked for, and of their ends the one that costs least.
+    /// Runs the approaches of the settings and keeps the result with the lowest cost.
     fn run(mut self, settings: &Settings, report: &mut Report) -> Result<Self, GraphError> {
         report.factor_blocks = self.system.pattern.factor_blocks();
         let direct = |s: &mut Self| s.descend(settings.kernel, settings.relative_tolerance, settings);
         let Some(k) = settings.kernel.scale() else {
-            direct(&mut self)?.tell(report, 0);
+            direct(&mut self)?.write_to(report, 0);
             return Ok(self);
         };
         match settings.approach {
-            Approach::Direct => direct(&mut self)?.tell(report, 0),
-            Approach::Graduated => self.narrow(k, settings)?.tell(report, 0),
+            Approach::Direct => direct(&mut self)?.write_to(report, 0),
+            Approach::Graduated => self.narrow(k, settings)?.write_to(report, 0),
             Approach::Better => {
                 let start = self.poses.clone();
                 let straight = direct(&mut self)?;
                 let kept = std::mem::replace(&mut self.poses, start);
                 let narrowed = self.narrow(k, settings)?;
                 if narrowed.cost.last() < straight.cost.last() {
-                    narrowed.tell(report, straight.iterations);
+                    narrowed.write_to(report, straight.iterations);
                 } else {
                     self.poses = kept;
-                    straight.tell(report, narrowed.iterations);
+                    straight.write_to(report, narrowed.iterations);
                 }
             }
         }
         Ok(self)
     }
 
-    /// From a kernel so wide that no edge is an outlier to one of scale `k`, by halves.
+    /// Narrows the kernel from a scale at which no edge is an outlier to the scale `k`, halving it in each stage.
     fn narrow(&mut self, k: f64, settings: &Settings) -> Result<Trace, GraphError> {
         let halvings = (0.5 * libm::log2(2.0 * self.system.worst(&self.poses) / (k * k))).ceil();
         let mut all = Trace::default();
-        // 2^200 is wider than any cost that is worth a stage; NaN (nothing is off) becomes 0.
+        // 2^200 is wider than any cost that needs a stage; NaN (no edge has an error) becomes 0.
         for stage in (0..=halvings.clamp(0.0, 200.0) as i32).rev() {
             let kernel = settings.kernel.with_scale(libm::scalbn(k, stage));
-            // On the way it is enough to stay near the minimum.
+            // Intermediate stages only have to stay near the minimum.
             let tolerance = settings.relative_tolerance.max(if stage > 0 { 1e-2 } else { 0.0 });
             let left = Settings { max_iterations: settings.max_iterations - all.iterations, ..*settings };
             all.append(self.descend(kernel, tolerance, &left)?);
@@ -155,7 +155,7 @@ impl<const D: usize, const B: usize> Descent<D, B> {
         }
         let (mut damping, mut growth) = (settings.damping, 2.0);
         loop {
-            self.system.linearise(&self.poses, kernel, &mut self.h, &mut self.g);
+            self.system.linearize(&self.poses, kernel, &mut self.h, &mut self.g);
             let accepted = loop {
                 if trace.iterations >= settings.max_iterations {
                     return Ok(trace.ended(Stop::IterationLimit));
@@ -170,7 +170,7 @@ impl<const D: usize, const B: usize> Descent<D, B> {
                 };
                 let new = self.system.cost(&poses, kernel);
                 let gain = (cost.robust - new.robust) / predicted;
-                // A cost that is not finite compares false: the step is taken back.
+                // A cost that is not finite compares false: the step is rejected.
                 if new.robust <= cost.robust && gain.is_finite() {
                     self.poses = poses;
                     let fit = 2.0 * gain - 1.0;
@@ -197,7 +197,7 @@ impl<const D: usize, const B: usize> Descent<D, B> {
         }
     }
 
-    /// The poses after a damped step, and by how much the linear model says that the cost falls.
+    /// The poses after a damped step, and the decrease of the cost that the linear model predicts.
     fn step(&mut self, damping: f64) -> Option<(Vec<Pose<D>>, f64)> {
         let pattern = &self.system.pattern;
         self.factor.factor(pattern, &self.h, damping)?;
@@ -222,7 +222,7 @@ impl<const D: usize, const B: usize> Descent<D, B> {
     }
 }
 
-/// Rounding undone, so that a thousand steps leave a rotation a rotation; `None` where the step overflowed.
+/// The pose with its rotation made orthonormal again after rounding; `None` where the step overflowed.
 fn rigid<const D: usize>(pose: Pose<D>) -> Option<Pose<D>> {
     Pose::from_matrix(pose.rotation, pose.translation).ok().map(|(pose, _)| pose)
 }

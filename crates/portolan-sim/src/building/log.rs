@@ -1,19 +1,19 @@
 //! A walk through the Building with a sensor.
 
 use super::camera::{DepthCamera, camera_frame};
-use super::lidar::{SpaceLidar, lidar_frame};
-use super::plan::{Building, building_world};
+use super::floor_plan::{Building, building_world};
+use super::lidar::{SpinningLidar, lidar_frame};
 use super::walk::{BODY_FROM_CAMERA, Walk, body_pose};
-use super::world::SpaceWorld;
+use super::world::World3;
 use crate::SEED;
 use portolan::geom::Pose;
 use portolan::scan::Frame;
 
 /// What is carried through the Building.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SpaceSensor {
+pub enum BuildingSensor {
     /// Upright, at 1.15 m.
-    Lidar(SpaceLidar),
+    Lidar(SpinningLidar),
     /// At 1.4 m, looking around and a little down.
     Camera(DepthCamera),
 }
@@ -24,7 +24,7 @@ pub struct BuildingConfig {
     /// Scans, at equal distances along the closed path through all rooms.
     pub scans: usize,
     /// The sensor.
-    pub sensor: SpaceSensor,
+    pub sensor: BuildingSensor,
     /// Furniture, noise.
     pub seed: u64,
 }
@@ -32,7 +32,7 @@ pub struct BuildingConfig {
 impl Default for BuildingConfig {
     /// 40 scans of the default lidar.
     fn default() -> Self {
-        Self { scans: 40, sensor: SpaceSensor::Lidar(SpaceLidar::default()), seed: SEED }
+        Self { scans: 40, sensor: BuildingSensor::Lidar(SpinningLidar::default()), seed: SEED }
     }
 }
 
@@ -40,7 +40,7 @@ impl Default for BuildingConfig {
 #[derive(Clone, Debug)]
 pub struct BuildingLog {
     /// The truth.
-    pub world: SpaceWorld,
+    pub world: World3,
     /// `world_from_sensor` and what was seen.
     pub scans: Vec<(Pose<3>, Frame)>,
     /// When each was taken (seconds): ten a second.
@@ -50,27 +50,27 @@ pub struct BuildingLog {
 /// One walk through the Building: everything that a demonstration in space needs.
 ///
 /// ```
-/// use portolan_sim::space::{BuildingConfig, SpaceLidar, SpaceSensor, building};
+/// use portolan_sim::building::{BuildingConfig, SpinningLidar, BuildingSensor, building_log};
 ///
-/// let sensor = SpaceSensor::Lidar(SpaceLidar { rings: 16, columns: 256, ..Default::default() });
-/// let log = building(&BuildingConfig { scans: 3, sensor, ..Default::default() });
+/// let sensor = BuildingSensor::Lidar(SpinningLidar { rings: 16, columns: 256, ..Default::default() });
+/// let log = building_log(&BuildingConfig { scans: 3, sensor, ..Default::default() });
 /// let (world_from_sensor, frame) = &log.scans[0];
 /// assert!(log.world.signed_distance(world_from_sensor.translation) > 0.25);
 /// assert!(frame.hits() > 3000);
 /// ```
-pub fn building(config: &BuildingConfig) -> BuildingLog {
+pub fn building_log(config: &BuildingConfig) -> BuildingLog {
     let building = building_world(config.seed);
     let poses = building_poses(&building, config);
     let directions = match &config.sensor {
-        SpaceSensor::Lidar(lidar) => lidar.directions(),
-        SpaceSensor::Camera(_) => Vec::new(),
+        BuildingSensor::Lidar(lidar) => lidar.directions(),
+        BuildingSensor::Camera(_) => Vec::new(),
     };
     let world = building.world;
     let scan = |(i, pose): (usize, Pose<3>)| {
         let noise = (config.seed, i as u64);
         let frame = match &config.sensor {
-            SpaceSensor::Lidar(lidar) => lidar_frame(&world, &pose, lidar, &directions, noise),
-            SpaceSensor::Camera(camera) => camera_frame(&world, &pose, camera, noise),
+            BuildingSensor::Lidar(lidar) => lidar_frame(&world, &pose, lidar, &directions, noise),
+            BuildingSensor::Camera(camera) => camera_frame(&world, &pose, camera, noise),
         };
         (pose, frame)
     };
@@ -87,11 +87,11 @@ pub fn building_poses(building: &Building, config: &BuildingConfig) -> Vec<Pose<
         let ([x, y], heading) = walk.after(share);
         let swing = |times: f64, phase: f64| libm::sin(std::f64::consts::TAU * times * share + phase);
         match config.sensor {
-            SpaceSensor::Lidar(_) => {
+            BuildingSensor::Lidar(_) => {
                 let place = [x, y, 1.15 + 0.04 * swing(17.0, 0.0)];
                 body_pose(place, heading, 0.0, 0.05 * swing(11.0, 1.0), 0.04 * swing(7.0, 2.0))
             }
-            SpaceSensor::Camera(_) => {
+            BuildingSensor::Camera(_) => {
                 let place = [x, y, 1.4 + 0.05 * swing(5.0, 0.0)];
                 let (turn, pitch) = (1.2 * swing(9.0, 0.0), 0.25 + 0.25 * swing(14.0, 1.0));
                 body_pose(place, heading, turn, pitch, 0.04 * swing(6.0, 0.5)) * BODY_FROM_CAMERA
@@ -125,13 +125,13 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_bytes_on_every_platform() {
-        let lidar = SpaceLidar { rings: 16, columns: 128, ..Default::default() };
+        let lidar = SpinningLidar { rings: 16, columns: 128, ..Default::default() };
         let camera = DepthCamera::default().scaled(0.1);
-        let of = |sensor, seed| fingerprint(&building(&BuildingConfig { scans: 10, sensor, seed }));
-        let lidar_bytes = of(SpaceSensor::Lidar(lidar), SEED);
-        assert_eq!(lidar_bytes, of(SpaceSensor::Lidar(lidar), SEED));
-        assert_ne!(lidar_bytes, of(SpaceSensor::Lidar(lidar), SEED + 1));
-        let camera_bytes = of(SpaceSensor::Camera(camera), SEED);
+        let of = |sensor, seed| fingerprint(&building_log(&BuildingConfig { scans: 10, sensor, seed }));
+        let lidar_bytes = of(BuildingSensor::Lidar(lidar), SEED);
+        assert_eq!(lidar_bytes, of(BuildingSensor::Lidar(lidar), SEED));
+        assert_ne!(lidar_bytes, of(BuildingSensor::Lidar(lidar), SEED + 1));
+        let camera_bytes = of(BuildingSensor::Camera(camera), SEED);
         println!("{lidar_bytes:#x} {camera_bytes:#x}");
         // The walk that figures in the documentation are measured on.
         assert_eq!((lidar_bytes, camera_bytes), (0xfd65_8d01_0a43_3e2d, 0xe114_bace_f211_ed3e));
@@ -139,7 +139,8 @@ mod tests {
 
     #[test]
     fn poses_are_rigid_and_keep_clear() {
-        for sensor in [SpaceSensor::Lidar(SpaceLidar::default()), SpaceSensor::Camera(DepthCamera::default())]
+        for sensor in
+            [BuildingSensor::Lidar(SpinningLidar::default()), BuildingSensor::Camera(DepthCamera::default())]
         {
             let config = BuildingConfig { scans: 300, sensor, ..Default::default() };
             let building = building_world(config.seed);
@@ -153,7 +154,7 @@ mod tests {
     #[test]
     fn twenty_scans_of_65_000_rays_take_a_moment() {
         let start = std::time::Instant::now();
-        let log = building(&BuildingConfig { scans: 20, ..Default::default() });
+        let log = building_log(&BuildingConfig { scans: 20, ..Default::default() });
         let took = start.elapsed().as_secs_f64();
         let hits: usize = log.scans.iter().map(|s| s.1.hits()).sum();
         println!("{hits} points, {} bodies: {took:.2} s", log.world.bodies().len());

@@ -1,15 +1,15 @@
-//! A depth camera that sees colour.
+//! A depth camera that sees color.
 
-use super::world::SpaceWorld;
+use super::world::World3;
 use crate::Random;
 use portolan::geom::Pose;
 use portolan::geom::vector::{along, norm, scale};
 use portolan::scan::{Frame, Pinhole, RangeImage};
 
-/// A depth camera; depth and colour come from one place.
+/// A depth camera; depth and color come from one place.
 ///
 /// The depth's noise is independent, normal and without bias, with a standard deviation of
-/// `noise + noise_quadratic (z - 0.4 m)^2`. Directions, colours and poses are exact: no distortion, no mixed pixel at
+/// `noise + noise_quadratic (z - 0.4 m)^2`. Directions, colors and poses are exact: no distortion, no mixed pixel at
 /// edges, no shadow of a projector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthCamera {
@@ -19,20 +19,20 @@ pub struct DepthCamera {
     pub columns: usize,
     /// Rows.
     pub rows: usize,
-    /// Depths outside of these are no readings (metres).
+    /// Depths outside of these are no readings (meters).
     pub depth: [f64; 2],
-    /// Standard deviation of a depth at 0.4 m (metres).
+    /// Standard deviation of a depth at 0.4 m (meters).
     pub noise: f64,
-    /// How it grows with the squared distance (per metre).
+    /// How it grows with the squared distance (per meter).
     pub noise_quadratic: f64,
-    /// Depths are rounded to multiples of this (metres); 0: not at all.
+    /// Depths are rounded to multiples of this (meters); 0: not at all.
     pub step: f64,
     /// Share of pixels without a reading, whatever is there.
     pub dropped_rate: f64,
 }
 
 impl Default for DepthCamera {
-    /// 640 x 480 pixels, 525 pixels focal length, 0.3 m to 8 m, in millimetres, one pixel in 200 lost; noise as of a
+    /// 640 x 480 pixels, 525 pixels focal length, 0.3 m to 8 m, in millimeters, one pixel in 200 lost; noise as of a
     /// Kinect: 1.2 mm at 0.4 m, 14 mm at 3 m (Nguyen, Izadi & Lovell 2012, doi:10.1109/3DIMPVT.2012.84).
     fn default() -> Self {
         Self {
@@ -63,7 +63,7 @@ impl DepthCamera {
         Self { pinhole, columns: pixels(self.columns), rows: pixels(self.rows), ..self }
     }
 
-    /// Standard deviation of a depth (metres).
+    /// Standard deviation of a depth (meters).
     pub fn sigma(&self, depth: f64) -> f64 {
         self.noise + self.noise_quadratic * (depth - 0.4) * (depth - 0.4)
     }
@@ -71,7 +71,7 @@ impl DepthCamera {
 
 /// What the camera sees from a pose (x right, y down, z forward). The noise is that of the stream `(seed, index)` alone.
 pub fn camera_frame(
-    world: &SpaceWorld,
+    world: &World3,
     world_from_camera: &Pose<3>,
     camera: &DepthCamera,
     (seed, index): (u64, u64),
@@ -105,8 +105,8 @@ pub fn camera_frame(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::building_world;
-    use crate::space::walk::{BODY_FROM_CAMERA, body_pose};
+    use crate::building::building_world;
+    use crate::building::walk::{BODY_FROM_CAMERA, body_pose};
 
     #[test]
     fn depths_are_those_of_the_surface_with_the_stated_noise() {

@@ -1,6 +1,6 @@
 //! What kind of place a mesh shows, and views of it that tell at once whether it is good.
 
-use super::camera::{Camera, Lens};
+use super::camera::{Camera, Projection};
 use super::mesh::MeshView;
 use super::vector::{along, cross, dot, sub, unit_or};
 
@@ -8,7 +8,7 @@ use super::vector::{along, cross, dot, sub, unit_or};
 /// up is z. Of a scanner with parallel rays along -z: forward is -z, up is y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
-    /// In the mesh's coordinates (metres).
+    /// In the mesh's coordinates (meters).
     pub position: [f32; 3],
     /// The direction it looked in.
     pub forward: [f32; 3],
@@ -18,13 +18,13 @@ pub struct Sensor {
 
 /// A mesh as a place: which way is up, what is inside, how far it reaches.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
+pub(super) struct MeshScene {
     /// Unit vector upwards.
-    pub up: [f32; 3],
+    pub(super) up: [f32; 3],
     /// Whether the sensors stood among the surfaces, and not around them.
-    pub inside: bool,
-    /// Height of a ceiling along `up` (metres), if there is one over the sensors.
-    pub ceiling: Option<f32>,
+    pub(super) inside: bool,
+    /// Height of a ceiling along `up` (meters), if there is one over the sensors.
+    pub(super) ceiling: Option<f32>,
     /// Vertices, thinned, without the farthest: what a view should hold.
     sample: Vec<[f32; 3]>,
     /// Their middles, normals and areas, for triangles, thinned.
@@ -44,9 +44,9 @@ const THINNED: usize = 60_000;
 /// Share of vertices at either end of every axis that a view need not hold: what was seen through windows.
 const STRAYS: f32 = 0.015;
 
-impl Setting {
+impl MeshScene {
     /// Looks at a mesh and at where its sensors stood. O(triangles / thinning + sensors).
-    pub fn of(mesh: &MeshView<'_>, sensors: &[Sensor]) -> Self {
+    pub(super) fn of(mesh: &MeshView<'_>, sensors: &[Sensor]) -> Self {
         let every = mesh.triangles.len().div_ceil(THINNED).max(1);
         let faces: Vec<Face> = (0..mesh.triangles.len())
             .step_by(every)
@@ -59,12 +59,12 @@ impl Setting {
             })
             .collect();
         let up = upwards(&faces, sensors);
-        let mut setting =
+        let mut scene =
             Self { up, inside: false, ceiling: None, sample: Vec::new(), faces, sensors: sensors.to_vec() };
-        setting.sample = setting.without_strays();
-        setting.inside = setting.is_inside();
-        setting.ceiling = if setting.inside { setting.find_ceiling() } else { None };
-        setting
+        scene.sample = scene.without_strays();
+        scene.inside = scene.is_inside();
+        scene.ceiling = if scene.inside { scene.find_ceiling() } else { None };
+        scene
     }
 
     /// Axes of the place: two level ones, the first along its length, and up.
@@ -160,7 +160,7 @@ impl Setting {
 
     /// From above at about 45 degrees, along the longer side, with the ceiling taken away: of rooms. Of an object, from where
     /// its sensors stood. `aspect` is the picture's width over its height.
-    pub fn overview(&self, aspect: f32) -> Camera {
+    pub(super) fn overview(&self, aspect: f32) -> Camera {
         let back = if self.inside {
             // The side from which more of the surfaces face the viewer.
             let shown = |from: [f32; 3]| -> f32 {
@@ -175,7 +175,7 @@ impl Setting {
     }
 
     /// Of an object: from its other side, if it has one that was seen, else as one of the sensors saw it; and from above.
-    pub fn other_sides(&self, aspect: f32) -> Vec<Camera> {
+    pub(super) fn other_sides(&self, aspect: f32) -> Vec<Camera> {
         let front = self.sensors_side();
         let rise = dot(front, self.up);
         let other = along(front.map(|v| -v), self.up, 2.0 * rise);
@@ -267,7 +267,7 @@ impl Setting {
     }
 
     /// From sensors inside: up to `count` views that show much, far from each other. Empty where sensors stood outside.
-    pub fn inside_views(&self, count: usize) -> Vec<Camera> {
+    pub(super) fn inside_views(&self, count: usize) -> Vec<Camera> {
         let mut scored: Vec<(f32, Camera)> = Vec::new();
         if !self.inside {
             return Vec::new();
@@ -307,14 +307,14 @@ impl Setting {
     /// How much a view shows: the share of a coarse picture with surfaces facing it, near ones counting less.
     fn worth(&self, camera: &Camera) -> f32 {
         const SIZE: [usize; 2] = [32, 22];
-        let lens = Lens::new(camera, SIZE[0], SIZE[1]);
+        let projection = Projection::new(camera, SIZE[0], SIZE[1]);
         let mut cells = vec![(f32::INFINITY, 0.0f32); SIZE[0] * SIZE[1]];
         for f in &self.faces {
-            let p = lens.view(f.middle);
+            let p = projection.view(f.middle);
             if p[2] < 0.1 {
                 continue;
             }
-            let [x, y] = lens.pixel(p);
+            let [x, y] = projection.pixel(p);
             if x < 0.0 || y < 0.0 || x >= SIZE[0] as f32 || y >= SIZE[1] as f32 {
                 continue;
             }
@@ -363,26 +363,26 @@ mod tests {
         let (vertices, triangles) = room([4.0, 7.0, 2.5]);
         let mesh = MeshView { vertices: &vertices, triangles: &triangles, normals: &[], colors: &[] };
         let sensors = [sensor([1.0, 2.0, 1.2], [0.0, 1.0, 0.0]), sensor([2.0, 4.0, 1.4], [0.0, 1.0, 0.0])];
-        let setting = Setting::of(&mesh, &sensors);
-        assert!(setting.inside);
-        assert!(setting.up[2] > 0.9999, "{:?}", setting.up);
-        assert!((setting.ceiling.unwrap() - 2.5).abs() < 0.01);
-        let [length, ..] = setting.axes();
+        let scene = MeshScene::of(&mesh, &sensors);
+        assert!(scene.inside);
+        assert!(scene.up[2] > 0.9999, "{:?}", scene.up);
+        assert!((scene.ceiling.unwrap() - 2.5).abs() < 0.01);
+        let [length, ..] = scene.axes();
         assert!(length[1].abs() > 0.999, "{length:?}");
-        let camera = setting.overview(1.5);
+        let camera = scene.overview(1.5);
         assert!(camera.cull_back && camera.cut.unwrap() < 2.5 && camera.eye[2] > 5.0);
         // All of it is in the picture, which it fills from one side to the other.
-        let lens = Lens::new(&camera, 300, 200);
+        let projection = Projection::new(&camera, 300, 200);
         let pixels: Vec<_> = vertices
             .iter()
             .filter(|v| v[2] < camera.cut.unwrap())
-            .map(|v| lens.pixel(lens.view(*v)))
+            .map(|v| projection.pixel(projection.view(*v)))
             .collect();
         let (left, right) = range(pixels.iter().map(|p| p[0]));
         let (top, bottom) = range(pixels.iter().map(|p| p[1]));
         assert!(left > 0.0 && right < 300.0 && top > 0.0 && bottom < 200.0);
         assert!(right - left > 270.0 || bottom - top > 180.0, "{left} {right} {top} {bottom}");
-        let views = setting.inside_views(2);
+        let views = scene.inside_views(2);
         assert_eq!(views.len(), 2);
         assert!(views.iter().all(|v| sensors.iter().any(|s| s.position == v.eye)));
     }
@@ -395,20 +395,20 @@ mod tests {
             .map(|i| 0.2 * i as f32 - 0.8)
             .map(|a| sensor([4.0 * a.cos(), 4.0 * a.sin(), 1.0], [-a.cos(), -a.sin(), -0.2]))
             .collect();
-        let setting = Setting::of(&mesh, &sensors);
-        assert!(!setting.inside && setting.ceiling.is_none());
-        let camera = setting.overview(1.0);
+        let scene = MeshScene::of(&mesh, &sensors);
+        assert!(!scene.inside && scene.ceiling.is_none());
+        let camera = scene.overview(1.0);
         assert!(camera.eye[0] > 2.0 && camera.eye[1].abs() < 1.0 && camera.eye[2] > 0.5, "{camera:?}");
-        assert!(!camera.cull_back && setting.inside_views(2).is_empty());
-        assert_eq!(setting.other_sides(1.0).len(), 2);
+        assert!(!camera.cull_back && scene.inside_views(2).is_empty());
+        assert_eq!(scene.other_sides(1.0).len(), 2);
         // Without any sensor too.
-        assert!(!Setting::of(&mesh, &[]).inside);
+        assert!(!MeshScene::of(&mesh, &[]).inside);
     }
 
     #[test]
     fn an_empty_mesh_has_views_too() {
         let empty = MeshView { vertices: &[], triangles: &[], normals: &[], colors: &[] };
-        let setting = Setting::of(&empty, &[sensor([0.0; 3], [1.0, 0.0, 0.0])]);
-        assert!(setting.overview(1.0).eye.iter().all(|v| v.is_finite()));
+        let scene = MeshScene::of(&empty, &[sensor([0.0; 3], [1.0, 0.0, 0.0])]);
+        assert!(scene.overview(1.0).eye.iter().all(|v| v.is_finite()));
     }
 }

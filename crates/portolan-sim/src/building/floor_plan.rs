@@ -2,7 +2,7 @@
 
 use super::furniture::{Furnisher, STONE, WALL};
 use super::shape::Shape;
-use super::world::{Body, SpaceWorld};
+use super::world::{Body, World3};
 use crate::Random;
 use std::f64::consts::FRAC_PI_2;
 
@@ -10,25 +10,25 @@ use std::f64::consts::FRAC_PI_2;
 #[derive(Clone, Debug)]
 pub struct Building {
     /// Walls and furniture.
-    pub world: SpaceWorld,
-    /// Corners of a closed path through all rooms (x and y, metres); the last is not the first again.
+    pub world: World3,
+    /// Corners of a closed path through all rooms (x and y, meters); the last is not the first again.
     pub path: Vec<[f64; 2]>,
 }
 
-/// Everything is moved by so much (metres): no face lies on a lattice of centimetres.
+/// Everything is moved by so much (meters): no face lies on a lattice of centimeters.
 const SHIFT: [f64; 3] = [0.0137, 0.0219, 0.0173];
-/// Inner size and clear height (metres).
+/// Inner size and clear height (meters).
 const SIZE: [f64; 3] = [11.373, 8.231, 2.687];
 const OUTER: f64 = 0.233;
 /// The walls between the rooms: a long one along x, one across on either side.
 const ALONG: [f64; 2] = [4.303, 4.464];
 const ACROSS_LOW: [f64; 2] = [6.107, 6.258];
 const ACROSS_HIGH: [f64; 2] = [3.911, 4.059];
-/// How far bodies that belong together reach into each other (metres).
+/// How far bodies that belong together reach into each other (meters).
 const SINK: f64 = 0.07;
 const DOOR_HEAD: f64 = 2.087;
 
-/// A hole in a wall: from where to where along it, from which height to which (metres).
+/// A hole in a wall: from where to where along it, from which height to which (meters).
 struct Opening {
     along: [f64; 2],
     height: [f64; 2],
@@ -69,10 +69,7 @@ pub fn building_world(seed: u64) -> Building {
         [1.95, 5.4],
         [1.95, 3.4],
     ];
-    Building {
-        world: SpaceWorld::new(bodies),
-        path: path.map(|[x, y]| [x + SHIFT[0], y + SHIFT[1]]).to_vec(),
-    }
+    Building { world: World3::new(bodies), path: path.map(|[x, y]| [x + SHIFT[0], y + SHIFT[1]]).to_vec() }
 }
 
 fn moved(shape: Shape) -> Shape {

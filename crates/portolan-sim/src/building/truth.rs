@@ -2,8 +2,9 @@
 //!
 //! The scores take closures, so that they fit any map.
 
-use super::world::SpaceWorld;
-use crate::{ErrorSummary, Random, Truth};
+use super::world::World3;
+use crate::Random;
+use portolan::gallery::{ErrorSummary, Truth};
 use portolan::geom::vector::{along, distance, dot, norm, scale, sub};
 use portolan::geom::{Aabb, Pose};
 use portolan::scan::Frame;
@@ -11,7 +12,7 @@ use portolan::scan::Frame;
 /// A point of the true surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// World, metres.
+    /// World, meters.
     pub point: [f64; 3],
     /// Unit normal, towards free space.
     pub normal: [f64; 3],
@@ -21,7 +22,7 @@ pub struct SurfacePoint {
 
 /// Points of the surface of the union of all bodies within a box, uniform by area. O(tries): faces inside other bodies
 /// and outside of the box are drawn in vain, at most a thousand times as often as points are wanted.
-pub fn surface_points(world: &SpaceWorld, within: &Aabb<3>, count: usize, seed: u64) -> Vec<SurfacePoint> {
+pub fn surface_points(world: &World3, within: &Aabb<3>, count: usize, seed: u64) -> Vec<SurfacePoint> {
     let mut random = Random::stream(seed, 0x5u64);
     let mut sums = Vec::new();
     let mut area = 0.0;
@@ -46,13 +47,13 @@ pub fn surface_points(world: &SpaceWorld, within: &Aabb<3>, count: usize, seed: 
     points
 }
 
-/// Those of the surface points that some scan saw: a ray of it ended within `reach` metres, nothing stands between the
+/// Those of the surface points that some scan saw: a ray of it ended within `reach` meters, nothing stands between the
 /// point and the sensor, and the cosine of the angle of incidence is at least `least_cos`.
 ///
 /// What no scan saw is unknown to any map. What rays only graze is lost to maps of rays where the surface runs through the
 /// lowest part of a cell: rays that end further on pass through the rest of it. O(points x scans + end points).
 pub fn seen_surface(
-    world: &SpaceWorld,
+    world: &World3,
     points: &[SurfacePoint],
     scans: &[(Pose<3>, Frame)],
     reach: f64,
@@ -94,13 +95,13 @@ fn end_points(frame: &Frame) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
     }
 }
 
-/// Points of free space that at least one ray passed through: each lies on a ray that ended on a surface, `margin` metres
+/// Points of free space that at least one ray passed through: each lies on a ray that ended on a surface, `margin` meters
 /// or more before its true end, and `margin` away from every surface. Fewer than `count` where hardly any are found.
 ///
 /// Scans and rays are drawn evenly, and the place on a ray so that far places are drawn as often as a uniform density in
 /// space would have it (the square of the range), as far as rays go.
 pub fn free_points(
-    world: &SpaceWorld,
+    world: &World3,
     scans: &[(Pose<3>, Frame)],
     margin: f64,
     count: usize,
@@ -170,7 +171,7 @@ pub fn score_free(points: &[[f64; 3]], mut is_free: impl FnMut([f64; 3]) -> Opti
     labels
 }
 
-/// Labels of points of the true surface: occupied where the map says so at the point or a `voxel` (metres) beside it along
+/// Labels of points of the true surface: occupied where the map says so at the point or a `voxel` (meters) beside it along
 /// an axis, because noise puts the end points of a surface into either of two cells; free where it calls the point free
 /// and none of those occupied.
 pub fn score_surface(
@@ -200,7 +201,7 @@ fn count(labels: &mut Labels, is_free: Option<bool>) {
     }
 }
 
-/// Signed distances of a reconstructed surface's points to the true surface (metres): the error of the reconstruction,
+/// Signed distances of a reconstructed surface's points to the true surface (meters): the error of the reconstruction,
 /// positive where it lies in free space. `None` without points.
 pub fn surface_errors(world: &impl Truth<3>, points: impl Iterator<Item = [f64; 3]>) -> Option<ErrorSummary> {
     ErrorSummary::of(points.map(|p| world.signed_distance(p)).collect())
@@ -209,13 +210,16 @@ pub fn surface_errors(world: &impl Truth<3>, points: impl Iterator<Item = [f64; 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::{BuildingConfig, SpaceLidar, SpaceSensor, building};
+    use crate::building::{BuildingConfig, BuildingSensor, SpinningLidar, building_log};
 
     #[test]
     fn samples_are_where_they_say() {
-        let lidar = SpaceLidar { rings: 32, columns: 360, ..Default::default() };
-        let log =
-            building(&BuildingConfig { scans: 8, sensor: SpaceSensor::Lidar(lidar), ..Default::default() });
+        let lidar = SpinningLidar { rings: 32, columns: 360, ..Default::default() };
+        let log = building_log(&BuildingConfig {
+            scans: 8,
+            sensor: BuildingSensor::Lidar(lidar),
+            ..Default::default()
+        });
         let world = &log.world;
         let inner = world.aabb().grown(-0.1);
         let surface = surface_points(world, &inner, 4000, 1);
@@ -244,15 +248,13 @@ mod tests {
     #[test]
     fn area_is_drawn_evenly() {
         // Half of a box is buried in another one: its points are those of what is left.
-        let shape = |min, max| crate::space::Body {
+        let shape = |min, max| crate::building::Body {
             name: String::new(),
-            shape: crate::space::Shape::between(min, max),
+            shape: crate::building::Shape::between(min, max),
             color: [0; 3],
         };
-        let world = SpaceWorld::new(vec![
-            shape([0.0; 3], [2.0, 1.0, 1.0]),
-            shape([1.0, -1.0, -1.0], [4.0, 2.0, 2.0]),
-        ]);
+        let world =
+            World3::new(vec![shape([0.0; 3], [2.0, 1.0, 1.0]), shape([1.0, -1.0, -1.0], [4.0, 2.0, 2.0])]);
         let points = surface_points(&world, &world.aabb(), 40_000, 3);
         // 1 m of a bar of 1 m x 1 m with one end, and a block without the bar's end.
         let (bar, block) = (4.0 + 1.0, 2.0 * 9.0 + 4.0 * 9.0 - 1.0);

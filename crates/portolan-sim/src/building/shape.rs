@@ -11,23 +11,23 @@ pub enum Shape {
     Box {
         /// Where it stands.
         world_from_box: Pose<3>,
-        /// Half its edges (metres).
+        /// Half its edges (meters).
         half: [f64; 3],
     },
     /// A cylinder whose axis is vertical.
     Cylinder {
-        /// Middle of the axis (metres).
+        /// Middle of the axis (meters).
         centre: [f64; 3],
-        /// Metres.
+        /// Meters.
         radius: f64,
-        /// Half its height (metres).
+        /// Half its height (meters).
         half_height: f64,
     },
     /// A ball.
     Sphere {
-        /// Metres.
+        /// Meters.
         centre: [f64; 3],
-        /// Metres.
+        /// Meters.
         radius: f64,
     },
 }
@@ -35,7 +35,7 @@ pub enum Shape {
 /// Where a ray enters a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
-    /// Arc length (metres).
+    /// Arc length (meters).
     pub(super) range: f64,
     /// Unit normal of the surface there, outwards.
     pub(super) normal: [f64; 3],
@@ -62,7 +62,7 @@ impl Shape {
         Aabb::new(along(centre, reach, -1.0), along(centre, reach, 1.0))
     }
 
-    /// Signed distance to its surface (metres): positive outside. Exact.
+    /// Signed distance to its surface (meters): positive outside. Exact.
     pub fn signed_distance(&self, p_world: [f64; 3]) -> f64 {
         match *self {
             Self::Box { world_from_box, half } => {
@@ -143,7 +143,7 @@ impl Shape {
         }
     }
 
-    /// Area of its surface (square metres).
+    /// Area of its surface (square meters).
     pub fn area(&self) -> f64 {
         let tau = std::f64::consts::TAU;
         match *self {

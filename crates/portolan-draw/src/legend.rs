@@ -58,7 +58,7 @@ impl Canvas {
         legend_height(rect.width, entries, font)
     }
 
-    /// A bar of a round number of metres at the lower right of the view, with its length written above it.
+    /// A bar of a round number of meters at the lower right of the view, with its length written above it.
     pub fn scale_bar(&mut self, view: &View) {
         let rect = view.rect();
         let metres = round_down(0.25 * rect.width / view.scale()[0]);

@@ -15,7 +15,7 @@ const GREEN: [u8; 3] = [104, 152, 96];
 const YELLOW: [u8; 3] = [219, 180, 76];
 const WHITE: [u8; 3] = [240, 240, 236];
 
-/// Legs begin so far below the floor (metres), so that they and the floor are one solid.
+/// Legs begin so far below the floor (meters), so that they and the floor are one solid.
 const SINK: f64 = -0.06;
 
 /// Puts furniture into a building, each piece a little off its place.

@@ -1,6 +1,6 @@
 //! A turning lidar with rings.
 
-use super::world::SpaceWorld;
+use super::world::World3;
 use crate::Random;
 use portolan::geom::Pose;
 use portolan::geom::vector::scale;
@@ -11,27 +11,27 @@ use portolan::scan::{Frame, PointScan, RangeImage, Spherical};
 /// The noise is that of the range alone: independent, normal, without bias. Directions are exact, and so are poses. There
 /// is no mixed pixel at edges, no motion during a turn and no dependence on the angle of incidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpaceLidar {
+pub struct SpinningLidar {
     /// Rings, at equal angles from the highest to the lowest elevation.
     pub rings: usize,
     /// Readings in a turn; the first looks along x, the turn is counter-clockwise.
     pub columns: usize,
     /// Lowest and highest elevation (radians).
     pub elevation: [f64; 2],
-    /// Rays that meet nothing up to here come back empty (metres).
+    /// Rays that meet nothing up to here come back empty (meters).
     pub max_range: f64,
-    /// Standard deviation of the range (metres).
+    /// Standard deviation of the range (meters).
     pub noise: f64,
     /// Share of rays that are lost, whatever is there; nothing is known of them.
     pub dropped_rate: f64,
     /// Whether rays that met nothing are told apart from lost ones: then they are free up to the maximum range.
     pub misses_known: bool,
     /// Whether the rows and columns are delivered beside the points.
-    pub organised: bool,
+    pub organized: bool,
 }
 
-impl Default for SpaceLidar {
-    /// 64 rings over ±22.5 degrees, 1024 columns, 30 m, noise 1 cm, one ray in 200 lost; misses known, organised.
+impl Default for SpinningLidar {
+    /// 64 rings over ±22.5 degrees, 1024 columns, 30 m, noise 1 cm, one ray in 200 lost; misses known, organized.
     fn default() -> Self {
         let edge = std::f64::consts::PI / 8.0;
         Self {
@@ -42,12 +42,12 @@ impl Default for SpaceLidar {
             noise: 0.01,
             dropped_rate: 0.005,
             misses_known: true,
-            organised: true,
+            organized: true,
         }
     }
 }
 
-impl SpaceLidar {
+impl SpinningLidar {
     /// Where rows and columns look.
     pub fn projection(&self) -> Spherical {
         let [low, high] = self.elevation;
@@ -74,12 +74,12 @@ impl SpaceLidar {
     }
 }
 
-/// What the lidar sees from a pose, with `directions` of [`SpaceLidar::directions`]. The noise is that of the stream
+/// What the lidar sees from a pose, with `directions` of [`SpinningLidar::directions`]. The noise is that of the stream
 /// `(seed, index)` alone.
 pub fn lidar_frame(
-    world: &SpaceWorld,
+    world: &World3,
     world_from_sensor: &Pose<3>,
-    lidar: &SpaceLidar,
+    lidar: &SpinningLidar,
     directions: &[[f64; 3]],
     (seed, index): (u64, u64),
 ) -> Frame {
@@ -107,8 +107,15 @@ pub fn lidar_frame(
         };
         values.push(value as f32);
     }
-    if lidar.organised {
-        scan.image = Some(RangeImage::from_ranges(lidar.projection(), lidar.columns, values));
+    if lidar.organized {
+        scan.image = Some(RangeImage {
+            projection: Projection::Spherical(lidar.projection()),
+            columns: lidar.columns,
+            rows: lidar.rings,
+            values,
+            colors: Vec::new(),
+            refused: RefusedBeams::default(),
+        });
     }
     Frame::Points(scan)
 }
@@ -116,13 +123,13 @@ pub fn lidar_frame(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::space::building_world;
+    use crate::building::building_world;
     use portolan::geom::vector::{norm, unit};
 
     #[test]
     fn noise_and_losses_are_as_stated() {
         let building = building_world(1);
-        let lidar = SpaceLidar::default();
+        let lidar = SpinningLidar::default();
         let directions = lidar.directions();
         let (mut errors, mut lost, mut rays) = (Vec::new(), 0, 0);
         for (i, &[x, y]) in building.path.iter().enumerate().step_by(3) {
@@ -158,7 +165,7 @@ mod tests {
     #[test]
     fn misses_are_absent_where_they_are_not_known() {
         let world = building_world(1).world;
-        let lidar = SpaceLidar { misses_known: false, organised: false, ..Default::default() };
+        let lidar = SpinningLidar { misses_known: false, organized: false, ..Default::default() };
         let pose = Pose { translation: [2.0, 2.9, 1.5], ..Pose::IDENTITY };
         let Frame::Points(scan) = lidar_frame(&world, &pose, &lidar, &lidar.directions(), (1, 0)) else {
             panic!("a lidar delivers points")

@@ -5,7 +5,7 @@ use portolan::geom::{Aabb, vector};
 
 /// Shapes in a leaf, at most.
 const LEAF: usize = 2;
-/// Boxes are a little larger than what is in them: rounding must not hide an edge (metres).
+/// Boxes are a little larger than what is in them: rounding must not hide an edge (meters).
 const SLACK: f64 = 1e-9;
 /// Trees are cut at the median, so that thousands of millions of shapes would not be deeper.
 const DEPTH: usize = 64;

@@ -1,0 +1,31 @@
+//! The simulator in 3-D: a building of solids known in closed form, a lidar and a depth camera in it, and ground truth to
+//! evaluate maps with.
+//!
+//! | question | start at |
+//! |---|---|
+//! | scans with poses, in one call | [`building_log`] |
+//! | what is there | [`building_world`], [`World3`], [`Body`], [`Shape`] |
+//! | what does a sensor see, and with which noise | [`SpinningLidar`], [`DepthCamera`] |
+//! | is a map right | [`surface_points`], [`free_points`]; [`score_free`], [`score_surface`], [`surface_errors`] |
+
+mod camera;
+mod floor_plan;
+mod furniture;
+mod lidar;
+mod log;
+mod shape;
+mod tree;
+mod truth;
+mod walk;
+mod world;
+
+pub use camera::{DepthCamera, camera_frame};
+pub use floor_plan::{Building, building_world};
+pub use lidar::{SpinningLidar, lidar_frame};
+pub use log::{BuildingConfig, BuildingLog, BuildingSensor, building_log, building_poses};
+pub use shape::Shape;
+pub use truth::{
+    Labels, SurfacePoint, free_points, score_free, score_surface, seen_surface, surface_errors,
+    surface_points,
+};
+pub use world::{Body, CHECKER, DEPTH_TOLERANCE, RayHit3, World3};
