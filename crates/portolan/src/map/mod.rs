@@ -1,17 +1,18 @@
-//! The maps: named combinations of sweep, cell and store.
+//! The maps: named combinations of sweep, cell and store, and the thin view that compares them.
 
 mod cloud;
 mod error;
 mod integrate;
-mod occupancy_grid;
-mod repr;
-mod sparse_occupancy;
+mod occupancy;
+mod occupancy_3d;
 #[cfg(test)]
-mod sparse_occupancy_tests;
-mod sparse_tsdf;
-mod sparse_tsdf_config;
+mod occupancy_projective_tests;
+mod occupancy_rings;
+#[cfg(test)]
+mod occupancy_tests;
+mod occupancy_tree;
+mod scan_kind;
 mod thresholds;
-mod tree_map;
 mod tsdf;
 mod tsdf_3d;
 mod tsdf_config;
@@ -19,19 +20,15 @@ mod tsdf_config;
 mod tsdf_tests;
 mod watch;
 
-pub use crate::sweep::OccupancySweep;
 pub use cloud::Cloud;
 pub use error::MapError;
-pub use occupancy_grid::OccupancyGrid;
-pub use repr::{Abilities, Derived, DerivedField, MapRepr};
-pub use sparse_occupancy::SparseOccupancy;
-pub use sparse_tsdf::SparseTsdf;
-pub use sparse_tsdf_config::{PointSweep, SparseTsdfConfig};
+pub use integrate::integrate;
+pub use occupancy::Occupancy;
+pub use occupancy_tree::CoarseOccupancy;
+pub use scan_kind::ScanKind;
 pub use thresholds::{DistanceMap, Thresholds};
-pub use tree_map::{
-    CoarseOccupancy, Octree, Quadtree, TreeMap, crossover_resolution, inner_only_node_bytes, memory_ratio,
-};
-pub use tsdf::{SweepKind, Tsdf, TsdfConfig};
+pub use tsdf::Tsdf;
+pub use tsdf_config::{BeamSweep, PointSweep, TsdfConfig};
 
 use crate::cell::{LogOdds8, SignedDistance};
 use crate::store::{Dense, Tree};
@@ -42,5 +39,9 @@ pub type DenseTsdf<const D: usize> = Tsdf<D, Dense<SignedDistance, D>>;
 pub type Tsdf2 = DenseTsdf<2>;
 /// A 3-D TSDF in bricks.
 pub type Tsdf3 = Tsdf<3>;
-/// Settings of a TSDF of the plane.
-pub type Tsdf2Config = TsdfConfig<2>;
+/// An occupancy map over all cells of a grid, one byte each.
+pub type OccupancyGrid<const D: usize> = Occupancy<D, LogOdds8, Dense<LogOdds8, D>>;
+/// A 2-D occupancy map in a pruned tree.
+pub type Quadtree = Occupancy<2, LogOdds8, Tree<LogOdds8, 2>>;
+/// A 3-D occupancy map in a pruned tree.
+pub type Octree = Occupancy<3, LogOdds8, Tree<LogOdds8, 3>>;

@@ -8,7 +8,7 @@ use crate::cell::{HitMiss, LogOdds8, LogOddsValue, OccupancyModel, Planes};
 use crate::geom::{Aabb, CellBox, Grid, Lattice, Pose, block_cells};
 use crate::scan::{PointScan, RangeImage, Scan, ScanStats};
 use crate::store::{Bricks, Dense, Store};
-use crate::sweep::{HitsAndMisses, Inside, OccupancySweep, Rays, Sweep};
+use crate::sweep::{HitMissSweep, Inside, OccupancySweep, Rays, Sweep};
 
 /// Clamped log odds of being occupied (Moravec & Elfes 1985), one byte a cell or one `f32`.
 ///
@@ -43,19 +43,19 @@ pub struct Occupancy<const D: usize, V: LogOddsValue = LogOdds8, S = Bricks<V, D
 #[derive(Clone, Debug)]
 pub(super) struct Sweeps<const D: usize> {
     beams: Rays<D>,
-    pub(super) images: HitsAndMisses<RangeImage>,
-    pub(super) points: HitsAndMisses<PointScan>,
+    pub(super) images: HitMissSweep<RangeImage>,
+    pub(super) points: HitMissSweep<PointScan>,
     /// Of points in the world's frame, seen from the pose's translation.
-    pub(super) world: HitsAndMisses<[[f64; 3]]>,
+    pub(super) world: HitMissSweep<[[f64; 3]]>,
 }
 
 impl<const D: usize> Sweeps<D> {
     fn new(wall_depth: f64, sweep: OccupancySweep) -> Self {
         Self {
             beams: Rays::new(wall_depth),
-            images: HitsAndMisses::new(sweep),
-            points: HitsAndMisses::new(sweep),
-            world: HitsAndMisses::new(OccupancySweep::Exact),
+            images: HitMissSweep::new(sweep),
+            points: HitMissSweep::new(sweep),
+            world: HitMissSweep::new(OccupancySweep::Exact),
         }
     }
 }

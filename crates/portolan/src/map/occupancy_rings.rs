@@ -1,10 +1,7 @@
 //! The nearest occupied cell of a dense map, by search.
 
-use super::MapError;
-use super::error::check_grid;
-use super::integrate::integrate;
-use crate::answer::Answer;
-use crate::cell::{Evidence, HitMiss, LogOdds8, LogOddsRule, OccupancyModel, ProbabilityTable};
+use super::Occupancy;
+use crate::cell::LogOddsValue;
 use crate::geom::vector::distance;
 use crate::store::Dense;
 
@@ -34,31 +31,6 @@ impl<const D: usize, V: LogOddsValue> Occupancy<D, V, Dense<V, D>> {
             });
         }
         (best <= limit).then_some(best)
-    }
-
-    /// Cells and where they are.
-    pub fn store(&self) -> &Dense<LogOdds8, D> {
-        &self.store
-    }
-
-    /// The model that the filter's numbers come from.
-    pub fn model(&self) -> &OccupancyModel {
-        &self.model
-    }
-
-    /// The filter.
-    pub fn rule(&self) -> &LogOddsRule<i8> {
-        &self.rule
-    }
-
-    /// Bytes of the cells, measured.
-    pub fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes()
-    }
-
-    /// Number of cells that were observed.
-    pub fn observed_cells(&self) -> usize {
-        (0..self.store.grid().len()).filter(|&i| self.store.at(i).is_some()).count()
     }
 }
 

@@ -1,8 +1,8 @@
 //! How much a cell must weigh to count as observed, by what observations weigh in its map.
 
-use super::{SparseTsdf, Tsdf};
+use super::{DenseTsdf, Tsdf};
 use crate::cell::SignedDistance;
-use crate::store::Bricks;
+use crate::store::{Bricks, Store};
 use crate::sweep::WeightModel;
 use std::borrow::Cow;
 
@@ -54,29 +54,22 @@ impl<const D: usize> DistanceMap<D> for Tsdf<D> {
     }
 
     fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>> {
-        Cow::Owned(self.store().into())
-    }
-}
-
-impl DistanceMap<3> for SparseTsdf {
-    fn thresholds(&self) -> Thresholds {
-        self.thresholds()
-    }
-
-    fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, 3>> {
         Cow::Borrowed(self.store())
     }
 }
 
-impl<const D: usize> Tsdf<D> {
-    /// How much cells must weigh to count, by what beams weigh in this map.
-    pub fn thresholds(&self) -> Thresholds {
-        Thresholds::of(self.config().weights, self.config().carve_weight)
+impl<const D: usize> DistanceMap<D> for DenseTsdf<D> {
+    fn thresholds(&self) -> Thresholds {
+        self.thresholds()
+    }
+
+    fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>> {
+        Cow::Owned(self.store().into())
     }
 }
 
-impl SparseTsdf {
-    /// How much cells must weigh to count, by what rays weigh in this map.
+impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
+    /// How much cells must weigh to count, by what beams weigh in this map.
     pub fn thresholds(&self) -> Thresholds {
         Thresholds::of(self.config().weights, self.config().carve_weight)
     }

@@ -1,8 +1,9 @@
 //! Truncated signed distance fields.
 
-use super::MapError;
-use super::error::check_grid;
-use super::integrate::integrate_watched;
+use super::error::{check_grid, check_lattice};
+use super::integrate::{limits, plan};
+use super::watch::Watch;
+use super::{BeamSweep, MapError, ScanKind, TsdfConfig};
 use crate::answer::Answer;
 use crate::cell::{
     Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
@@ -12,70 +13,8 @@ use crate::scan::{LayoutFinder, Scan, ScanStats};
 use crate::store::{Bricks, Dense, Store};
 use crate::sweep::{CellCentre, Inside, March, PointRays, Projective, Sweep, Swept, SweptColors};
 
-/// How a scan becomes observations of cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SweepKind {
-    /// At cell centres, with the range interpolated between neighbouring beams.
-    #[default]
-    CellCentre,
-    /// The textbook's march along every beam; puts surfaces about a quarter of a cell too far away.
-    March,
-}
-
-/// Settings of a [`Tsdf`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TsdfConfig<const D: usize> {
-    /// Number of cells along each axis.
-    pub cells: [usize; D],
-    /// Edge of a cell (metres).
-    pub resolution: f64,
-    /// World position of the lower corner of the first cell (metres).
-    pub origin: [f64; D],
-    /// Truncation tau (metres): two to four cells, and less than half of the thinnest wall that is seen from
-    /// both sides.
-    pub truncation: f64,
-    /// Clamp of the weight. Infinity: never forget.
-    pub w_max: f32,
-    /// Weight of an observation of free space beyond the truncation, times the beam's. The textbook's is 1. With
-    /// less, what was seen of a surface counts for more than that beams passed near it: thin things survive, and
-    /// what has gone fades more slowly, by the same factor.
-    pub carve_weight: f32,
-    /// How scans become observations.
-    pub sweep: SweepKind,
-    /// How much each beam is trusted.
-    pub weights: WeightModel,
-}
-
-impl<const D: usize> Default for TsdfConfig<D> {
-    /// The textbook's parameters (r 5 cm, tau 15 cm, W_max 64) and no cells.
-    fn default() -> Self {
-        Self {
-            cells: [0; D],
-            resolution: 0.05,
-            origin: [0.0; D],
-            truncation: 0.15,
-            w_max: 64.0,
-            carve_weight: 1.0,
-            sweep: SweepKind::default(),
-            weights: WeightModel::default(),
-        }
-    }
-}
-
-impl<const D: usize> TsdfConfig<D> {
-    /// These settings for the cells of a grid.
-    pub fn with_grid(self, grid: &Grid<D>) -> Self {
-        Self { cells: grid.shape, resolution: grid.lattice.resolution, origin: grid.lattice.origin, ..self }
-    }
-
-    /// The box of cells.
-    pub fn grid(&self) -> Grid<D> {
-        Grid::new(self.origin, self.resolution, self.cells)
-    }
-}
-
-/// A truncated signed distance field: per cell a scalar information filter of the signed distance to the
-/// nearest surface (Curless & Levoy 1996), in two `f32` planes.
+/// A truncated signed distance field: per cell a scalar information filter of the signed distance to the nearest surface
+/// (Curless & Levoy 1996).
 ///
 /// Distances are measured along rays and kept within the truncation: the map answers *where is the surface*, not *how far
 /// is it*; the distance field derived from it does that. Cells lie in bricks, which exist only where something was seen, or
@@ -308,20 +247,47 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
         }
     }
 
+    /// The color of the cell that holds a point; `None` where none was seen.
+    pub fn color(&self, p_world: impl Into<[f64; D]>) -> Option<Color> {
+        self.colors.as_ref()?.cell(self.lattice().cell_of(p_world.into())?)
+    }
+
     /// 1 behind the surface, 0 in front of it: the sign of the estimate. `None`: never observed, or outside.
     pub fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
-        let i = self.store.grid().index_of(p_world)?;
-        self.store.at(i).map(|c| if c.distance < 0.0 { 1.0 } else { 0.0 })
+        match self.signed_distance(p_world) {
+            Answer::Known(d) | Answer::Saturated(d) => Some(if d < 0.0 { 1.0 } else { 0.0 }),
+            Answer::Unknown | Answer::Outside => None,
+        }
     }
 
-    /// Bytes of the cells, measured.
+    /// The distances.
+    pub fn store(&self) -> &S {
+        &self.distances
+    }
+
+    /// The colors beside them; `None` where the map keeps none.
+    pub fn colors(&self) -> Option<&Bricks<Color, D>> {
+        self.colors.as_ref()
+    }
+
+    /// The stores of the map: distances, colors.
+    pub fn into_stores(self) -> (S, Option<Bricks<Color, D>>) {
+        (self.distances, self.colors)
+    }
+
+    /// Allows no more than `bytes` for distances and colors together from now on.
+    pub fn set_limit(&mut self, bytes: usize) {
+        self.limit = bytes;
+    }
+
+    /// Keeps to cells whose center lies in a box (world) from now on; `None`: everywhere.
+    pub fn set_bounds(&mut self, bounds: Option<Aabb<D>>) {
+        self.bounds = bounds;
+    }
+
+    /// Bytes that the cells hold: measured, not estimated.
     pub fn memory_bytes(&self) -> usize {
-        self.store.memory_bytes()
-    }
-
-    /// Cells and where they are.
-    pub fn store(&self) -> &Dense<SignedDistance, D> {
-        &self.store
+        self.distances.memory_bytes() + self.colors.as_ref().map_or(0, Store::memory_bytes)
     }
 
     /// The settings.
@@ -340,10 +306,16 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scan::RangeLimits;
+/// The colors of a swept scan, as evidence of its own.
+struct ColorsOf<'a, W> {
+    scan: &'a W,
+    /// Only cells so near to a surface have colors (metres).
+    band: f32,
+}
+
+impl<const D: usize, W: SweptColors<D>> Swept<D> for ColorsOf<'_, W> {
+    type Evidence = Colors;
+    type Scratch = (W::Scratch, Colors);
 
     fn scratch(&self) -> Self::Scratch {
         (self.scan.scratch(), Colors::silent(block_cells::<D>()))

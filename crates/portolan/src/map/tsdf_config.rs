@@ -94,9 +94,9 @@ impl<const D: usize> TsdfConfig<D> {
             return Err(TsdfRuleError::WeightClamp(self.color_w_max).into());
         }
         let most = LONGEST_RAY_CELLS * self.resolution;
-        let ranges = (self.min_range, self.max_range);
-        if !(ranges.0 >= 0.0 && ranges.1 > ranges.0 && ranges.1 + self.truncation <= most) {
-            return Err(MapError::Ranges { min: ranges.0, max: ranges.1, most });
+        let (min, max) = (self.min_range, self.max_range);
+        if !(min >= 0.0 && max > min && max + self.truncation <= most) {
+            return Err(MapError::Ranges { min, max, most });
         }
         Ok(rule)
     }

@@ -1,8 +1,7 @@
 //! The textbook's march: samples along every beam.
 
-use super::occupancy::LONGEST_RAY;
 use super::touched::Touched;
-use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel, beam_stats, clip};
+use super::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel, beam_stats, clip};
 use crate::cell::{DistanceObservation, Distances};
 use crate::geom::vector::along;
 use crate::geom::{BlockKey, Lattice, Pose};
@@ -82,7 +81,7 @@ impl<const D: usize> Sweep<D> for March<D> {
             let last = if beam.is_hit() { z + tau } else { z };
             let direction = world_from_sensor.rotate(beam.direction);
             let Some((near, far)) = clip(&bounds, origin, direction, last) else { continue };
-            if far - near > LONGEST_RAY * lattice.resolution {
+            if far - near > LONGEST_RAY_CELLS * lattice.resolution {
                 stats.refuse_far(beam.is_hit());
                 continue;
             }

@@ -7,12 +7,13 @@
 //! | [`CellCentre`] | distances | the centre of every cell, against the range interpolated between beams |
 //! | [`Projective`] | distances | the center of every 3-D cell, against a range image |
 //! | [`PointRays`] | distances | every 3-D cell that a ray to a point passes through; the nearest ray counts |
-//! | [`HitMissSweep`] | hits and misses | 3-D cells that beams pass through, exactly or through a range image |
+//! | [`HitMissSweep`] | hits and misses | 3-D cells that rays pass through, exactly or through a range image |
 
 mod cell_centre;
 mod fan;
 mod fan_plan;
 mod image;
+mod inside;
 mod march;
 mod nearest_ray;
 mod occupancy;
@@ -24,11 +25,10 @@ mod weight;
 
 pub use cell_centre::CellCentre;
 pub use image::{Projective, ProjectiveSettings};
+pub(crate) use inside::Inside;
 pub use march::March;
-#[cfg(test)]
-pub(crate) use occupancy::CellBox;
 pub use occupancy::{HitMissSweep, OccupancySweep};
-pub use plan::{LONGEST_RAY_CELLS, PlanError, PlanLimits, PlannedScan};
+pub use plan::{LONGEST_RAY_CELLS, PlanError, PlanLimits};
 pub use point_rays::PointRays;
 pub use rays::Rays;
 pub use weight::WeightModel;
@@ -87,45 +87,6 @@ pub trait SweptColors<const D: usize>: Swept<D, Evidence = Distances> {
     fn is_free(&self, _i: usize) -> bool {
         false
     }
-}
-
-/// How far a sweep follows beams.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlanLimits<const D: usize> {
-    /// Beams are followed only inside this box (world, metres); `None`: everywhere.
-    pub bounds: Option<Aabb<D>>,
-    /// No scan may touch more blocks than this.
-    pub most_blocks: usize,
-}
-
-impl<const D: usize> Default for PlanLimits<D> {
-    fn default() -> Self {
-        Self { bounds: None, most_blocks: usize::MAX }
-    }
-}
-
-impl<const D: usize> PlanLimits<D> {
-    /// Limits that follow beams only inside a box (world, metres).
-    pub fn inside(bounds: Aabb<D>) -> Self {
-        Self { bounds: Some(bounds), ..Self::default() }
-    }
-
-    /// The bounds as a box; without bounds an infinite one.
-    pub fn bounds_or_everywhere(&self) -> Aabb<D> {
-        self.bounds.unwrap_or(Aabb::new([f64::NEG_INFINITY; D], [f64::INFINITY; D]))
-    }
-}
-
-/// Why a scan cannot be swept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlanError {
-    /// A range image contradicts itself.
-    #[error("a range image cannot be used: {0}")]
-    BadImage(&'static str),
-    /// It touches more blocks than it may.
-    #[error("the scan touches more blocks of cells than it may")]
-    TooManyBlocks,
 }
 
 /// What became of the beams of a scan that maps read beam by beam.

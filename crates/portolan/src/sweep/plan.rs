@@ -1,39 +1,36 @@
-//! What a plan of a scan is given, and what it returns.
+//! What the plan of a scan may use, and why there may be none.
 
 use crate::geom::Aabb;
-use crate::scan::{BeamCounts, RefusedBeams};
 
 /// Rays and reaches of more cells than this are refused: one reading of 10^8 m must not cost what a million others do.
 /// At cells of 5 cm these are 52 km.
 pub const LONGEST_RAY_CELLS: f64 = (1u32 << 20) as f64;
 
-/// What a plan may use.
+/// How far a sweep follows beams.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanLimits<const D: usize> {
-    /// Box in which cells may change (world, metres); `None`: everywhere.
+    /// Beams are followed only inside this box (world, metres); `None`: everywhere.
     pub bounds: Option<Aabb<D>>,
-    /// Most blocks that the plan may hold.
+    /// No scan may touch more blocks than this.
     pub most_blocks: usize,
-    /// Whether colors are looked up too, where the scan has them.
-    pub colors: bool,
 }
 
 impl<const D: usize> Default for PlanLimits<D> {
-    /// Everywhere, any number of blocks, no colors.
     fn default() -> Self {
-        Self { bounds: None, most_blocks: usize::MAX, colors: false }
+        Self { bounds: None, most_blocks: usize::MAX }
     }
 }
 
-/// What became of a planned scan's readings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PlannedScan {
-    /// Readings by what they do to the map.
-    pub beams: BeamCounts,
-    /// Readings that are not used, by cause; those that were refused when the scan was built are among them.
-    pub refused: RefusedBeams,
-    /// Surfaces outside of the bounds.
-    pub hits_outside: u64,
+impl<const D: usize> PlanLimits<D> {
+    /// Limits that follow beams only inside a box (world, metres).
+    pub fn inside(bounds: Aabb<D>) -> Self {
+        Self { bounds: Some(bounds), ..Self::default() }
+    }
+
+    /// The bounds as a box; without bounds an infinite one.
+    pub fn bounds_or_everywhere(&self) -> Aabb<D> {
+        self.bounds.unwrap_or(Aabb::new([f64::NEG_INFINITY; D], [f64::INFINITY; D]))
+    }
 }
 
 /// Why a scan cannot be swept.
@@ -44,6 +41,6 @@ pub enum PlanError {
     #[error("a range image cannot be used: {0}")]
     BadImage(&'static str),
     /// The scan reaches into more blocks than [`PlanLimits::most_blocks`], or than can be searched.
-    #[error("the scan reaches into too many blocks")]
+    #[error("the scan reaches into too many blocks of cells")]
     TooManyBlocks,
 }

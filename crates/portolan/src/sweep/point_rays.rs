@@ -1,15 +1,14 @@
 //! The sweep for 3-D scans without rows and columns: exact rays, the nearest of which counts.
 
-use super::image::keep_inside;
 use super::nearest_ray::{NearestRay, Ray};
-use super::{PlanError, PlanLimits, PlannedScan, ProjectiveSettings};
+use super::{PlanError, PlanLimits, ProjectiveSettings, Sweep, Swept, SweptColors};
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
 use crate::geom::vector::{norm, scale, sub};
-use crate::geom::{Aabb, BlockKey, Lattice, Pose};
-use crate::scan::PointScan;
+use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
+use crate::scan::{BeamCounts, PointScan, RefusedBeams, ScanStats};
 
-/// Walks the ray of every point through the cells exactly. A cell takes the ray that passes nearest to its center, and
-/// gets that ray's distance at the center; ties go to the earlier ray.
+/// Walks the ray of every point through the cells exactly. A cell listens to the ray that passes nearest to its centre, and
+/// gets that ray's distance at the centre; ties go to the earlier ray.
 ///
 /// The cost is that of rays times their length in cells: where the scan has rows and columns, [`super::Projective`] says
 /// the same sooner, and better between rays. Weights by incidence need neighbours; here every ray counts as head-on.
@@ -30,21 +29,18 @@ impl PointRays {
     }
 }
 
-    /// Takes a scan in, taken at a rigid pose, and gathers what it says about cells. Only cells whose center lies in the bounds
-    /// get anything. O(rays times their length in cells).
-    ///
-    /// # Errors
-    /// Where rays touch more blocks than they may.
-    pub fn plan(
+impl Sweep<3> for PointRays {
+    type Scan = PointScan;
+
+    fn plan(
         &mut self,
         scan: &PointScan,
         world_from_scan: &Pose<3>,
         lattice: &Lattice<3>,
         limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
+    ) -> Result<ScanStats, PlanError> {
         let how = &self.settings;
-        let mut planned = PlannedScan { refused: scan.refused, ..PlannedScan::default() };
-        let PlannedScan { beams, refused, .. } = &mut planned;
+        let (mut beams, mut refused) = (BeamCounts::default(), RefusedBeams::default());
         // One pass over the points alone: rays are counted whether they reach into the bounds or not.
         let ray = |i: usize| {
             let (end, hit) = match scan.points.get(i) {
@@ -85,24 +81,32 @@ impl PointRays {
         }
         let silent =
             Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0], range: 0.0, hit: false, weight: 0.0 };
-        let everywhere = Aabb::new([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
-        let within = limits.bounds.as_ref().unwrap_or(&everywhere);
+        let bounds = limits.bounds_or_everywhere();
         let fits = self.rays.plan_rays(
             (0..count).map(|i| ray(i).unwrap_or(silent)),
             (lattice, &bounds),
             (how.truncation, how.carve_weight),
             limits.most_blocks,
         );
-        self.bounds = limits.bounds.map(|b| (*lattice, b));
+        if !fits {
+            return Err(PlanError::TooManyBlocks);
+        }
         self.colors.clear();
-        if limits.colors && scan.colors.len() == scan.points.len() {
+        if how.color && scan.colors.len() == scan.points.len() {
             self.colors.extend_from_slice(&scan.colors);
         }
-        if let Some(bounds) = &limits.bounds {
-            let outside = |p: &[f32; 3]| !bounds.contains(world_from_scan.transform_point(p.map(f64::from)));
-            planned.hits_outside = scan.points.iter().filter(|p| outside(p)).count() as u64;
-        }
-        if fits { Ok(planned) } else { Err(PlanError::TooManyBlocks) }
+        let outside = |bounds: Aabb<3>| {
+            let is_outside =
+                |p: &[f32; 3]| !bounds.contains(world_from_scan.transform_point(p.map(f64::from)));
+            scan.points.iter().filter(|p| is_outside(p)).count() as u64
+        };
+        Ok(ScanStats {
+            scans: 1,
+            beams,
+            refused: scan.refused + refused,
+            hits_outside: limits.bounds.map_or(0, outside),
+            ..Default::default()
+        })
     }
 }
 
@@ -116,20 +120,14 @@ impl Swept<3> for PointRays {
         self.rays.blocks()
     }
 
-    /// The evidence about the `i`-th block, into `evidence`; returns for how many cells there is some.
-    pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
-        evidence.clone_from(self.rays.evidence(i));
-        if let Some((lattice, bounds)) = &self.bounds {
-            keep_inside(lattice, bounds, self.blocks()[i], evidence.planes_mut().1);
-        }
-        evidence.observed()
+    fn evidence<'a>(&'a self, i: usize, (): &'a mut ()) -> &'a Distances {
+        self.rays.evidence(i)
     }
 }
 
-    /// The colors of the `i`-th block: of the rays that the distances come from, for cells within `band` metres of the
-    /// surface, with the weight of their distances. `distances` is the block's evidence. Returns for how many cells there is
-    /// one.
-    pub fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) -> usize {
+impl SweptColors<3> for PointRays {
+    /// Those of the rays that the distances come from.
+    fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) {
         colors.clear();
         let rays = &self.rays.nearest(i).ray;
         for (cell, &ray) in rays.iter().enumerate() {
@@ -141,7 +139,7 @@ impl Swept<3> for PointRays {
     }
 }
 
-/// Why a point makes no ray.
+/// Why a point is no ray.
 enum Refusal {
     NotFinite,
     TooNear,

@@ -1,8 +1,7 @@
 //! Exact rays: every cell that a beam passes through.
 
-use super::occupancy::LONGEST_RAY;
 use super::touched::Touched;
-use super::{PlanError, PlanLimits, Sweep, Swept, beam_stats, clip};
+use super::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept, beam_stats, clip};
 use crate::cell::HitMiss;
 use crate::geom::vector::{along, distance};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
@@ -38,7 +37,7 @@ impl<const D: usize> Rays<D> {
         let half = 0.5 * self.wall_depth;
         let length = if hit { z + half } else { z };
         let Some((near, far)) = clip(bounds, origin, direction, length) else { return Ok(true) };
-        if far - near > LONGEST_RAY * lattice.resolution {
+        if far - near > LONGEST_RAY_CELLS * lattice.resolution {
             return Ok(false);
         }
         let start = if near > 0.0 { along(origin, direction, near) } else { origin };

@@ -8,9 +8,9 @@ use super::range_pyramid::RangePyramid;
 use super::search::{Class, Classify, Cube, LONGEST_EDGE, Octants, find_blocks};
 use super::window::Window;
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
-use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
-use crate::scan::RangeImage;
-use crate::sweep::{PlanError, PlanLimits, PlannedScan, WeightModel};
+use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
+use crate::scan::{RangeImage, ScanStats};
+use crate::sweep::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel};
 
 /// How a range image becomes distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +25,8 @@ pub struct ProjectiveSettings {
     pub min_range: f64,
     /// Surfaces further than this are not used; the space up to there is free (metres along the ray).
     pub max_range: f64,
+    /// Whether colors are looked up too, where the scan has them.
+    pub color: bool,
 }
 
 /// Gives every cell the distance at its **center**, measured along the ray through it.
@@ -69,54 +71,8 @@ impl Projective {
         }
     }
 
-    /// Takes an image in, taken at a rigid pose, and finds the blocks that it says something about. Only cells whose center
-    /// lies in the bounds get anything. O(pixels + blocks), in parallel.
-    ///
-    /// # Errors
-    /// Where the image contradicts itself, or sees more blocks than it may. The plan is then empty.
-    pub fn plan(
-        &mut self,
-        image: &RangeImage,
-        world_from_image: &Pose<3>,
-        lattice: &Lattice<3>,
-        limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
-        self.keys.clear();
-        self.octants.clear();
-        image.check().map_err(PlanError::BadImage)?;
-        let projector = self.projector.take().filter(|p| p.is_of(image));
-        let projector = projector.unwrap_or_else(|| Projector::of(image));
-        let tau = self.settings.truncation;
-        let cleaning = Cleaning {
-            min_range: self.settings.min_range,
-            max_range: self.settings.max_range,
-            step: (0.5 * tau).min(0.03),
-            weights: self.settings.weights,
-            colors: limits.colors,
-        };
-        let mut planned = self.image.fill(image, &projector, &cleaning);
-        planned.refused += image.refused;
-        if let Some(bounds) = &limits.bounds {
-            let outside = |p: [f64; 3]| !bounds.contains(world_from_image.transform_point(p));
-            planned.hits_outside = image.points().filter(|(_, p)| outside(*p)).count() as u64;
-        }
-        self.pyramid.build(self.image.stride, &self.image.value, !self.carves());
-        self.lattice = *lattice;
-        self.origin = world_from_image.translation;
-        self.image_from_world = world_from_image.inverse().rotation;
-        self.bounds = limits.bounds;
-        let found = self.find_blocks(&projector, world_from_image, limits.most_blocks);
-        self.projector = Some(projector);
-        found.map(|()| planned)
-    }
-
     fn carves(&self) -> bool {
         self.settings.carve_weight > 0.0
-    }
-
-    /// The planned blocks, ascending.
-    pub fn blocks(&self) -> &[BlockKey<3>] {
-        &self.keys
     }
 
     fn find_blocks(
@@ -192,38 +148,90 @@ impl Projective {
         }
     }
 
-    /// Whether all cells of the `i`-th planned block are free beyond the truncation.
-    pub(crate) fn is_free(&self, i: usize) -> bool {
-        self.octants[i].mixed == 0
-    }
-
-    /// The evidence about the `i`-th planned block, into `evidence`; returns for how many cells there is some.
-    pub fn evidence(&self, i: usize, evidence: &mut Distances) -> usize {
-        let Some(projector) = &self.projector else { return 0 };
+    /// The evidence about the `i`-th planned block, into `evidence`.
+    fn observe(&self, i: usize, evidence: &mut Distances) {
+        let Some(projector) = &self.projector else { return };
         let (distance, weight) = evidence.planes_mut();
         let mut octants = self.octants[i];
         if self.settings.weights != WeightModel::Constant {
             // What is free has weights of its own too.
             octants = Octants { mixed: octants.mixed | octants.free, ..Octants::default() };
         }
-        let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight))
-        else {
-            return;
-        };
-        let observed =
+        if let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight)) {
             observe_block(&self.lookup(projector), &self.centers(self.keys[i]), octants, distance, weight);
-        match &self.bounds {
-            Some(bounds) if keep_inside(&self.lattice, bounds, self.keys[i], weight) => evidence.observed(),
-            _ => observed,
         }
     }
+}
 
-    /// The colors of the `i`-th planned block: those of the nearest pixels, for cells within `band` metres of the surface,
-    /// with the weight of their distances. `distances` is the block's evidence. Returns for how many cells there is one.
-    pub fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) -> usize {
+impl Sweep<3> for Projective {
+    type Scan = RangeImage;
+
+    /// O(pixels + blocks), in parallel.
+    fn plan(
+        &mut self,
+        image: &RangeImage,
+        world_from_image: &Pose<3>,
+        lattice: &Lattice<3>,
+        limits: &PlanLimits<3>,
+    ) -> Result<ScanStats, PlanError> {
+        self.keys.clear();
+        self.octants.clear();
+        image.check().map_err(PlanError::BadImage)?;
+        let projector = self.projector.take().filter(|p| p.is_of(image));
+        let projector = projector.unwrap_or_else(|| Projector::of(image));
+        let tau = self.settings.truncation;
+        let cleaning = Cleaning {
+            min_range: self.settings.min_range,
+            max_range: self.settings.max_range,
+            step: (0.5 * tau).min(0.03),
+            weights: self.settings.weights,
+            colors: self.settings.color,
+        };
+        let mut stats = self.image.fill(image, &projector, &cleaning);
+        stats.refused += image.refused;
+        if let Some(bounds) = &limits.bounds {
+            let outside = |p: [f64; 3]| !bounds.contains(world_from_image.transform_point(p));
+            stats.hits_outside = image.points().filter(|(_, p)| outside(*p)).count() as u64;
+        }
+        self.pyramid.build(self.image.stride, &self.image.value, !self.carves());
+        self.lattice = *lattice;
+        self.origin = world_from_image.translation;
+        self.image_from_world = world_from_image.inverse().rotation;
+        self.bounds = limits.bounds;
+        let found = self.find_blocks(&projector, world_from_image, limits.most_blocks);
+        self.projector = Some(projector);
+        found.map(|()| stats)
+    }
+}
+
+impl Swept<3> for Projective {
+    type Evidence = Distances;
+    type Scratch = Distances;
+
+    fn scratch(&self) -> Distances {
+        Distances::silent(block_cells::<3>())
+    }
+
+    fn blocks(&self) -> &[BlockKey<3>] {
+        &self.keys
+    }
+
+    fn evidence<'a>(&'a self, i: usize, scratch: &'a mut Distances) -> &'a Distances {
+        self.observe(i, scratch);
+        scratch
+    }
+}
+
+impl SweptColors<3> for Projective {
+    fn is_free(&self, i: usize) -> bool {
+        self.octants[i].mixed == 0
+    }
+
+    /// Those of the nearest pixels.
+    fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) {
         colors.clear();
         let Some(projector) = self.projector.as_ref().filter(|_| !self.image.colors.is_empty()) else {
-            return 0;
+            return;
         };
         let near = |cell: usize| distances.weights()[cell] > 0.0 && distances.distances()[cell].abs() <= band;
         let centers = self.centers(self.keys[i]);
@@ -246,25 +254,6 @@ impl Projective {
             }
         }
     }
-}
-
-/// Silences the cells whose center is not inside; returns whether there may be such cells.
-pub(in crate::sweep) fn keep_inside(
-    lattice: &Lattice<3>,
-    bounds: &Aabb<3>,
-    key: BlockKey<3>,
-    weight: &mut [f32],
-) -> bool {
-    let (low, high) = (lattice.center(key.first_cell()), lattice.center(key.cell(weight.len() - 1)));
-    if bounds.contains(low) && bounds.contains(high) {
-        return false;
-    }
-    for (i, w) in weight.iter_mut().enumerate() {
-        if !bounds.contains(lattice.center(key.cell(i))) {
-            *w = 0.0;
-        }
-    }
-    true
 }
 
 /// What an image says of cubes of cells: their smallest and largest depth against those of their window.

@@ -28,6 +28,5 @@ mod sine_rows;
 mod window;
 mod window_minima;
 
-pub(super) use distances::keep_inside;
 pub use distances::{Projective, ProjectiveSettings};
 pub(super) use misses::ProjectiveMisses;

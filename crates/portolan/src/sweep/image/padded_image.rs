@@ -4,7 +4,7 @@ use super::bands::each_row;
 use super::projector::Projector;
 use crate::geom::vector::{dot, norm, sub};
 use crate::scan::{BeamCounts, MAX_OPENING, MAX_SLOPE, RangeImage, RefusedBeams};
-use crate::sweep::{PlannedScan, WeightModel};
+use crate::sweep::{ScanStats, WeightModel};
 use multiversion::multiversion;
 
 /// Neighbors nearer than this say more about the noise than about the surface (metres).
@@ -47,7 +47,7 @@ pub(super) struct Cleaning {
 
 impl PaddedImage {
     /// Takes an image in. Readings that are no number, too near or too far are cleaned, and counted by cause.
-    pub(super) fn fill(&mut self, image: &RangeImage, projector: &Projector, how: &Cleaning) -> PlannedScan {
+    pub(super) fn fill(&mut self, image: &RangeImage, projector: &Projector, how: &Cleaning) -> ScanStats {
         let shape = (image.columns, image.rows, projector.is_closed());
         if shape != (self.columns, self.rows, self.closed) {
             (self.columns, self.rows, self.closed) = shape;
@@ -74,7 +74,7 @@ impl PaddedImage {
         counted
     }
 
-    fn clean(&mut self, image: &RangeImage, projector: &Projector, how: &Cleaning) -> PlannedScan {
+    fn clean(&mut self, image: &RangeImage, projector: &Projector, how: &Cleaning) -> ScanStats {
         let (w, stride) = (self.columns, self.stride);
         // Along a row the least and the most that a ray is longer than its value: whole rows need no closer look.
         let all_fit = |row: usize, values: &[f32]| {
@@ -113,7 +113,7 @@ impl PaddedImage {
         }
         let dropped = (w * self.rows) as u64 - u64::from(hits) - u64::from(free);
         let beams = BeamCounts { hit: hits.into(), max_range: free.into(), dropped, ..BeamCounts::default() };
-        PlannedScan { beams, refused, hits_outside: 0 }
+        ScanStats { scans: 1, beams, refused, ..Default::default() }
     }
 
     /// Marks in the sign where four neighbors are not of one surface.

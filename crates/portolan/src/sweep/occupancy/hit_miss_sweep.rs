@@ -1,44 +1,49 @@
-//! Hits and misses of a whole scan.
+//! Hits and misses of 3-D scans, brick by brick: exact rays, or exact ends and misses through a range image.
 
-use super::cell_box::CellBox;
-use super::exact::{ExactRays, Ray, Tally};
+use super::exact::{ExactRays, Ray, Tally, TooManyBricks};
 use super::masks::Bits;
-use crate::cell::{Evidence, HitMiss};
+use crate::cell::HitMiss;
 use crate::geom::{BlockKey, Lattice, Pose};
 use crate::parallel;
 use crate::scan::{
-    BeamCounts, Frame, LayoutFinder, Origin, PointScan, RangeImage, RefusedBeams, Scan, SphericalLayout,
+    BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout,
 };
 use crate::sweep::image::ProjectiveMisses;
-use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, PlannedScan};
+use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept};
 use std::borrow::Cow;
+use std::marker::PhantomData;
 
-/// How a scan becomes evidence of hits and misses.
+/// How a 3-D scan becomes evidence of hits and misses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OccupancySweep {
-    /// Projective where a scan has rows and columns or gets them, exact otherwise.
+    /// Where a scan has rows and columns or gets them, misses through its range image and exact hits: faster, frees the
+    /// space between beams, and carves grazing surfaces less. Exact otherwise.
     #[default]
     Auto,
     /// Every cell that a beam passes, exactly: the map that OctoMap makes.
     Exact,
-    /// Misses through a range image, hits exact: faster, frees the space between beams, and carves grazing surfaces less.
-    /// As `Auto`, said by name.
-    Projective,
 }
 
-/// The cell in which a beam ends is hit, cells that beams pass are missed, and a hit overrules misses: one observation per
-/// cell and scan (Hornung et al. 2013). Hits are exact; misses come from exact rays or through the scan's range image.
+/// The sweep for hits and misses of 3-D scans: of points (`HitMissSweep<PointScan>`), of range images
+/// (`HitMissSweep<RangeImage>`), or of points in the world's frame (`HitMissSweep<[[f64; 3]]>`).
 ///
-/// Keeps its memory from scan to scan, and the rows and columns that it found.
-#[derive(Clone, Debug, Default)]
-pub struct HitMissSweep {
-    kind: OccupancySweep,
-    layout: LayoutFinder,
-    rays: ExactRays,
+/// The cell in which a ray ends on a surface is hit and no other; cells that rays pass are missed.
+#[derive(Debug)]
+pub struct HitMissSweep<S: ?Sized> {
+    sweep: OccupancySweep,
+    exact: ExactRays,
     misses: ProjectiveMisses,
-    bounds: Option<CellBox>,
+    layout: LayoutFinder,
     keys: Vec<BlockKey<3>>,
     parts: Vec<Parts>,
+    scan: PhantomData<fn(&S)>,
+}
+
+/// Without what it remembers of the last scan: a snapshot of a map does not pay for it.
+impl<S: ?Sized> Clone for HitMissSweep<S> {
+    fn clone(&self) -> Self {
+        Self { layout: self.layout.clone(), ..Self::new(self.sweep) }
+    }
 }
 
 /// A block's place among those that rays touch, and among those that the image sees.
@@ -48,100 +53,126 @@ struct Parts {
     misses: Option<u32>,
 }
 
-/// The rays of a scan: those up to `hits` end on surfaces.
-struct Rays<F> {
+/// The rays of a scan.
+struct Rays<'a, F> {
+    /// The first so many end on surfaces.
     hits: usize,
     count: usize,
     ray: F,
+    /// The range image that free space is read from, and where it was taken.
+    view: Option<(&'a Pose<3>, &'a RangeImage)>,
 }
 
-/// An image and the pose of the frame in which its pixels look.
-type View<'a> = (&'a Pose<3>, &'a RangeImage);
-
-impl HitMissSweep {
-    /// A sweep of this kind.
-    pub fn new(kind: OccupancySweep) -> Self {
-        Self { kind, ..Self::default() }
+impl<S: ?Sized> HitMissSweep<S> {
+    /// A sweep that has seen nothing yet.
+    pub fn new(sweep: OccupancySweep) -> Self {
+        Self {
+            sweep,
+            exact: ExactRays::default(),
+            misses: ProjectiveMisses::default(),
+            layout: LayoutFinder::default(),
+            keys: Vec::new(),
+            parts: Vec::new(),
+            scan: PhantomData,
+        }
     }
 
-    /// Rows and columns for scans of points that come without them; otherwise they are found: see [`LayoutFinder`].
+    /// Rows and columns for points that come without them; otherwise they are looked for.
     pub fn set_layout(&mut self, layout: SphericalLayout) {
         self.layout = LayoutFinder::of(layout);
     }
 
-    /// Takes in what a sensor delivered at a rigid pose. Rays that are not finite, or longer than [`LONGEST_RAY_CELLS`]
-    /// (within the bounds, if there are any), are refused and counted. O(cells passed), in parallel.
-    ///
-    /// # Errors
-    /// Where an image that is used contradicts itself, or rays touch more blocks than they may. The plan is then empty.
-    pub fn plan(
+    /// Marks the rays, and finds what the image of a view sees; without one, rays that pass mark misses.
+    fn plan_rays(
         &mut self,
-        frame: &Frame,
+        rays: &Rays<'_, impl Fn(usize) -> Ray + Sync>,
+        lattice: &Lattice<3>,
+        limits: &PlanLimits<3>,
+    ) -> Result<ScanStats, PlanError> {
+        self.keys.clear();
+        self.parts.clear();
+        self.misses.clear();
+        let (bounds, most) = (limits.bounds.as_ref(), limits.most_blocks);
+        let longest = LONGEST_RAY_CELLS * lattice.resolution;
+        let further: Vec<Ray> =
+            rays.view.and_then(|(pose, image)| free_reach(pose, image, longest)).into_iter().collect();
+        let (exact, misses) = (&mut self.exact, &mut self.misses);
+        let (planned, ()) = parallel::join(
+            || exact.plan(lattice, bounds, rays.count, &rays.ray, &further, most),
+            || rays.view.into_iter().for_each(|(pose, image)| misses.take(image, pose, lattice)),
+        );
+        let mut tally = planned.map_err(|TooManyBricks| PlanError::TooManyBlocks)?;
+        let is_searched = match (rays.view, exact.reach()) {
+            (Some(_), Some((first, last))) => misses.find_blocks(first, last),
+            _ => true,
+        };
+        if !is_searched {
+            let passing = |i: usize| Ray { passes: true, ..(rays.ray)(i) };
+            let planned = exact.plan(lattice, bounds, rays.count, passing, &[], most);
+            tally = planned.map_err(|TooManyBricks| PlanError::TooManyBlocks)?;
+        }
+        self.unite();
+        Ok(stats(rays.hits, rays.count, tally))
+    }
+
+    /// Blocks of the rays and of the image together, ascending, as both are.
+    fn unite(&mut self) {
+        let (marked, seen) = (self.exact.keys(), self.misses.blocks());
+        let (mut i, mut j) = (0, 0);
+        while i < marked.len() || j < seen.len() {
+            let key = match (marked.get(i), seen.get(j)) {
+                (Some(a), Some(b)) => *a.min(b),
+                (Some(key), None) | (None, Some(key)) => *key,
+                (None, None) => break,
+            };
+            let (is_marked, is_seen) = (marked.get(i) == Some(&key), seen.get(j) == Some(&key));
+            self.keys.push(key);
+            self.parts.push(Parts { rays: is_marked.then_some(i as u32), misses: is_seen.then_some(j as u32) });
+            i += usize::from(is_marked);
+            j += usize::from(is_seen);
+        }
+    }
+}
+
+impl Sweep<3> for HitMissSweep<RangeImage> {
+    type Scan = RangeImage;
+
+    fn plan(
+        &mut self,
+        image: &RangeImage,
         world_from_sensor: &Pose<3>,
         lattice: &Lattice<3>,
         limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
-        let mut planned = match frame {
-            Frame::Points(scan) => self.plan_scan(scan, world_from_sensor, lattice, limits)?,
-            Frame::Image(image) => self.plan_image(image, world_from_sensor, lattice, limits)?,
-        };
-        planned.refused += frame.refused();
-        Ok(planned)
+    ) -> Result<ScanStats, PlanError> {
+        image.check().map_err(PlanError::BadImage)?;
+        let passes = self.sweep == OccupancySweep::Exact;
+        let all: Vec<Ray> = image
+            .readings()
+            .map(|(origin, end, hit)| Ray {
+                origin: world_from_sensor.transform_point(origin),
+                end: world_from_sensor.transform_point(end),
+                hit,
+                passes,
+            })
+            .collect();
+        let hits = all.iter().filter(|r| r.hit).count();
+        let view = (!passes).then_some((world_from_sensor, image));
+        let rays = Rays { hits, count: all.len(), ray: |i| all[i], view };
+        let stats = self.plan_rays(&rays, lattice, limits)?;
+        Ok(ScanStats { refused: stats.refused + image.refused, ..stats })
     }
+}
 
-    /// Takes in surfaces seen from `origin_world` (both world, metres), with exact rays.
-    ///
-    /// # Errors
-    /// As [`HitMissSweep::plan`].
-    pub fn plan_points(
-        &mut self,
-        points_world: &[impl Into<[f64; 3]> + Copy + Sync],
-        origin_world: [f64; 3],
-        lattice: &Lattice<3>,
-        limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
-        let ray =
-            |i: usize| Ray { origin: origin_world, end: points_world[i].into(), hit: true, passes: true };
-        let count = points_world.len();
-        self.plan_rays(&Rays { hits: count, count, ray }, None, lattice, limits)
-    }
+impl Sweep<3> for HitMissSweep<PointScan> {
+    type Scan = PointScan;
 
-    /// Takes in beams, with exact rays: they have no rows and columns.
-    ///
-    /// # Errors
-    /// As [`HitMissSweep::plan`].
-    pub fn plan_beams(
-        &mut self,
-        scan: &Scan<3>,
-        world_from_sensor: &Pose<3>,
-        lattice: &Lattice<3>,
-        limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
-        let origin = world_from_sensor.translation;
-        let used = scan.beams().filter(|b| b.free_range() > 0.0);
-        let ray = |b: crate::scan::Beam<3>| {
-            let end = world_from_sensor.transform_point(b.direction.map(|d| d * b.range));
-            Ray { origin, end, hit: b.is_hit(), passes: true }
-        };
-        let rays: Vec<Ray> = used.map(ray).collect();
-        let hits = rays.iter().filter(|r| r.hit).count();
-        let rays = Rays { hits, count: rays.len(), ray: |i: usize| rays[i] };
-        let mut planned = self.plan_rays(&rays, None, lattice, limits)?;
-        let refused_hits = (hits as u64).saturating_sub(planned.beams.hit);
-        planned.beams = scan.counts();
-        planned.beams.hit -= refused_hits.min(planned.beams.hit);
-        planned.beams.dropped += refused_hits;
-        planned.refused += scan.refused();
-        Ok(planned)
-    }
-
-    fn plan_scan(
+    fn plan(
         &mut self,
         scan: &PointScan,
         world_from_sensor: &Pose<3>,
         lattice: &Lattice<3>,
         limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
+    ) -> Result<ScanStats, PlanError> {
         let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
         let (common, image) = match &scan.origin {
@@ -163,16 +194,38 @@ impl HitMissSweep {
                 Ray { origin, end: to_world(scan.points[i]), hit: true, passes }
             }
         };
-        self.plan_rays(&Rays { hits, count: hits + scan.free_ends.len(), ray }, view, lattice, limits)
+        let rays = Rays { hits, count: hits + scan.free_ends.len(), ray, view };
+        let stats = self.plan_rays(&rays, lattice, limits)?;
+        Ok(ScanStats { refused: stats.refused + scan.refused, ..stats })
     }
+}
 
+/// Points in the world's frame, seen from the pose's translation: exact rays, whatever the sweep.
+impl Sweep<3> for HitMissSweep<[[f64; 3]]> {
+    type Scan = [[f64; 3]];
+
+    fn plan(
+        &mut self,
+        points_world: &[[f64; 3]],
+        world_from_sensor: &Pose<3>,
+        lattice: &Lattice<3>,
+        limits: &PlanLimits<3>,
+    ) -> Result<ScanStats, PlanError> {
+        let origin = world_from_sensor.translation;
+        let ray = |i: usize| Ray { origin, end: points_world[i], hit: true, passes: true };
+        let count = points_world.len();
+        self.plan_rays(&Rays { hits: count, count, ray, view: None }, lattice, limits)
+    }
+}
+
+impl HitMissSweep<PointScan> {
     /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them.
     fn organised<'a>(
         &mut self,
         scan: &'a PointScan,
         origin: [f64; 3],
     ) -> Result<Option<Cow<'a, RangeImage>>, PlanError> {
-        if self.kind == OccupancySweep::Exact {
+        if self.sweep == OccupancySweep::Exact {
             return Ok(None);
         }
         if let Some(image) = &scan.image {
@@ -181,110 +234,34 @@ impl HitMissSweep {
         }
         Ok(self.layout.image(&scan.points, origin).map(Cow::Owned))
     }
+}
 
-    fn plan_image(
-        &mut self,
-        image: &RangeImage,
-        world_from_sensor: &Pose<3>,
-        lattice: &Lattice<3>,
-        limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
-        image.check().map_err(PlanError::BadImage)?;
-        let passes = self.kind == OccupancySweep::Exact;
-        let ray = |(origin, end, hit)| Ray {
-            origin: world_from_sensor.transform_point(origin),
-            end: world_from_sensor.transform_point(end),
-            hit,
-            passes,
-        };
-        let rays: Vec<Ray> = image.readings().map(ray).collect();
-        let hits = rays.iter().filter(|r| r.hit).count();
-        let rays = Rays { hits, count: rays.len(), ray: |i: usize| rays[i] };
-        self.plan_rays(&rays, (!passes).then_some((world_from_sensor, image)), lattice, limits)
+impl<S: ?Sized> Swept<3> for HitMissSweep<S> {
+    type Evidence = HitMiss;
+    type Scratch = HitMiss;
+
+    fn scratch(&self) -> HitMiss {
+        HitMiss::from_words([0; 8], [0; 8])
     }
 
-    /// Marks the rays, and finds what the image of a view sees; without one, rays that pass mark misses.
-    fn plan_rays<F: Fn(usize) -> Ray + Sync>(
-        &mut self,
-        rays: &Rays<F>,
-        view: Option<View<'_>>,
-        lattice: &Lattice<3>,
-        limits: &PlanLimits<3>,
-    ) -> Result<PlannedScan, PlanError> {
-        self.keys.clear();
-        self.parts.clear();
-        self.misses.clear();
-        self.bounds = limits.bounds.map(|b| CellBox::of(&b, lattice));
-        let bounds = self.bounds.map(|b| b.aabb(lattice));
-        let (bounds, most) = (bounds.as_ref(), limits.most_blocks);
-        let longest = LONGEST_RAY_CELLS * lattice.resolution;
-        let further: Vec<Ray> =
-            view.and_then(|(pose, image)| free_reach(pose, image, longest)).into_iter().collect();
-        let (exact, misses) = (&mut self.rays, &mut self.misses);
-        let (planned, ()) = parallel::join(
-            || exact.plan(lattice, bounds, rays.count, &rays.ray, &further, most),
-            || view.into_iter().for_each(|(pose, image)| misses.take(image, pose, lattice)),
-        );
-        let mut tally = planned.map_err(|_| PlanError::TooManyBlocks)?;
-        let is_searched = match (view, exact.reach()) {
-            (Some(_), Some((first, last))) => misses.find_blocks(first, last),
-            _ => true,
-        };
-        if !is_searched {
-            let passing = |i: usize| Ray { passes: true, ..(rays.ray)(i) };
-            let planned = exact.plan(lattice, bounds, rays.count, passing, &[], most);
-            tally = planned.map_err(|_| PlanError::TooManyBlocks)?;
-        }
-        self.unite();
-        Ok(planned_scan(rays.hits, rays.count, tally))
-    }
-
-    /// Blocks of the rays and of the image together, ascending, as both are.
-    fn unite(&mut self) {
-        let (marked, seen) = (self.rays.keys(), self.misses.blocks());
-        let (mut i, mut j) = (0, 0);
-        while i < marked.len() || j < seen.len() {
-            let key = match (marked.get(i), seen.get(j)) {
-                (Some(a), Some(b)) => *a.min(b),
-                (Some(key), None) | (None, Some(key)) => *key,
-                (None, None) => break,
-            };
-            let (is_marked, is_seen) = (marked.get(i) == Some(&key), seen.get(j) == Some(&key));
-            self.keys.push(key);
-            self.parts
-                .push(Parts { rays: is_marked.then_some(i as u32), misses: is_seen.then_some(j as u32) });
-            i += usize::from(is_marked);
-            j += usize::from(is_seen);
-        }
-    }
-
-    /// The planned blocks, ascending.
-    pub fn blocks(&self) -> &[BlockKey<3>] {
+    fn blocks(&self) -> &[BlockKey<3>] {
         &self.keys
     }
 
-    /// The evidence about the `i`-th planned block, into `evidence`; returns for how many cells there is some.
-    pub fn evidence(&self, i: usize, evidence: &mut HitMiss) -> usize {
-        let parts = self.parts[i];
-        let Bits { mut miss, mut hit } =
-            parts.rays.map_or_else(Bits::default, |at| *self.rays.bits(at as usize));
-        if let Some(at) = parts.misses {
+    fn evidence<'a>(&'a self, i: usize, scratch: &'a mut HitMiss) -> &'a HitMiss {
+        let Parts { rays, misses } = self.parts[i];
+        let mut bits = rays.map_or_else(Bits::default, |slot| *self.exact.bits(slot as usize));
+        if let Some(at) = misses {
             let free = self.misses.free_cells(at as usize);
-            (0..8).for_each(|w| miss[w] |= free[w]);
+            (0..8).for_each(|w| bits.miss[w] |= free[w]);
         }
-        if let Some(mask) = self.bounds.and_then(|b| b.mask(self.keys[i])) {
-            for w in 0..8 {
-                hit[w] &= mask[w];
-                miss[w] &= mask[w];
-            }
-        }
-        *evidence = HitMiss::from_words(hit, miss);
-        evidence.observed()
+        *scratch = HitMiss::from_words(bits.hit, bits.miss);
+        scratch
     }
 }
 
-/// The box around a sensor in which pixels without a surface say that space is free, as its diagonal. Not those of more than
-/// `longest` metres, which are refused.
+/// The box around a sensor in which pixels without a surface mean that space is free, as its diagonal. Not those of more
+/// than `longest` metres, which are refused.
 fn free_reach(world_from_image: &Pose<3>, image: &RangeImage, longest: f64) -> Option<Ray> {
     let used = |v: &f32| f64::from(-v) <= longest;
     let farthest = image.values.iter().copied().filter(used).fold(0.0f32, f32::min);
@@ -297,11 +274,15 @@ fn free_reach(world_from_image: &Pose<3>, image: &RangeImage, longest: f64) -> O
     Some(Ray { origin: o.map(|v| v - r), end: o.map(|v| v + r), hit: false, passes: false })
 }
 
-fn planned_scan(hits: usize, count: usize, tally: Tally) -> PlannedScan {
+fn stats(hits: usize, count: usize, tally: Tally) -> ScanStats {
     let dropped = tally.refused.total();
     let hit = (hits as u64).saturating_sub(tally.refused_hits);
     let max_range = (count as u64).saturating_sub(hit + dropped);
-    let beams = BeamCounts { hit, max_range, dropped, ..Default::default() };
-    let refused: RefusedBeams = tally.refused;
-    PlannedScan { beams, refused, hits_outside: tally.hits_outside }
+    ScanStats {
+        scans: 1,
+        beams: BeamCounts { hit, max_range, dropped, ..Default::default() },
+        refused: tally.refused,
+        hits_outside: tally.hits_outside,
+        ..Default::default()
+    }
 }

@@ -9,6 +9,4 @@ mod hit_miss_sweep;
 mod masks;
 mod trace;
 
-#[cfg(test)]
-pub(crate) use cell_box::CellBox;
 pub use hit_miss_sweep::{HitMissSweep, OccupancySweep};
