@@ -79,7 +79,7 @@ impl<const D: usize> MapRepr<D> for TreeMap<D> {
     }
 }
 
-impl<const D: usize> MapRepr<D> for Tsdf<D> {
+impl<const D: usize> MapRepr<D> for DenseTsdf<D> {
     /// With carving.
     fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
         self.integrate(world_from_sensor, scan, true)
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn what_cannot_be_asked_is_not_what_is_not_known() {
         let mut grid =
-            OccupancyGrid::<2>::new(Grid::new([0.0; 2], 0.1, [4; 2]), OccupancyModel::default()).unwrap();
+            OccupancyGrid::<2>::covering(Grid::new([0.0; 2], 0.1, [4; 2]), OccupancyModel::default()).unwrap();
         let (no_scan, p) = (Scan::from_beams([]), [0.2, 0.2]);
         assert_eq!(grid.integrate_scan(&Pose::IDENTITY, &no_scan).scans, 1);
         assert_eq!((MapRepr::occupancy(&grid, p), MapRepr::distance(&grid, p)), (None, None));

@@ -45,7 +45,7 @@ impl EsdfArg {
 
 /// The field of a map of the plane, as far as the method reaches (509 cells where it is accurate), with distances to
 /// unknown cells where they are wanted.
-pub(crate) fn plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg, unknown: bool) -> Esdf<2> {
+pub(crate) fn plane_esdf(tsdf: &Tsdf2, method: EsdfArg, unknown: bool) -> Esdf<2> {
     let grid = tsdf.grid();
     let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
     let how = EsdfSettings { max_distance, method: method.method(), unknown, ..EsdfSettings::default() };
@@ -53,7 +53,7 @@ pub(crate) fn plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg, unknown: bool) -> Esdf
 }
 
 /// The cells of a map of the plane.
-pub(crate) fn dense_plane_esdf(tsdf: &Tsdf<2>, method: EsdfArg) -> EsdfGrid<2> {
+pub(crate) fn dense_plane_esdf(tsdf: &Tsdf2, method: EsdfArg) -> EsdfGrid<2> {
     plane_esdf(tsdf, method, false).dense(tsdf.grid())
 }
 

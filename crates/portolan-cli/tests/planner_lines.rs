@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 use portolan::field::{Esdf, EsdfSettings};
-use portolan::map::{SparseTsdf, SparseTsdfConfig, Tsdf, Tsdf2, Tsdf2Config, TsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig, Tsdf, Tsdf2, TsdfConfig, TsdfConfig};
 use portolan::plan::{Demand, Waypoints, check_path};
 use portolan::store::Bricks;
 
@@ -33,7 +33,7 @@ fn in_space() {
     let how = EsdfSettings { unknown: true, ..Default::default() };
     let path = Waypoints::new(vec![[0.5, 0.5, 0.5], [1.5, 1.0, 1.5], [1.5, 1.5, 1.0]]).unwrap();
     // Nothing was seen yet: nothing is certified.
-    let unseen = SparseTsdf::new(SparseTsdfConfig::default()).unwrap();
+    let unseen = Tsdf3::new(TsdfConfig::default()).unwrap();
     let field = Esdf::of(unseen.store(), &how);
     assert!(!check_path(&field, &path, &Demand::new(0.3)).is_certified());
     // A wall at x = 2.

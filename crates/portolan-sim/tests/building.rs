@@ -103,7 +103,7 @@ fn the_surface_and_colours_of_depth_images_are_right() {
         sensor: BuildingSensor::Camera(camera),
         ..Default::default()
     });
-    let map = tsdf_of(&log, SparseTsdfConfig { color: true, truncation: 0.15, ..Default::default() });
+    let map = tsdf_of(&log, TsdfConfig { color: true, truncation: 0.15, ..Default::default() });
     let points = vertices(&map);
     let errors = surface_errors(&log.world, points.iter().copied()).unwrap();
     println!("depth camera, 5 cm, noise 1 cm: {errors:?}");

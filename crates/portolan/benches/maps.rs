@@ -7,7 +7,7 @@ use divan::{Bencher, black_box};
 use portolan::cell::OccupancyModel;
 use portolan::field::{EsdfGrid, esdf_from_tsdf};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Cloud, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
+use portolan::map::{Cloud, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use std::sync::LazyLock;

@@ -84,8 +84,8 @@ fn the_expected_gain_is_what_a_scan_adds_and_more() {
 fn frontiers_of_the_building_follow_its_scans() {
     let sensor = BuildingSensor::Lidar(SpinningLidar { rings: 16, columns: 256, ..Default::default() });
     let log = building_log(&BuildingConfig { scans: 12, sensor, ..Default::default() });
-    let config = SparseTsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() };
-    let mut map = SparseTsdf::new(config).unwrap();
+    let config = TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() };
+    let mut map = Tsdf3::new(config).unwrap();
     let mut kept = FrontierMap::new(FrontierSettings::default());
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();

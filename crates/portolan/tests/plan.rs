@@ -22,7 +22,7 @@ use std::sync::LazyLock;
 
 /// The Apartment at 5 cm, its field up to one metre, and the contour it is about.
 static APARTMENT: LazyLock<(Tsdf2, Esdf<2>, Segments)> = LazyLock::new(|| {
-    let tsdf = tsdf(SweepKind::CellCentre, true, &apartment().log);
+    let tsdf = tsdf(BeamSweep::CellCentre, true, &apartment().log);
     let settings = EsdfSettings { unknown: true, ..Default::default() };
     let esdf = Esdf::of(&tsdf, &settings);
     let contour = ContourSettings { min_weight: settings.min_weight, ..Default::default() };
@@ -146,7 +146,7 @@ fn certified_motions_through_the_building_keep_their_clearance() {
     let sensor = BuildingSensor::Lidar(SpinningLidar { rings: 32, columns: 512, ..Default::default() });
     let log = building_log(&BuildingConfig { scans: 24, sensor, ..Default::default() });
     let mut map =
-        SparseTsdf::new(SparseTsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
+        Tsdf3::new(TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();
     }

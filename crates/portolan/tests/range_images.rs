@@ -3,7 +3,7 @@
 
 use portolan::cell::LogOdds8;
 use portolan::geom::{Lattice, Pose};
-use portolan::map::{SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, PointScan, RangeImage, Spherical};
 use std::f64::consts::TAU;
 
@@ -11,17 +11,17 @@ const RESOLUTION: f64 = 0.05;
 
 /// Both maps after one scan.
 struct Maps {
-    distances: SparseTsdf,
-    occupancy: SparseOccupancy<LogOdds8>,
+    distances: Tsdf3,
+    occupancy: Occupancy<3, LogOdds8>,
 }
 
 impl Maps {
     fn of(frame: &Frame) -> Self {
-        let config = SparseTsdfConfig { resolution: RESOLUTION, ..SparseTsdfConfig::default() };
+        let config = TsdfConfig { resolution: RESOLUTION, ..TsdfConfig::default() };
         let lattice = Lattice::new([0.0; 3], RESOLUTION);
         let mut maps = Self {
-            distances: SparseTsdf::new(config).unwrap(),
-            occupancy: SparseOccupancy::new(lattice, Default::default(), Default::default()).unwrap(),
+            distances: Tsdf3::new(config).unwrap(),
+            occupancy: Occupancy::new(lattice, Default::default(), Default::default()).unwrap(),
         };
         maps.distances.integrate(&Pose::IDENTITY, frame).unwrap();
         maps.occupancy.integrate(&Pose::IDENTITY, frame).unwrap();

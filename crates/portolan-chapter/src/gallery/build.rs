@@ -8,7 +8,7 @@ use super::run::{Gallery, GallerySettings};
 use crate::memory::inner_only_node_bytes;
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, SweepKind, Tsdf2, Tsdf2Config};
+use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
 use portolan::scan::{Scan, ScanStats};
 use portolan::store::Store;
 use portolan::surface::{Contour, marching_squares};
@@ -57,12 +57,12 @@ impl Maps {
     ) -> Result<Self, MapError> {
         let (grid, model) = (settings.grid, settings.model);
         let config = settings.tsdf.with_grid(&grid);
-        let march = Tsdf2Config { sweep: SweepKind::March, ..config };
+        let march = TsdfConfig { sweep: BeamSweep::March, ..config };
         let in_tree = |map: &mut Quadtree, at: &Pose<2>, scan: &Scan<2>| map.integrate(at, scan);
         let carving = |map: &mut Tsdf2, at: &Pose<2>, scan: &Scan<2>| map.integrate(at, scan, true);
 
         let occupancy =
-            Fused::new(clock, log, OccupancyGrid::new(grid, model)?, |map, at, scan| map.integrate(at, scan));
+            Fused::new(clock, log, OccupancyGrid::covering(grid, model)?, |map, at, scan| map.integrate(at, scan));
         let tree = Fused::new(clock, log, Quadtree::covering(&grid, model)?, in_tree);
         let chapter_tree = Fused::new(clock, log, chapter_tree(&grid, model)?, in_tree);
         let tsdf = Fused::new(clock, log, Tsdf2::new(config)?, carving);

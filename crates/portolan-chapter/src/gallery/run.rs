@@ -10,7 +10,7 @@ use super::row::{Row, Winner, Workload};
 use portolan::cell::OccupancyModel;
 use portolan::field::{Esdf2, EsdfSettings};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, Tsdf2, Tsdf2Config};
+use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::{Contour, ContourSettings};
 use portolan_sim::Truth;
@@ -21,7 +21,7 @@ pub struct GallerySettings {
     /// The cells of the dense maps.
     pub grid: Grid<2>,
     /// The TSDF; its grid is replaced by `grid`.
-    pub tsdf: Tsdf2Config,
+    pub tsdf: TsdfConfig,
     /// The occupancy filter of grid and trees.
     pub model: OccupancyModel,
     /// Contour extraction.

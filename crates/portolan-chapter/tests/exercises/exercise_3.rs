@@ -5,7 +5,7 @@ use portolan::map::{Tsdf, TsdfConfig};
 
 /// What the map of a wall at `y = 0` believes along the normal when beams of these angles (radians) were fused with these
 /// weights, their ranges off by `errors`: cell centres at `(k + 1/2) r`, up to tau on both sides.
-fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf<2> {
+fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf2 {
     let config = TsdfConfig {
         cells: [1, 2 * (tau / r).ceil() as usize],
         resolution: r,
@@ -14,7 +14,7 @@ fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf<2> {
         w_max: f32::INFINITY,
         ..Default::default()
     };
-    let mut map = Tsdf::<2>::new(config).unwrap();
+    let mut map = Tsdf2::new(config).unwrap();
     for j in 0..config.cells[1] as i32 {
         let y = map.grid().lattice.center([0, j])[1];
         for &(theta, weight, error) in beams {
@@ -29,7 +29,7 @@ fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf<2> {
 }
 
 /// Where the linear interpolation between the cells next to the wall is zero, and the slope in front of it.
-fn crossing_and_slope(map: &Tsdf<2>) -> (f64, f64) {
+fn crossing_and_slope(map: &Tsdf2) -> (f64, f64) {
     let n = map.grid().shape[1] as i32;
     // Far behind the wall a grazing beam says nothing.
     let at = |j: i32| {

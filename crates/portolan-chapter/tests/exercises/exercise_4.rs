@@ -1,7 +1,7 @@
 //! Exercise 4: the ghost of the chair, predicted and counted.
 
 use crate::page::check;
-use portolan::map::SweepKind;
+use portolan::map::BeamSweep;
 use portolan::sweep::WeightModel;
 use portolan_chapter::experiment::shown_half_life;
 use portolan_chapter::ghost::{GhostGroup, GhostRun, GhostSettings, ghost};
@@ -28,8 +28,8 @@ fn exercise_4_on_the_page() {
         rows.push((format!("counted at `W_max` {}, seen from behind too", run.w_max), counted(&run.tapered)));
     }
     for (name, weights, sweep) in [
-        ("weights of 1 / z^2", WeightModel::InverseSquare, SweepKind::CellCentre),
-        ("weights of cos theta", WeightModel::CosIncidence, SweepKind::CellCentre),
+        ("weights of 1 / z^2", WeightModel::InverseSquare, BeamSweep::CellCentre),
+        ("weights of cos theta", WeightModel::CosIncidence, BeamSweep::CellCentre),
     ] {
         let run = runs(GhostSettings { w_max: vec![4.0], weights, sweep, ..Default::default() }).remove(0);
         let m = &run.measured;

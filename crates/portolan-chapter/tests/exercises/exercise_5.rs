@@ -59,9 +59,9 @@ fn exercise_5_on_the_page() {
     let world = apartment().world;
     let log = lap(&world, &LapConfig::default());
     let cells = Grid::new([0.0; 2], R, [240, 180]);
-    let mut grid = OccupancyGrid::new(cells, OccupancyModel::default()).unwrap();
+    let mut grid = OccupancyGrid::covering(cells, OccupancyModel::default()).unwrap();
     let mut tree = Quadtree::covering(&cells, OccupancyModel::default()).unwrap();
-    let mut tsdf = Tsdf::<2>::new(TsdfConfig::default().with_grid(&cells)).unwrap();
+    let mut tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&cells)).unwrap();
     for (pose, scan) in &log {
         grid.integrate(pose, scan);
         tree.integrate(pose, scan);

@@ -16,7 +16,7 @@ const POINT_BYTES: usize = 2 * 16 + 4;
 fn scans_until_larger() -> (usize, usize) {
     let world = apartment().world;
     let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
-    let tsdf = Tsdf::<2>::new(TsdfConfig::default().with_grid(&grid)).unwrap();
+    let tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&grid)).unwrap();
     let field = esdf_from_tsdf(&tsdf, 0.5, 1.5).memory_bytes();
     let mut points = 0;
     let scans = lap(&world, &LapConfig::default());
@@ -50,7 +50,7 @@ fn after_the_move() -> (f64, f64, Option<f64>) {
     let moved = world.with_moved("chair", CHAIR_MOVE);
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
     let mut tsdf =
-        Tsdf::<2>::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
+        Tsdf2::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
     let mut cloud = Cloud::new();
     for (k, world) in [&world, &moved].into_iter().enumerate() {
         for (pose, scan) in lap(world, &LapConfig { first_index: 200 * k as u64, ..Default::default() }) {

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{SweepKind, Tsdf2Config};
+use portolan::map::{BeamSweep, TsdfConfig};
 use portolan::scan::{RangeLimits, Scan, ScanStats};
 use portolan::sweep::WeightModel;
 use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
@@ -242,8 +242,8 @@ fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
 }
 
 /// What the contours of the three sets of poses are made with.
-fn config_of(settings: &Settings) -> Tsdf2Config {
-    Tsdf2Config {
+fn config_of(settings: &Settings) -> TsdfConfig {
+    TsdfConfig {
         resolution: settings.resolution,
         truncation: settings.truncation,
         w_max: settings.w_max,

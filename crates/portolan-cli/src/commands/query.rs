@@ -7,7 +7,8 @@ use anyhow::bail;
 use portolan::Answer;
 use portolan::field::{Esdf, EsdfGrid, EsdfMethod, UnknownSpace};
 use portolan::geom::Pose;
-use portolan::map::{OccupancySweep, SparseOccupancy};
+use portolan::map::Occupancy;
+use portolan::sweep::OccupancySweep;
 use portolan::store::Store;
 use portolan::sweep::OccupancySweep;
 use portolan_io::{

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Tsdf3, TsdfConfig};
 use portolan_io::{Container, FileKind, MapFile, detect, map_dimension};
 use portolan_studio::engine::{Limits, Logs, PlaneLog, SpaceSource, check};
 use portolan_studio::server::{Server, Settings};
@@ -114,7 +114,7 @@ impl Args {
             weights: held.weights,
             ..TsdfConfig::default()
         };
-        let tsdf = SparseTsdf::from_stores(held.store, file.color_bricks.map(|c| c.store), config)?;
+        let tsdf = Tsdf3::from_stores(held.store, file.color_bricks.map(|c| c.store), config)?;
         let space = SpaceSource::Map { name: name(path), tsdf: Box::new(tsdf) };
         Ok(Logs { space, ..Logs::default() })
     }

@@ -88,10 +88,10 @@ impl SpaceMaps {
         let occupancy = file
             .occupancy_bricks
             .take()
-            .map(|o| SparseOccupancy::from_store(o.store, o.model, settings.sweep));
+            .map(|o| Occupancy::from_store(o.store, o.model, settings.sweep));
         let tsdf = file.tsdf_bricks.take().map(|t| {
             let config = settings.tsdf_config(t.store.lattice().origin);
-            SparseTsdf::from_stores(t.store, file.color_bricks.take().map(|c| c.store), config)
+            Tsdf3::from_stores(t.store, file.color_bricks.take().map(|c| c.store), config)
         });
         Ok(Self { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()? })
     }

@@ -57,7 +57,7 @@ impl Settings {
             },
             // What is beyond the caller's limit is cut before; the map's own is as far as it reaches.
             max_range: LONGEST_RAY_CELLS * self.resolution - self.truncation,
-            ..SparseTsdfConfig::default()
+            ..TsdfConfig::default()
         }
     }
 

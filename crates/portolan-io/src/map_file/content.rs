@@ -19,7 +19,7 @@ pub struct MapFile<const D: usize> {
     /// Occupancy in a quadtree or octree.
     pub tree: Option<TreeMap<D>>,
     /// The truncated signed distance field in a dense array.
-    pub tsdf: Option<Tsdf<D>>,
+    pub tsdf: Option<DenseTsdf<D>>,
     /// Occupancy in bricks.
     pub occupancy_bricks: Option<OccupancyBricks<D>>,
     /// The truncated signed distance field in bricks.
@@ -53,7 +53,7 @@ mod tests {
                 more: [("studio".to_owned(), json!({"colour": 0.1}))].into_iter().collect(),
                 ..Default::default()
             },
-            grid: Some(OccupancyGrid::new(grid, OccupancyModel::default()).unwrap()),
+            grid: Some(OccupancyGrid::covering(grid, OccupancyModel::default()).unwrap()),
             tree: Some(Quadtree::covering(&grid, OccupancyModel::default()).unwrap()),
             tsdf: Some(
                 Tsdf::new(TsdfConfig { truncation: 0.3, ..Default::default() }.with_grid(&grid)).unwrap(),

@@ -1,7 +1,7 @@
 //! Where maps of the engine meet what a file holds of them: cells and settings.
 
 use portolan::cell::{LogOdds8, OccupancyModel, SignedDistance};
-use portolan::map::{MapError, OccupancyGrid, SweepKind, TreeMap, Tsdf, TsdfConfig};
+use portolan::map::{MapError, OccupancyGrid, BeamSweep, TreeMap, Tsdf, TsdfConfig};
 use portolan::store::{Bricks, Dense, Tree};
 use portolan::sweep::WeightModel;
 use serde_json::{Map, Value};
@@ -30,7 +30,7 @@ pub(super) fn saved_tree<const D: usize>(
     Saved { store: map.tree(), settings: OccupancySettings { model: *map.model(), more: Map::new() } }
 }
 
-pub(super) fn saved_tsdf<const D: usize>(map: &Tsdf<D>) -> Saved<'_, Dense<SignedDistance, D>, TsdfSettings> {
+pub(super) fn saved_tsdf<const D: usize>(map: &DenseTsdf<D>) -> Saved<'_, Dense<SignedDistance, D>, TsdfSettings> {
     let config = map.config();
     let settings = TsdfSettings {
         truncation: config.truncation,
@@ -79,8 +79,8 @@ pub(super) fn tsdf_of<const D: usize>(
     store: Dense<SignedDistance, D>,
     settings: &TsdfSettings,
     weights: WeightModel,
-    sweep: SweepKind,
-) -> Result<Tsdf<D>, MapError> {
+    sweep: BeamSweep,
+) -> Result<DenseTsdf<D>, MapError> {
     let config = TsdfConfig {
         truncation: settings.truncation,
         w_max: settings.w_max(),

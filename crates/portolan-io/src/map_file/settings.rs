@@ -1,7 +1,7 @@
 //! The settings of maps in the header, and the words for what they choose.
 
 use portolan::cell::OccupancyModel;
-use portolan::map::SweepKind;
+use portolan::map::BeamSweep;
 use portolan::sweep::WeightModel;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -54,16 +54,16 @@ pub(super) struct ColorSettings {
 }
 
 /// The word for a sweep in files and on the command line.
-pub fn sweep_word(sweep: SweepKind) -> &'static str {
+pub fn sweep_word(sweep: BeamSweep) -> &'static str {
     match sweep {
-        SweepKind::CellCentre => "cell-centre",
-        SweepKind::March => "march",
+        BeamSweep::CellCentre => "cell-centre",
+        BeamSweep::March => "march",
     }
 }
 
 /// The sweep of a word; `None` for any other word.
-pub fn sweep_of(word: &str) -> Option<SweepKind> {
-    [SweepKind::CellCentre, SweepKind::March].into_iter().find(|&s| sweep_word(s) == word)
+pub fn sweep_of(word: &str) -> Option<BeamSweep> {
+    [BeamSweep::CellCentre, BeamSweep::March].into_iter().find(|&s| sweep_word(s) == word)
 }
 
 /// The word for a weight model in files and on the command line.

@@ -13,7 +13,7 @@ use crate::store::{Bricks, Store};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrontierSettings {
     /// Cells of smaller weight are unknown.
-    pub min_weight: f32,
+    pub min_weight: Option<f32>,
     /// Frontiers of fewer cells are omitted.
     pub min_cells: usize,
 }
@@ -62,7 +62,7 @@ impl FrontierSettings {
 /// # Ok::<(), portolan::store::StoreFull>(())
 /// ```
 ///
-/// The same in 3-D, where the store is that of [`SparseTsdf::store`](crate::map::SparseTsdf::store):
+/// The same in 3-D, where the store is that of [`Tsdf3::store`](crate::map::Tsdf3::store):
 ///
 /// ```
 /// use portolan::cell::DistanceBrick;

@@ -14,7 +14,7 @@ use rustc_hash::FxHashMap;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GainSettings<const D: usize> {
     /// Cells of smaller weight are unknown.
-    pub min_weight: f32,
+    pub min_weight: Option<f32>,
     /// Range of the sensor (meters). Infinite is limited to 100,000 cells, the longest ray.
     pub max_range: f64,
     /// Depth to which a ray is expected to see into unknown space (meters, summed along the ray); infinite for the whole

@@ -33,6 +33,14 @@ impl<const D: usize> Aabb<D> {
         self
     }
 
+    /// The box of the points that lie in both; empty where there are none.
+    pub fn intersection(self, other: Self) -> Self {
+        Self {
+            min: std::array::from_fn(|k| self.min[k].max(other.min[k])),
+            max: std::array::from_fn(|k| self.max[k].min(other.max[k])),
+        }
+    }
+
     /// The box with every face moved outward by `margin` (meters).
     pub fn grown(self, margin: f64) -> Self {
         Self { min: self.min.map(|v| v - margin), max: self.max.map(|v| v + margin) }

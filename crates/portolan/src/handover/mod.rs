@@ -1,7 +1,7 @@
 //! Distance fields as arrays in the layouts of planners, optimizers and costmaps.
 //!
 //! A field here is an array of samples at the cell centers of a grid: meters, positive in free space, x fastest, NaN where
-//! unknown ([`crate::field::DenseEsdf`], [`crate::field::Esdf`]). Consumers differ in each of these, and most of them have
+//! unknown ([`crate::field::EsdfGrid`]). Consumers differ in each of these, and most of them have
 //! no value for unknown: the caller first decides what unknown cells become ([`Filled`]), then the layout.
 //!
 //! | consumer | array | sign | position of samples | beyond the array | here |

@@ -52,11 +52,11 @@ pub struct PathViolation {
 ///
 /// ```
 /// use portolan::field::{Esdf, EsdfSettings};
-/// use portolan::map::{Tsdf2, Tsdf2Config, Tsdf3, TsdfConfig};
+/// use portolan::map::{Tsdf2, TsdfConfig, Tsdf3, TsdfConfig};
 /// use portolan::plan::{Cause, Demand, PathCheck, Waypoints, check_path};
 ///
 /// // A wall at x = 4 m; the space before it was observed.
-/// let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [84, 60], resolution: 0.05, ..Default::default() })?;
+/// let mut tsdf = Tsdf2::new(TsdfConfig { cells: [84, 60], resolution: 0.05, ..Default::default() })?;
 /// for i in 0..tsdf.grid().len() {
 ///     let cell = tsdf.grid().cell(i);
 ///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);

@@ -73,32 +73,6 @@ impl Contour {
     }
 }
 
-impl DerivedField<2> for Contour {
-    type Settings = ContourSettings;
-
-    fn derive(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Self {
-        marching_squares(tsdf, settings)
-    }
-
-    fn occupancy(&self, p_world: [f64; 2]) -> Option<f64> {
-        self.is_inside(p_world).map(|inside| if inside { 1.0 } else { 0.0 })
-    }
-
-    /// `None`: a contour needs a search ([`Contour::nearest_distance`]).
-    fn distance(&self, _: [f64; 2]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.vertices.capacity() * size_of::<[f64; 2]>() + self.segments.capacity() * size_of::<[u32; 2]>()
-    }
-
-    /// The segments joined end to end.
-    pub fn polylines(&self) -> Vec<Polyline> {
-        super::polyline::join(self)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

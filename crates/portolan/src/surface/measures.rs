@@ -72,7 +72,7 @@ pub struct ThinWalls {
 
 /// Searches behind every segment of a contour, in steps of half a cell along the normal, for free space within twice the
 /// truncation. O(segments).
-pub fn thin_walls(tsdf: &Tsdf<2>, contour: &Contour) -> ThinWalls {
+pub fn thin_walls(tsdf: &Tsdf2, contour: &Contour) -> ThinWalls {
     let grid = tsdf.grid();
     let strides = grid.strides();
     let planes = tsdf.store().planes();

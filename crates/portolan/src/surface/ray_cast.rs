@@ -2,7 +2,7 @@
 
 use crate::geom::interpolate;
 use crate::geom::vector::{along, norm, unit};
-use crate::map::Tsdf;
+use crate::map::{DenseTsdf, DistanceMap};
 
 /// Where a ray ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +33,9 @@ pub struct RayTrace<const D: usize> {
 /// Settings of ray casting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayCastSettings {
-    /// Cells of smaller weight are unknown.
-    pub min_weight: f32,
+    /// Cells of smaller weight are unknown. `None`: what fits the map
+    /// ([`Thresholds::observed`](crate::map::Thresholds::observed)), and any weight above 0 where cells alone are given.
+    pub min_weight: Option<f32>,
     /// Maximum length of a ray (meters).
     pub max_range: f64,
     /// Length of unknown space that a ray may cross without ending in it (meters), such as gaps between beams.
@@ -61,7 +62,7 @@ impl RayCastSettings {
 
     #[inline(always)]
     pub(super) fn observed(&self, weight: f32) -> bool {
-        weight > 0.0 && weight >= self.min_weight
+        weight > 0.0 && self.min_weight.is_none_or(|least| weight >= least)
     }
 }
 
@@ -85,7 +86,7 @@ pub fn cast_ray<const D: usize>(
 /// use portolan::surface::{RayCast, RayCastSettings, trace_ray};
 ///
 /// // A wall at x = 1 m, and an unobserved gap before it.
-/// let mut tsdf = Tsdf2::new(Tsdf2Config { cells: [24, 8], resolution: 0.05, ..Default::default() })?;
+/// let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [24, 8]), TsdfConfig::default())?;
 /// for i in (0..192).filter(|i| !(8..12).contains(&(i % 24))) {
 ///     let cell = [i % 24, i / 24];
 ///     tsdf.fuse(cell, 1.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
@@ -130,7 +131,7 @@ fn cast_dense<const D: usize>(
 
 #[inline(always)]
 fn sample_dense<const D: usize>(
-    tsdf: &Tsdf<D>,
+    tsdf: &DenseTsdf<D>,
     p: [f64; D],
     s: f64,
     settings: &RayCastSettings,
@@ -226,7 +227,7 @@ pub(super) mod tests {
     use crate::geom::Grid;
     use crate::map::TsdfConfig;
 
-    pub(crate) fn wall<const D: usize>() -> Tsdf<D> {
+    pub(crate) fn wall<const D: usize>() -> DenseTsdf<D> {
         let mut tsdf =
             Tsdf::new(TsdfConfig { cells: [20; D], resolution: 0.1, truncation: 0.3, ..Default::default() })
                 .unwrap();

@@ -110,7 +110,7 @@ mod tests {
     use crate::surface::{cast_ray, trace_ray};
 
     /// The same cells in bricks.
-    fn in_bricks<const D: usize>(tsdf: &Tsdf<D>) -> Bricks<SignedDistance, D> {
+    fn in_bricks<const D: usize>(tsdf: &DenseTsdf<D>) -> Bricks<SignedDistance, D> {
         let mut bricks = Bricks::new(tsdf.grid().lattice);
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);

@@ -2,7 +2,7 @@
 
 use super::Contour;
 use crate::geom::Grid;
-use crate::map::{DistanceMap, Tsdf};
+use crate::map::{DistanceMap, Tsdf2};
 
 /// Treatment of ambiguous squares: those whose diagonal corners have equal signs and neighboring corners different ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,25 +16,19 @@ pub enum Ambiguity {
 }
 
 /// Settings of [`marching_squares`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContourSettings {
-    /// Cells of smaller weight are unknown; a square with an unknown corner gets no segment.
-    pub min_weight: f32,
+    /// Cells of smaller weight are unknown; a square with an unknown corner gets no segment. `None`: what fits the map
+    /// ([`Thresholds::surface`](crate::map::Thresholds::surface)).
+    pub min_weight: Option<f32>,
     /// Treatment of ambiguous squares.
     pub ambiguity: Ambiguity,
 }
 
-impl Default for ContourSettings {
-    /// A least weight of 0.5, half an observation.
-    fn default() -> Self {
-        Self { min_weight: 0.5, ambiguity: Ambiguity::Decide }
-    }
-}
-
 impl ContourSettings {
-    /// The default with a least weight of half the weight of a typical beam of this map (0.5 where all beams weigh 1).
-    pub fn of(tsdf: &Tsdf<2>) -> Self {
-        Self { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..Self::default() }
+    /// The default, with the weight that fits a map written out.
+    pub fn of(map: &impl DistanceMap<2>) -> Self {
+        Self { min_weight: Some(map.thresholds().surface), ..Self::default() }
     }
 }
 
@@ -53,7 +47,7 @@ struct RowEdges {
 ///
 /// The corners of a square are the centers of four neighboring cells; a vertex is placed on an edge by linear interpolation,
 /// `t = D_a / (D_a - D_b)`. Negative is inside, zero is free. O(cells).
-pub fn marching_squares(tsdf: &Tsdf<2>, settings: &ContourSettings) -> Contour {
+pub fn marching_squares(tsdf: &Tsdf2, settings: &ContourSettings) -> Contour {
     let planes = tsdf.store().planes();
     let weight = planes.weights();
     let min_weight = settings.min_weight.unwrap_or(tsdf.thresholds().surface);

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::{Context, bail};
 use portolan::geom::Aabb;
-use portolan::map::OccupancySweep;
+use portolan::sweep::OccupancySweep;
 use portolan::scan::{FrameFilter, ScanStats};
 use portolan_io::scan_log::ScanLog;
 use portolan_io::{MapFile, weights_of, write_atomic};

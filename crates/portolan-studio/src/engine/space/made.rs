@@ -37,8 +37,8 @@ pub(super) struct Seconds {
 pub(super) struct Made {
     /// Frames that are fused.
     pub(super) at: usize,
-    pub(super) tsdf: SparseTsdf,
-    pub(super) occupancy: Option<SparseOccupancy>,
+    pub(super) tsdf: Tsdf3,
+    pub(super) occupancy: Option<Occupancy>,
     pub(super) esdf: Option<Esdf<3>>,
     /// The map's epoch when the Euclidean field was made.
     measured: u64,
@@ -206,7 +206,7 @@ impl Made {
 
     pub(super) fn memory_bytes(&self) -> usize {
         self.tsdf.memory_bytes()
-            + self.occupancy.as_ref().map_or(0, SparseOccupancy::memory_bytes)
+            + self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes)
             + self.esdf.as_ref().map_or(0, Esdf::memory_bytes)
             + self.mesh.memory_bytes()
             + self.drawn.memory_bytes()

@@ -2,7 +2,8 @@
 
 use portolan::cell::OccupancyModel;
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
+use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
+use portolan::sweep::OccupancySweep;
 use portolan::surface::MeshSettings;
 use portolan::sweep::LONGEST_RAY_CELLS;
 use serde::{Deserialize, Serialize};
@@ -77,7 +78,7 @@ impl Settings {
             carve_weight: CARVE_WEIGHT,
             color,
             max_range: LONGEST_RAY_CELLS * resolution - truncation,
-            ..SparseTsdfConfig::default()
+            ..TsdfConfig::default()
         })
     }
 

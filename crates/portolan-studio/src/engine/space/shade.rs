@@ -16,7 +16,7 @@ const ERROR_CELLS: f64 = 1.0;
 pub(super) fn shades(
     by: ColorBy,
     piece: &Mesh,
-    tsdf: &SparseTsdf,
+    tsdf: &Tsdf3,
     world: Option<&World3>,
     out: &mut Vec<u8>,
 ) {

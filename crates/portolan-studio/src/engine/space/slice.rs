@@ -76,8 +76,8 @@ pub(super) fn layer_index(
 /// What a field says of a cell; NaN: nothing.
 pub(super) fn value_of<'a>(
     field: Field,
-    tsdf: &'a SparseTsdf,
-    occupancy: Option<&'a SparseOccupancy>,
+    tsdf: &'a Tsdf3,
+    occupancy: Option<&'a Occupancy>,
     esdf: Option<&'a Esdf<3>>,
 ) -> impl Fn([i32; 3]) -> f32 + 'a {
     move |cell| {

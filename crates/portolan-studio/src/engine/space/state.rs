@@ -217,7 +217,7 @@ impl Space {
             "bricks": tsdf.store().len(),
             "bytes": {
                 "tsdf": tsdf.memory_bytes(),
-                "occupancy": made.occupancy.as_ref().map(SparseOccupancy::memory_bytes),
+                "occupancy": made.occupancy.as_ref().map(Occupancy::memory_bytes),
                 "esdf": made.esdf.as_ref().map(Esdf::memory_bytes),
                 "mesh": made.mesh.memory_bytes(),
             },

@@ -40,7 +40,7 @@ pub struct Esdf<const D: usize> {
 impl<const D: usize> Esdf<D> {
     /// The field over the observed bricks of a map, by [`EsdfSettings::method`].
     ///
-    /// `map` is a [`Tsdf`](crate::map::Tsdf), a [`SparseTsdf`](crate::map::SparseTsdf), or the cells of one in bricks; a dense map
+    /// `map` is a [`Tsdf`](crate::map::Tsdf), a [`Tsdf3`](crate::map::Tsdf3), or the cells of one in bricks; a dense map
     /// is copied into bricks first, a small part of what the transform takes.
     ///
     /// Accurate: the exact distance to the crossings of the surface that [`crate::surface`] extracts, and from there to its

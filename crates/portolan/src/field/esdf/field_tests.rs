@@ -87,7 +87,7 @@ proptest! {
 }
 
 /// A ball in a box of observed cells, dense and in bricks.
-fn ball<const D: usize>(n: usize) -> (Tsdf<D>, Bricks<SignedDistance, D>) {
+fn ball<const D: usize>(n: usize) -> (DenseTsdf<D>, Bricks<SignedDistance, D>) {
     let config = TsdfConfig { cells: [n; D], resolution: R, truncation: 0.3, ..Default::default() };
     let mut tsdf = Tsdf::new(config).unwrap();
     let mut bricks = Bricks::new(tsdf.grid().lattice);

@@ -1,7 +1,7 @@
 //! The textbook's distance field of a dense map.
 
 use super::{EsdfGrid, squared_distance_transform};
-use crate::map::Tsdf;
+use crate::map::DenseTsdf;
 
 /// The textbook's transform: seeds every observed cell within `band_cells` of the surface with its own
 /// estimate, `f = (D / r)^2`, runs the exact squared distance transform over `f`, and takes the sign from `D`.
@@ -15,7 +15,7 @@ use crate::map::Tsdf;
 /// angles to the way there. On an exact field that makes distances too small by up to one and a half cells,
 /// and never too large; on a fused field, whose values are projective, it can be too large by as much as the
 /// cells' values are.
-pub fn esdf_from_tsdf<const D: usize>(tsdf: &Tsdf<D>, min_weight: f32, band_cells: f64) -> EsdfGrid<D> {
+pub fn esdf_from_tsdf<const D: usize>(tsdf: &DenseTsdf<D>, min_weight: f32, band_cells: f64) -> EsdfGrid<D> {
     let grid = *tsdf.grid();
     let planes = tsdf.store().planes();
     let (distance, weight) = (planes.distances(), planes.weights());
@@ -51,7 +51,7 @@ mod tests {
     use crate::geom::vector;
     use crate::map::TsdfConfig;
 
-    fn sphere<const D: usize>(n: usize, r: f64, radius: f64) -> Tsdf<D> {
+    fn sphere<const D: usize>(n: usize, r: f64, radius: f64) -> DenseTsdf<D> {
         let config = TsdfConfig { cells: [n; D], resolution: r, truncation: 3.0 * r, ..Default::default() };
         let mut tsdf = Tsdf::new(config).unwrap();
         let centre = [0.5 * n as f64 * r; D];
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn a_map_without_a_surface_is_unknown_and_not_far() {
-        let mut tsdf = Tsdf::<2>::new(TsdfConfig { cells: [10; 2], ..Default::default() }).unwrap();
+        let mut tsdf = Tsdf2::new(TsdfConfig { cells: [10; 2], ..Default::default() }).unwrap();
         (0..100).for_each(|i| {
             let cell = tsdf.grid().cell(i);
             tsdf.fuse(cell, 0.15, 1.0);
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn unobserved_cells_make_their_neighbourhood_unknown() {
         let mut tsdf =
-            Tsdf::<2>::new(TsdfConfig { cells: [20; 2], resolution: 0.1, ..Default::default() }).unwrap();
+            Tsdf2::new(TsdfConfig { cells: [20; 2], resolution: 0.1, ..Default::default() }).unwrap();
         for i in 0..400 {
             let cell = tsdf.grid().cell(i);
             if cell != [10, 10] {

@@ -17,7 +17,7 @@ use crate::surface::Mesh;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshSettings {
     /// Cells of smaller weight are unknown; a cube with an unknown corner gets no triangles.
-    pub min_weight: f32,
+    pub min_weight: Option<f32>,
     /// Whether vertices get normals.
     pub normals: bool,
     /// Whether vertices get colors, if the map has any.
