@@ -15,15 +15,19 @@ import space from "./views/space.js";
  * @typedef {object} View
  * @property {string} id also in the address
  * @property {string} title on its tab
- * @property {(root: HTMLElement, app: App) => Shown} mount fills `root`, a section that is not on the page yet
+ * @property {(root: HTMLElement, app: App) => Shown} mount fills `root`, a section that is not on the page
+ *   yet
  *
  * @typedef {object} Shown
- * @property {(state: URLSearchParams) => Promise<void> | void} show the view is on the page now; `state` is what the
+ * @property {(state: URLSearchParams) => Promise<void> | void} show the view is on the page now; `state` is
+ *   what the
  *   address says, and empty where it says nothing
  * @property {() => void} hide
- * @property {() => Record<string, string>} state what the address must say so that another page shows the same
+ * @property {() => Record<string, string>} state what the address must say so that another page shows the
+ *   same
  * @property {() => Promise<HTMLCanvasElement> | HTMLCanvasElement} picture of what is shown
- * @property {(event: KeyboardEvent) => boolean} key whether the key meant something; never called while a text is typed
+ * @property {(event: KeyboardEvent) => boolean} key whether the key meant something; never called while a
+ *   text is typed
  * @property {[string, string][]} keys which key does what
  * @property {() => void} redraw after the theme has changed
  *
@@ -54,7 +58,10 @@ function fail(error) {
   status.textContent = error instanceof Error ? error.message : String(error);
 }
 
-/** What is mounted, and the theme that it was drawn in. @type {Map<string, {section: HTMLElement, shown: Shown, theme?: string}>} */
+/**
+ * What is mounted, and the theme that it was drawn in.
+ * @type {Map<string, {section: HTMLElement, shown: Shown, theme?: string}>}
+ */
 const mounted = new Map();
 /** @type {View | undefined} */
 let current;
@@ -171,7 +178,11 @@ async function main() {
     const all = [...(current ? (mounted.get(current.id)?.shown.keys ?? []) : []), ...SHELL_KEYS];
     $("keys-list").replaceChildren(
       ...all.flatMap(([key, what]) => {
-        const [dt, dd, kbd] = [document.createElement("dt"), document.createElement("dd"), document.createElement("kbd")];
+        const [dt, dd, kbd] = [
+          document.createElement("dt"),
+          document.createElement("dd"),
+          document.createElement("kbd"),
+        ];
         kbd.textContent = key;
         dt.append(kbd);
         dd.textContent = what;
@@ -187,7 +198,10 @@ async function main() {
     const typing = on.matches("select, textarea, input:not([type=checkbox]):not([type=range])");
     if (typing) return;
     // A focused button or slider keeps the keys that it has a use for.
-    const own = { BUTTON: ["Enter", " "], INPUT: ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown", " "] }[on.tagName];
+    const own = {
+      BUTTON: ["Enter", " "],
+      INPUT: ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown", " "],
+    }[on.tagName];
     if (own?.includes(event.key)) return;
     const shell = { l: "share", p: "picture", t: "theme", "?": "help" }[event.key];
     const number = Number(event.key);

@@ -3,7 +3,9 @@ import { colors } from "../ui/theme.js";
 
 /** Gradients shorter than this are dots: there is no direction in them. */
 const NONE = 0.05;
-/** Longer ones are drawn as if they were of this length: projective distances can grow faster than one walks. */
+/**
+ * Longer ones are drawn as if they were of this length: projective distances can grow faster than one walks.
+ */
 const MOST = 1.3;
 
 /**
@@ -36,7 +38,15 @@ export function drawArrows(g, camera, { points, gradients, spacing }) {
   g.globalAlpha = 1;
 }
 
-/** Adds an arrow from x, y by dx, dy. @param {CanvasRenderingContext2D} g @param {number} x @param {number} y @param {number} dx @param {number} dy @param {number} head */
+/**
+ * Adds an arrow from x, y by dx, dy.
+ * @param {CanvasRenderingContext2D} g
+ * @param {number} x
+ * @param {number} y
+ * @param {number} dx
+ * @param {number} dy
+ * @param {number} head
+ */
 function arrow(g, x, y, dx, dy, head) {
   const length = Math.hypot(dx, dy);
   const [ux, uy] = [dx / length, dy / length];
@@ -48,7 +58,8 @@ function arrow(g, x, y, dx, dy, head) {
 }
 
 /**
- * The probe: the circle in which nothing is, the one in which something is, and the gradient of the field that is shown.
+ * The probe: the circle in which nothing is, the one in which something is, and the gradient of the field
+ * that is shown.
  * @param {CanvasRenderingContext2D} g
  * @param {import("../plane/plane.js").Camera} camera
  * @param {import("./scene.js").Scene} s

@@ -25,7 +25,11 @@ import { drawRings } from "./rings_layer.js";
  * @typedef {{points: Float32Array, gradients: Float32Array, spacing: number}} Arrows
  */
 
-/** What stays while the probe moves, from back to front. @param {Scene} s @returns {import("../plane/plane.js").Layer[]} */
+/**
+ * What stays while the probe moves, from back to front.
+ * @param {Scene} s
+ * @returns {import("../plane/plane.js").Layer[]}
+ */
 export function stillLayers(s) {
   return [
     (g, camera) => s.image?.draw(g, camera),

@@ -1,8 +1,10 @@
 // @ts-check
 
 /**
- * Layers that stay as they are while the probe moves: kept as a picture once the camera rests, and copied until it moves or
- * what they show changes. While it moves they are drawn as they are: a picture costs the main thread what a browser
+ * Layers that stay as they are while the probe moves: kept as a picture once the camera rests, and copied
+ * until it moves or
+ * what they show changes. While it moves they are drawn as they are: a picture costs the main thread what a
+ * browser
  * otherwise does beside it.
  */
 export class Still {
@@ -40,7 +42,8 @@ export class Still {
 
   /** @param {number} width @param {number} height @param {import("../plane/plane.js").Camera} camera */
   #keep(width, height, camera) {
-    if (this.canvas.width !== width || this.canvas.height !== height) this.canvas = new OffscreenCanvas(width, height);
+    if (this.canvas.width !== width || this.canvas.height !== height)
+      this.canvas = new OffscreenCanvas(width, height);
     // The layers use what both kinds of canvas have.
     const g = /** @type {CanvasRenderingContext2D} */ (/** @type {unknown} */ (this.canvas.getContext("2d")));
     g.setTransform(1, 0, 0, 1, 0, 0);

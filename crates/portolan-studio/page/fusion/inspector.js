@@ -19,12 +19,28 @@ export class Inspector {
     this.picked = undefined;
     /** @type {any} */
     this.decay = null;
-    this.title = el("p", { id: "cell" }, "Click a cell of the field, or press Enter for the one in the middle.");
+    this.title = el(
+      "p",
+      { id: "cell" },
+      "Click a cell of the field, or press Enter for the one in the middle.",
+    );
     this.facts = facts([
-      ["cell-before", "prior D"], ["cell-observed", "observation d"], ["cell-gain", "gain K = w / (W + w)"],
-      ["cell-after", "posterior D = D + K (d − D)"], ["cell-weight-before", "weight W before"], ["cell-weight", "weight W after"], ["cell-scan", "scan"],
+      ["cell-before", "prior D"],
+      ["cell-observed", "observation d"],
+      ["cell-gain", "gain K = w / (W + w)"],
+      ["cell-after", "posterior D = D + K (d − D)"],
+      ["cell-weight-before", "weight W before"],
+      ["cell-weight", "weight W after"],
+      ["cell-scan", "scan"],
     ]);
-    this.pick = el("input", { type: "range", id: "cell-event", min: 0, max: 0, step: 1, "aria-label": "Which observation of the cell" });
+    this.pick = el("input", {
+      type: "range",
+      id: "cell-event",
+      min: 0,
+      max: 0,
+      step: 1,
+      "aria-label": "Which observation of the cell",
+    });
     this.which = el("output", { for: "cell-event", id: "cell-count" });
     this.pick.oninput = () => {
       const n = Number(this.pick.value);
@@ -32,7 +48,10 @@ export class Inspector {
       this.show();
     };
     this.plot = plot({
-      id: "cell-history", label: "History of the cell: observations, estimate, and the decay that theory predicts", x: "observation", y: "distance (m)",
+      id: "cell-history",
+      label: "History of the cell: observations, estimate, and the decay that theory predicts",
+      x: "observation",
+      y: "distance (m)",
       series: [
         { label: "observation d", color: "beam", width: 0, points: true },
         { label: "estimate D", color: "positive", width: 2 },
@@ -40,14 +59,41 @@ export class Inspector {
       ],
     });
     this.note = el("p", { class: "note", id: "cell-decay" });
-    const button = (/** @type {string} */ text, /** @type {string} */ label, /** @type {() => void} */ onclick) => el("button", { type: "button", "aria-label": label, title: label, onclick }, text);
+    const button = (
+      /** @type {string} */ text,
+      /** @type {string} */ label,
+      /** @type {() => void} */ onclick,
+    ) => el("button", { type: "button", "aria-label": label, title: label, onclick }, text);
     this.details = el(
-      "div", { class: "group", hidden: true },
-      el("div", { class: "control" }, el("label", { for: "cell-event" }, "Observation", this.which), this.pick),
-      this.facts.node, this.plot.node, this.note,
-      el("div", { class: "row" }, el("span", { class: "note" }, "Neighbour (W A S D)"),
-        el("span", {}, button("←", "Cell to the left", () => move(-1, 0)), " ", button("↑", "Cell above", () => move(0, 1)), " ", button("↓", "Cell below", () => move(0, -1)), " ",
-          button("→", "Cell to the right", () => move(1, 0)), " ", button("✕", "Follow no cell", close))),
+      "div",
+      { class: "group", hidden: true },
+      el(
+        "div",
+        { class: "control" },
+        el("label", { for: "cell-event" }, "Observation", this.which),
+        this.pick,
+      ),
+      this.facts.node,
+      this.plot.node,
+      this.note,
+      el(
+        "div",
+        { class: "row" },
+        el("span", { class: "note" }, "Neighbour (W A S D)"),
+        el(
+          "span",
+          {},
+          button("←", "Cell to the left", () => move(-1, 0)),
+          " ",
+          button("↑", "Cell above", () => move(0, 1)),
+          " ",
+          button("↓", "Cell below", () => move(0, -1)),
+          " ",
+          button("→", "Cell to the right", () => move(1, 0)),
+          " ",
+          button("✕", "Follow no cell", close),
+        ),
+      ),
     );
     this.node = group("A cell's filter", this.title, this.details);
     this.shownAt = 0;
@@ -84,10 +130,20 @@ export class Inspector {
     this.facts.set(
       e
         ? {
-            "cell-before": metres(e[1]), "cell-observed": metres(e[3]), "cell-gain": e[4].toFixed(6), "cell-after": metres(e[5]),
-            "cell-weight-before": e[2].toFixed(4), "cell-weight": e[6].toFixed(4), "cell-scan": String(e[0] + 1),
+            "cell-before": metres(e[1]),
+            "cell-observed": metres(e[3]),
+            "cell-gain": e[4].toFixed(6),
+            "cell-after": metres(e[5]),
+            "cell-weight-before": e[2].toFixed(4),
+            "cell-weight": e[6].toFixed(4),
+            "cell-scan": String(e[0] + 1),
           }
-        : Object.fromEntries(["before", "observed", "gain", "after", "weight-before", "weight", "scan"].map((k) => [`cell-${k}`, none])),
+        : Object.fromEntries(
+            ["before", "observed", "gain", "after", "weight-before", "weight", "scan"].map((k) => [
+              `cell-${k}`,
+              none,
+            ]),
+          ),
     );
     // The plot costs more than the numbers, and nobody reads it sixty times a second.
     if (performance.now() - this.shownAt > 120 || this.picked !== undefined) this.showPlot();

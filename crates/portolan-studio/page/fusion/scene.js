@@ -88,7 +88,10 @@ export function layers(s) {
       if (!s.cell || !s.field) return;
       const [x, y] = camera.toScreen(...s.field.center(s.cell));
       const half = Math.max(4, 0.5 * s.field.grid.resolution * camera.scale);
-      for (const [width, color] of /** @type {[number, string][]} */ ([[4, colors().paper], [2, colors().ink]])) {
+      for (const [width, color] of /** @type {[number, string][]} */ ([
+        [4, colors().paper],
+        [2, colors().ink],
+      ])) {
         g.lineWidth = width;
         g.strokeStyle = color;
         g.strokeRect(x - half, y - half, 2 * half, 2 * half);
@@ -103,7 +106,12 @@ function outline(g, camera, { min, max }) {
   g.strokeRect(x, y, (max[0] - min[0]) * camera.scale, (max[1] - min[1]) * camera.scale);
 }
 
-/** @param {CanvasRenderingContext2D} g @param {import("../plane/plane.js").Camera} camera @param {Box} box @param {string} text */
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {import("../plane/plane.js").Camera} camera
+ * @param {Box} box
+ * @param {string} text
+ */
 function label(g, camera, { min, max }, text) {
   if (camera.scale < 40) return;
   const [x, y] = camera.toScreen((min[0] + max[0]) / 2, max[1]);

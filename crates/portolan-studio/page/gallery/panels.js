@@ -4,7 +4,10 @@ import { colors } from "../ui/theme.js";
 import { el } from "../ui/controls.js";
 import { bytes, time, times } from "./format.js";
 
-/** Panels: name in the engine's answers, heading, what it says to those who do not see it. @type {[string, string, string][]} */
+/**
+ * Panels: name in the engine's answers, heading, what it says to those who do not see it.
+ * @type {[string, string, string][]}
+ */
 const PANELS = [
   ["grid", "Occupancy grid", "The occupancy grid: a byte per cell"],
   ["tree", "Quadtree", "The quadtree with the cells that pruning has left"],
@@ -14,7 +17,13 @@ const PANELS = [
   ["cloud", "Point cloud", "The end points of all beams"],
 ];
 /** Meters of a panel, memory and then times. @type {[string, string][]} */
-const METERS = [["memory", "memory"], ["update", "update"], ["occupancy", "occupancy?"], ["distance", "distance?"], ["surface", "surface?"]];
+const METERS = [
+  ["memory", "memory"],
+  ["update", "update"],
+  ["occupancy", "occupancy?"],
+  ["distance", "distance?"],
+  ["surface", "surface?"],
+];
 
 /**
  * Six views of one part of the world, with meters.
@@ -33,11 +42,28 @@ export function panels(meter, o) {
       const value = el("output", { id: `gallery-${name}-${key}` }, "–");
       const by = el("span", { class: "note" });
       const head = el("dt", { "data-meter": key }, text, by);
-      return { key, bar, value, by, head, row: el("dd", { "data-meter": key }, el("span", { class: "track", "aria-hidden": "true" }, bar), value) };
+      return {
+        key,
+        bar,
+        value,
+        by,
+        head,
+        row: el(
+          "dd",
+          { "data-meter": key },
+          el("span", { class: "track", "aria-hidden": "true" }, bar),
+          value,
+        ),
+      };
     });
     plane.node.append(answer);
-    const node = el("article", { class: "panel", id: `gallery-panel-${name}`, "aria-label": title },
-      el("h2", {}, title, badge), plane.node, el("dl", { class: "meters" }, ...rows.flatMap((r) => [r.head, r.row])));
+    const node = el(
+      "article",
+      { class: "panel", id: `gallery-panel-${name}`, "aria-label": title },
+      el("h2", {}, title, badge),
+      plane.node,
+      el("dl", { class: "meters" }, ...rows.flatMap((r) => [r.head, r.row])),
+    );
     return { name, title, plane, node, badge, answer, rows };
   });
 
@@ -62,7 +88,12 @@ export function panels(meter, o) {
     plane.oncamera = () => {
       if (following) return;
       following = true;
-      for (const other of each) [other.plane.home, other.plane.center, other.plane.zoom] = [plane.home, [...plane.center], plane.zoom];
+      for (const other of each)
+        [other.plane.home, other.plane.center, other.plane.zoom] = [
+          plane.home,
+          [...plane.center],
+          plane.zoom,
+        ];
       following = false;
       o.oncamera();
       draw();
@@ -97,23 +128,38 @@ export function panels(meter, o) {
       for (const { plane, name } of each) plane.layers = [...layers[name], crosshair];
       draw();
     },
-    /** Crosshairs, and what each answers there. @param {[number, number] | undefined} p @param {Record<string, string>} answers */
+    /**
+     * Crosshairs, and what each answers there.
+     * @param {[number, number] | undefined} p
+     * @param {Record<string, string>} answers
+     */
     point(p, answers) {
       place = p;
       for (const { name, answer } of each) answer.textContent = answers[name] ?? "";
       draw();
     },
-    /** Bars over their scales. @param {any} costs @param {{memory: [number, number], time: [number, number]}} scales powers of ten */
+    /**
+     * Bars over their scales.
+     * @param {any} costs
+     * @param {{memory: [number, number], time: [number, number]}} scales powers of ten
+     */
     meters(costs, scales) {
       for (const { name, rows } of each) {
         const row = costs.rows.find((/** @type {any} */ r) => r.panel === name);
         if (!row) continue;
         for (const { key, bar, value, by, head } of rows) {
-          const cost = key === "memory" ? { seconds: row.memory_bytes, by: row.derived ? "on top of the TSDF" : null } : row[key];
+          const cost =
+            key === "memory"
+              ? { seconds: row.memory_bytes, by: row.derived ? "on top of the TSDF" : null }
+              : row[key];
           const [low, high] = key === "memory" ? scales.memory : scales.time;
           const share = cost && cost.seconds > 0 ? (Math.log10(cost.seconds) - low) / (high - low) : 0;
           bar.style.width = `${Math.max(cost && cost.seconds > 0 ? 1 : 0, Math.min(100, 100 * share)).toFixed(1)}%`;
-          value.textContent = !cost ? "–" : key === "memory" ? `${row.derived ? "+" : ""}${bytes(cost.seconds)}` : time(cost.seconds);
+          value.textContent = !cost
+            ? "–"
+            : key === "memory"
+              ? `${row.derived ? "+" : ""}${bytes(cost.seconds)}`
+              : time(cost.seconds);
           value.title = head.title = !cost ? "cannot answer" : (cost.by ?? "");
           by.textContent = cost?.by && key !== "memory" ? ` ${cost.by}` : "";
         }
@@ -122,21 +168,34 @@ export function panels(meter, o) {
     /** Frames for a workload that was run; `undefined`: none. @param {any} winner @param {any[]} rows */
     frames(winner, rows) {
       for (const { name, node, badge, rows: meters } of each) {
-        const own = rows.flatMap((/** @type {any} */ r, /** @type {number} */ i) => (r.panel === name ? [i] : []));
+        const own = rows.flatMap((/** @type {any} */ r, /** @type {number} */ i) =>
+          r.panel === name ? [i] : [],
+        );
         const first = own[0];
         const wins = winner !== undefined && own.includes(winner.row);
         const level = winner !== undefined && !wins && own.some((i) => winner.level.includes(i));
         node.classList.toggle("winner", wins);
         node.classList.toggle("level", level);
         for (const m of meters) m.head.classList.toggle("asked", m.key === winner?.workload);
-        badge.textContent = winner === undefined || first === undefined ? "" : wins ? "fastest" : level ? "level with it" : behind(winner, rows[first], first);
+        badge.textContent =
+          winner === undefined || first === undefined
+            ? ""
+            : wins
+              ? "fastest"
+              : level
+                ? "level with it"
+                : behind(winner, rows[first], first);
       }
     },
     /** What they show as canvases with headings and meters, in three columns, for a picture. */
     canvases() {
       paint();
       const drawn = each.map(portrait);
-      return [[drawn[0], drawn[3]], [drawn[1], drawn[4]], [drawn[2], drawn[5]]];
+      return [
+        [drawn[0], drawn[3]],
+        [drawn[1], drawn[4]],
+        [drawn[2], drawn[5]],
+      ];
     },
   };
 }
@@ -148,7 +207,10 @@ function behind(winner, row, i) {
   return winner.times[i] === null ? `${time(cost.seconds)} more` : `${times(winner.times[i])} slower`;
 }
 
-/** A panel as one canvas. @param {{title: string, plane: Plane, node: HTMLElement, badge: HTMLElement, rows: any[]}} panel */
+/**
+ * A panel as one canvas.
+ * @param {{title: string, plane: Plane, node: HTMLElement, badge: HTMLElement, rows: any[]}} panel
+ */
 function portrait({ title, plane, node, badge, rows }) {
   const c = colors();
   const ratio = devicePixelRatio;
@@ -162,7 +224,14 @@ function portrait({ title, plane, node, badge, rows }) {
   g.drawImage(plane.canvas, 0, Math.round(head * ratio));
   g.scale(ratio, ratio);
   const [w, foot] = [width / ratio, head + height / ratio + 18];
-  const text = (/** @type {string} */ t, /** @type {number} */ x, /** @type {number} */ y, /** @type {CanvasTextAlign} */ align, colour = c.ink, font = "12px") => {
+  const text = (
+    /** @type {string} */ t,
+    /** @type {number} */ x,
+    /** @type {number} */ y,
+    /** @type {CanvasTextAlign} */ align,
+    colour = c.ink,
+    font = "12px",
+  ) => {
     [g.textAlign, g.fillStyle, g.font] = [align, colour, `${font} system-ui, sans-serif`];
     g.fillText(t, x, y);
   };

@@ -34,7 +34,8 @@ export class Cells {
   /** All cells anew. @param {(i: number) => number} word of cell i, x fastest */
   fill(word) {
     const [w, h] = this.grid.shape;
-    for (let y = 0, i = 0; y < h; y++) for (let x = 0, k = (h - 1 - y) * w; x < w; x++, i++, k++) this.words[k] = word(i);
+    for (let y = 0, i = 0; y < h; y++)
+      for (let x = 0, k = (h - 1 - y) * w; x < w; x++, i++, k++) this.words[k] = word(i);
     this.touch(0, h);
   }
 
@@ -48,23 +49,35 @@ export class Cells {
     const [x0, y0] = camera.toScreen(origin[0], origin[1] + shape[1] * resolution);
     // Magnified cells are sharp squares; where several share a pixel they are mixed.
     g.imageSmoothingEnabled = camera.scale * resolution * devicePixelRatio < 1;
-    g.drawImage(this.image, x0, y0, shape[0] * resolution * camera.scale, shape[1] * resolution * camera.scale);
+    g.drawImage(
+      this.image,
+      x0,
+      y0,
+      shape[0] * resolution * camera.scale,
+      shape[1] * resolution * camera.scale,
+    );
   };
 }
 
 /** Red, green, blue, alpha (0 to 255) as a word of an image. */
-export const word = (/** @type {number} */ r, /** @type {number} */ g, /** @type {number} */ b, /** @type {number} */ a) =>
-  ((a << 24) | (b << 16) | (g << 8) | r) >>> 0;
+export const word = (
+  /** @type {number} */ r,
+  /** @type {number} */ g,
+  /** @type {number} */ b,
+  /** @type {number} */ a,
+) => ((a << 24) | (b << 16) | (g << 8) | r) >>> 0;
 
 /** Steps of a ramp. */
 export const STEPS = 256;
 
 /**
- * A diverging ramp over [-1, 1]: one colour, transparent zero, the other. Opacity grows with the root of the distance
+ * A diverging ramp over [-1, 1]: one colour, transparent zero, the other. Opacity grows with the root of the
+ * distance
  * from zero, so that small distances are told from none.
  * @param {string} negative `#rrggbb`
  * @param {string} positive
- * @param {[number, number]} most opacity at either end, 0 to 1: there is more free space than anything else, and it should
+ * @param {[number, number]} most opacity at either end, 0 to 1: there is more free space than anything else,
+ *   and it should
  *   not shout
  */
 export function diverging(negative, positive, most = [0.95, 0.5]) {
@@ -88,5 +101,11 @@ export function sequential(from, to) {
   return ramp;
 }
 
-/** The step of a value in [low, high]; beyond it the last. @param {number} v @param {number} low @param {number} high */
-export const step = (v, low, high) => Math.max(0, Math.min(STEPS - 1, Math.round(((v - low) / (high - low)) * (STEPS - 1))));
+/**
+ * The step of a value in [low, high]; beyond it the last.
+ * @param {number} v
+ * @param {number} low
+ * @param {number} high
+ */
+export const step = (v, low, high) =>
+  Math.max(0, Math.min(STEPS - 1, Math.round(((v - low) / (high - low)) * (STEPS - 1))));

@@ -1,7 +1,8 @@
 // @ts-check
 
 /**
- * Lines in one array, as the engine sends them: points x, y, and where each line begins (in points, the end included).
+ * Lines in one array, as the engine sends them: points x, y, and where each line begins (in points, the end
+ * included).
  * @param {CanvasRenderingContext2D} g
  * @param {import("./plane.js").Camera} camera
  * @param {Float32Array} points

@@ -8,10 +8,14 @@ import { colors } from "../ui/theme.js";
  * @property {(x: number, y: number) => [number, number]} toScreen
  * @property {(px: number, py: number) => [number, number]} toWorld
  *
- * @typedef {(g: CanvasRenderingContext2D, camera: Camera) => void} Layer draws itself; the context is in CSS pixels
+ * @typedef {(g: CanvasRenderingContext2D, camera: Camera) => void} Layer draws itself; the context is in CSS
+ *   pixels
  */
 
-/** A canvas that shows a part of the plane: pan, zoom, layers from back to front. Drawn once per picture, when asked. */
+/**
+ * A canvas that shows a part of the plane: pan, zoom, layers from back to front. Drawn once per picture, when
+ * asked.
+ */
 export class Plane {
   /**
    * @param {object} o
@@ -27,7 +31,10 @@ export class Plane {
     this.before = before;
     /** @type {Layer[]} */
     this.layers = [];
-    /** World box that is shown where nothing was moved: x0, y0, x1, y1. @type {[number, number, number, number]} */
+    /**
+     * World box that is shown where nothing was moved: x0, y0, x1, y1.
+     * @type {[number, number, number, number]}
+     */
     this.home = [0, 0, 1, 1];
     this.center = [0.5, 0.5];
     this.zoom = 1;
@@ -36,11 +43,21 @@ export class Plane {
     this.asked = false;
     /** Whether a length is drawn at the lower left. */
     this.bar = true;
-    /** A click that was no drag: world x, y. @type {((p: [number, number], event: PointerEvent) => void) | undefined} */
+    /**
+     * A click that was no drag: world x, y.
+     * @type {((p: [number, number], event: PointerEvent) => void) | undefined}
+     */
     this.onclick = undefined;
-    /** The pointer moves over the canvas: world x, y; `undefined`: it has left. @type {((p: [number, number] | undefined) => void) | undefined} */
+    /**
+     * The pointer moves over the canvas: world x, y; `undefined`: it has left.
+     * @type {((p: [number, number] | undefined) => void) | undefined}
+     */
     this.onhover = undefined;
-    /** A drag begins here: take it and get its moves, or let the plane pan. @type {((p: [number, number]) => ((p: [number, number], last: boolean) => void) | undefined) | undefined} */
+    /**
+     * A drag begins here: take it and get its moves, or let the plane pan.
+     * @type {((p: [number, number]) => ((p: [number, number], last: boolean) => void) | undefined) |
+     *   undefined}
+     */
     this.ondrag = undefined;
     this.oncamera = () => {};
     this.#listen();
@@ -67,7 +84,8 @@ export class Plane {
     const [x0, y0, x1, y1] = this.home;
     const { clientWidth: w, clientHeight: h } = this.canvas;
     const margin = Math.min(28, 0.04 * Math.min(w, h));
-    const scale = this.zoom * Math.max(1e-6, Math.min((w - 2 * margin) / (x1 - x0), (h - 2 * margin) / (y1 - y0)));
+    const scale =
+      this.zoom * Math.max(1e-6, Math.min((w - 2 * margin) / (x1 - x0), (h - 2 * margin) / (y1 - y0)));
     const [cx, cy] = this.center;
     return {
       scale,
@@ -135,8 +153,14 @@ export class Plane {
     const step = event.shiftKey ? 200 : 60;
     /** @type {Record<string, () => void>} */
     const does = {
-      "+": () => this.zoomAt(1.25, w / 2, h / 2), "=": () => this.zoomAt(1.25, w / 2, h / 2), "-": () => this.zoomAt(0.8, w / 2, h / 2),
-      0: () => this.reset(), ArrowLeft: () => this.pan(step, 0), ArrowRight: () => this.pan(-step, 0), ArrowUp: () => this.pan(0, step), ArrowDown: () => this.pan(0, -step),
+      "+": () => this.zoomAt(1.25, w / 2, h / 2),
+      "=": () => this.zoomAt(1.25, w / 2, h / 2),
+      "-": () => this.zoomAt(0.8, w / 2, h / 2),
+      0: () => this.reset(),
+      ArrowLeft: () => this.pan(step, 0),
+      ArrowRight: () => this.pan(-step, 0),
+      ArrowUp: () => this.pan(0, step),
+      ArrowDown: () => this.pan(0, -step),
     };
     const what = does[event.key];
     what?.();
@@ -146,7 +170,8 @@ export class Plane {
   /** What the address says of the camera; nothing where it is at home. @returns {Record<string, string>} */
   state() {
     const [x0, y0, x1, y1] = this.home;
-    const home = this.zoom === 1 && Math.hypot(this.center[0] - (x0 + x1) / 2, this.center[1] - (y0 + y1) / 2) < 1e-6;
+    const home =
+      this.zoom === 1 && Math.hypot(this.center[0] - (x0 + x1) / 2, this.center[1] - (y0 + y1) / 2) < 1e-6;
     return home ? {} : { at: [...this.center, this.zoom].map((v) => v.toFixed(3)).join(",") };
   }
 
@@ -166,7 +191,8 @@ export class Plane {
     /** @type {((p: [number, number], last: boolean) => void) | undefined} */
     let taken;
     let moved = false;
-    const at = (/** @type {PointerEvent | WheelEvent} */ e) => /** @type {[number, number]} */ ([e.offsetX, e.offsetY]);
+    const at = (/** @type {PointerEvent | WheelEvent} */ e) =>
+      /** @type {[number, number]} */ ([e.offsetX, e.offsetY]);
     canvas.onpointerdown = (e) => {
       canvas.setPointerCapture(e.pointerId);
       this.pointers.set(e.pointerId, at(e));
@@ -183,7 +209,9 @@ export class Plane {
       if (down && Math.hypot(now[0] - down[0], now[1] - down[1]) > 4) moved = true;
       if (this.pointers.size === 2) {
         const other = [...this.pointers].find(([id]) => id !== e.pointerId)?.[1] ?? now;
-        const ratio = Math.hypot(now[0] - other[0], now[1] - other[1]) / Math.max(1, Math.hypot(before[0] - other[0], before[1] - other[1]));
+        const ratio =
+          Math.hypot(now[0] - other[0], now[1] - other[1]) /
+          Math.max(1, Math.hypot(before[0] - other[0], before[1] - other[1]));
         this.zoomAt(ratio, (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
       } else if (taken) {
         if (moved) taken(this.camera().toWorld(...now), false);
@@ -197,15 +225,24 @@ export class Plane {
       taken = undefined;
     };
     canvas.onpointerleave = () => this.onhover?.(undefined);
-    canvas.addEventListener("wheel", (e) => {
-      e.preventDefault();
-      this.zoomAt(Math.exp(-e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), ...at(e));
-    }, { passive: false });
+    canvas.addEventListener(
+      "wheel",
+      (e) => {
+        e.preventDefault();
+        this.zoomAt(Math.exp(-e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), ...at(e));
+      },
+      { passive: false },
+    );
     canvas.ondblclick = () => this.reset();
   }
 }
 
-/** A round length at the lower left. @param {CanvasRenderingContext2D} g @param {Camera} camera @param {number} height */
+/**
+ * A round length at the lower left.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Camera} camera
+ * @param {number} height
+ */
 function scaleBar(g, camera, height) {
   const wanted = 90 / camera.scale;
   const power = 10 ** Math.floor(Math.log10(wanted));
@@ -221,5 +258,13 @@ function scaleBar(g, camera, height) {
   g.lineTo(x + length, y - 5);
   g.stroke();
   g.font = "11px system-ui, sans-serif";
-  g.fillText(metres >= 1 ? `${metres} m` : metres >= 0.01 ? `${Math.round(metres * 100)} cm` : `${Math.round(metres * 1000)} mm`, x + length + 6, y);
+  g.fillText(
+    metres >= 1
+      ? `${metres} m`
+      : metres >= 0.01
+        ? `${Math.round(metres * 100)} cm`
+        : `${Math.round(metres * 1000)} mm`,
+    x + length + 6,
+    y,
+  );
 }

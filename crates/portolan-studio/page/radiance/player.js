@@ -8,7 +8,8 @@ const REST = 20_000;
 
 /**
  * Play, step, speed. It asks for steps and waits for the answer before it asks again.
- * @param {{step: (n: number) => Promise<unknown>, restart: () => void, ontoggle: (playing: boolean) => void}} o
+ * @param {{step: (n: number) => Promise<unknown>, restart: () => void, ontoggle: (playing: boolean) => void}}
+ *   o
  */
 export function player(o) {
   let playing = false;
@@ -16,12 +17,25 @@ export function player(o) {
   /** Steps of the way of fitting that is in force. */
   let inPhase = 0;
 
-  const button = (/** @type {string} */ id, /** @type {string} */ text, /** @type {string} */ label, /** @type {() => void} */ onclick) =>
-    el("button", { type: "button", id, title: label, "aria-label": label, onclick }, text);
+  const button = (
+    /** @type {string} */ id,
+    /** @type {string} */ text,
+    /** @type {string} */ label,
+    /** @type {() => void} */ onclick,
+  ) => el("button", { type: "button", id, title: label, "aria-label": label, onclick }, text);
   const play = button("radiance-play", "Play", "Play or pause (Space)", () => toggle());
-  const speed = el("select", { id: "radiance-speed" }, ...SPEEDS.map((s) => el("option", { value: s }, String(s))));
+  const speed = el(
+    "select",
+    { id: "radiance-speed" },
+    ...SPEEDS.map((s) => el("option", { value: s }, String(s))),
+  );
   speed.value = "50";
-  const more = button("radiance-more", "+50", "As many steps as a picture has (,)", () => (pause(), step(Number(speed.value))));
+  const more = button(
+    "radiance-more",
+    "+50",
+    "As many steps as a picture has (,)",
+    () => (pause(), step(Number(speed.value))),
+  );
   speed.onchange = () => void (more.textContent = `+${speed.value}`);
   const text = el("output", { id: "radiance-at", "aria-live": "off" });
   play.setAttribute("aria-pressed", "false");
@@ -67,12 +81,24 @@ export function player(o) {
   }
 
   return {
-    node: el("div", { class: "strip" }, play, button("radiance-step", "+1", "One step (.)", () => (pause(), step(1))),
+    node: el(
+      "div",
+      { class: "strip" },
+      play,
+      button("radiance-step", "+1", "One step (.)", () => (pause(), step(1))),
       more,
       button("radiance-restart", "Start over", "The same start again (Home)", () => (pause(), o.restart())),
-      text, speed, el("label", { for: "radiance-speed" }, "steps a picture")),
+      text,
+      speed,
+      el("label", { for: "radiance-speed" }, "steps a picture"),
+    ),
     pause,
-    /** The engine is there now; the last answer made so many steps. @param {{steps: number}[]} phases @param {number} made @param {number} seconds */
+    /**
+     * The engine is there now; the last answer made so many steps.
+     * @param {{steps: number}[]} phases
+     * @param {number} made
+     * @param {number} seconds
+     */
     show(phases, made, seconds) {
       inPhase = phases[phases.length - 1].steps;
       const all = phases.reduce((n, p) => n + p.steps, 0);
@@ -92,7 +118,11 @@ export function player(o) {
     key(e) {
       /** @type {Record<string, () => void>} */
       const does = {
-        " ": toggle, ".": () => (pause(), step(1)), ",": () => (pause(), step(Number(speed.value))), Home: () => (pause(), o.restart()), "<": () => faster(-1),
+        " ": toggle,
+        ".": () => (pause(), step(1)),
+        ",": () => (pause(), step(Number(speed.value))),
+        Home: () => (pause(), o.restart()),
+        "<": () => faster(-1),
         ">": () => faster(1),
       };
       does[e.key]?.();

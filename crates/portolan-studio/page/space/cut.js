@@ -34,9 +34,16 @@ export class Cut {
   constructor() {
     this.geometry = new THREE.BufferGeometry();
     this.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(12), 3));
-    this.geometry.setAttribute("uv", new THREE.BufferAttribute(new Float32Array([0, 0, 1, 0, 1, 1, 0, 1]), 2));
+    this.geometry.setAttribute(
+      "uv",
+      new THREE.BufferAttribute(new Float32Array([0, 0, 1, 0, 1, 1, 0, 1]), 2),
+    );
     this.geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    this.material = new THREE.MeshBasicMaterial({ transparent: true, side: THREE.DoubleSide, depthWrite: false });
+    this.material = new THREE.MeshBasicMaterial({
+      transparent: true,
+      side: THREE.DoubleSide,
+      depthWrite: false,
+    });
     this.quad = new THREE.Mesh(this.geometry, this.material);
     this.frame = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
     this.frame.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(24), 3));
@@ -61,7 +68,9 @@ export class Cut {
     const corners = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
     this.geometry.getAttribute("position").array.set(corners.flat());
     this.geometry.getAttribute("position").needsUpdate = true;
-    this.frame.geometry.getAttribute("position").array.set([0, 1, 1, 2, 2, 3, 3, 0].flatMap((i) => corners[i]));
+    this.frame.geometry
+      .getAttribute("position")
+      .array.set([0, 1, 1, 2, 2, 3, 3, 0].flatMap((i) => corners[i]));
     this.frame.geometry.getAttribute("position").needsUpdate = true;
     const { width, height, bytes } = image(answer, field);
     this.material.map?.dispose();

@@ -21,7 +21,8 @@ export function texels(stops) {
   for (let i = 0; i < 256; i++) {
     const at = (i / 255) * (all.length - 1);
     const k = Math.min(Math.floor(at), all.length - 2);
-    for (let c = 0; c < 3; c++) out[4 * i + c] = Math.round(all[k][c] + (all[k + 1][c] - all[k][c]) * (at - k));
+    for (let c = 0; c < 3; c++)
+      out[4 * i + c] = Math.round(all[k][c] + (all[k + 1][c] - all[k][c]) * (at - k));
     out[4 * i + 3] = 255;
   }
   return out;

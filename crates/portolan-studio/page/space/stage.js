@@ -11,7 +11,8 @@ const TURN = Math.PI / 24;
 const raw = (name) => rgb(colors()[name]).map((v) => v / 255);
 
 /**
- * The scene: surface, slice, way of the sensor, its last points, the voxel that is looked at; and the eye that goes round it.
+ * The scene: surface, slice, way of the sensor, its last points, the voxel that is looked at; and the eye
+ * that goes round it.
  */
 export class Stage {
   /**
@@ -31,16 +32,33 @@ export class Stage {
     this.surface = new Surface();
     this.cut = new Cut();
     this.way = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
-    this.points = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size: 2, sizeAttenuation: false }));
-    this.sensor = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({ size: 9, sizeAttenuation: false }));
-    this.voxel = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ depthTest: false, transparent: true }));
+    this.points = new THREE.Points(
+      new THREE.BufferGeometry(),
+      new THREE.PointsMaterial({ size: 2, sizeAttenuation: false }),
+    );
+    this.sensor = new THREE.Points(
+      new THREE.BufferGeometry(),
+      new THREE.PointsMaterial({ size: 9, sizeAttenuation: false }),
+    );
+    this.voxel = new THREE.LineSegments(
+      new THREE.BufferGeometry(),
+      new THREE.LineBasicMaterial({ depthTest: false, transparent: true }),
+    );
     this.voxel.renderOrder = 3;
     this.cut.quad.renderOrder = 1;
     for (const o of [this.way, this.points, this.sensor, this.voxel]) {
       o.frustumCulled = false;
       o.visible = false;
     }
-    this.scene.add(this.surface.mesh, this.cut.quad, this.cut.frame, this.way, this.points, this.sensor, this.voxel);
+    this.scene.add(
+      this.surface.mesh,
+      this.cut.quad,
+      this.cut.frame,
+      this.way,
+      this.points,
+      this.sensor,
+      this.voxel,
+    );
     this.up = new THREE.Vector3(0, 0, 1);
     /** @type {any} */
     this.controls = undefined;
@@ -85,7 +103,9 @@ export class Stage {
     this.draw();
   }
 
-  /** Draws before the next picture of the screen; `work` of the page before it belongs to the same picture. */
+  /**
+   * Draws before the next picture of the screen; `work` of the page before it belongs to the same picture.
+   */
   draw() {
     if (this.waiting) return;
     this.waiting = true;
@@ -101,7 +121,11 @@ export class Stage {
 
   /** Pictures a second of those that followed each other, and who draws them. */
   rate() {
-    const gaps = this.times.slice(1).map((t, i) => t - this.times[i]).filter((gap) => gap < 400).sort((a, b) => a - b);
+    const gaps = this.times
+      .slice(1)
+      .map((t, i) => t - this.times[i])
+      .filter((gap) => gap < 400)
+      .sort((a, b) => a - b);
     const middle = gaps[gaps.length >> 1];
     return `${middle ? `${(1000 / middle).toFixed(0)} pictures/s · ` : ""}${this.name}`;
   }
@@ -116,7 +140,11 @@ export class Stage {
     if (Math.abs(this.up.x) > 0.9) side.set(0, 1, 0);
     side.addScaledVector(this.up, -side.dot(this.up)).normalize();
     const ahead = side.clone().cross(this.up).normalize();
-    const from = side.multiplyScalar(0.35).add(ahead.multiplyScalar(0.72)).addScaledVector(this.up, 1.05).normalize();
+    const from = side
+      .multiplyScalar(0.35)
+      .add(ahead.multiplyScalar(0.72))
+      .addScaledVector(this.up, 1.05)
+      .normalize();
     const narrow = Math.min(1, this.camera.aspect);
     const far = (0.86 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
     this.controls.target.copy(middle);
@@ -164,7 +192,9 @@ export class Stage {
       this.controls.target.add(move);
     } else if (arrow) {
       offset.applyAxisAngle(this.up, arrow[0] * TURN);
-      const turned = offset.clone().applyAxisAngle(this.up.clone().cross(offset).normalize(), -arrow[1] * TURN);
+      const turned = offset
+        .clone()
+        .applyAxisAngle(this.up.clone().cross(offset).normalize(), -arrow[1] * TURN);
       const high = turned.angleTo(this.up);
       if (high > 0.05 && high < Math.PI - 0.05) offset.copy(turned);
     }
@@ -182,7 +212,10 @@ export class Stage {
   ray(x, y) {
     this.camera.updateMatrixWorld();
     const through = new THREE.Vector3(x, y, 0.5).unproject(this.camera);
-    return { origin: this.camera.position.toArray(), direction: through.sub(this.camera.position).normalize().toArray() };
+    return {
+      origin: this.camera.position.toArray(),
+      direction: through.sub(this.camera.position).normalize().toArray(),
+    };
   }
 
   /** @param {number[][]} places */
@@ -253,10 +286,16 @@ function line(object, values) {
   object.geometry.setDrawRange(0, values.length / 3);
 }
 
-/** Who draws, without the layers between: of `ANGLE (vendor, Vulkan 1.3.0 (device (0x…)), driver)` the device. @param {any} gl */
+/**
+ * Who draws, without the layers between: of `ANGLE (vendor, Vulkan 1.3.0 (device (0x…)), driver)` the device.
+ * @param {any} gl
+ */
 function rendererName(gl) {
   const info = gl.getExtension("WEBGL_debug_renderer_info");
   const whole = String(info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : gl.getParameter(gl.RENDERER));
   const device = /^ANGLE \([^,]*, (.*?)(, [^,]*)?\)$/.exec(whole)?.[1] ?? whole;
-  return device.replace(/ ?\(0x[0-9a-fA-F]+\)/, "").replace(/^Vulkan [\d.]+ \((.*)\)$/, "$1").slice(0, 60);
+  return device
+    .replace(/ ?\(0x[0-9a-fA-F]+\)/, "")
+    .replace(/^Vulkan [\d.]+ \((.*)\)$/, "$1")
+    .slice(0, 60);
 }

@@ -3,7 +3,10 @@ import * as THREE from "../vendor/three.js";
 import { colors, rgb } from "../ui/theme.js";
 import { stops, texels } from "./ramps.js";
 
-/** A mesh of more triangles is drawn when all of it is there: drawing it again for every part would take longer than it. */
+/**
+ * A mesh of more triangles is drawn when all of it is there: drawing it again for every part would take
+ * longer than it.
+ */
 export const LARGE = 800_000;
 const MODES = ["height", "color", "weight", "error"];
 /** Parts of the buffers that lie no further apart than this are sent to the graphics card in one go. */
@@ -47,7 +50,8 @@ void main() {
 }`;
 
 /**
- * The mesh: one geometry, one draw call. The engine says where in its buffers each brick's piece lies; here it is copied
+ * The mesh: one geometry, one draw call. The engine says where in its buffers each brick's piece lies; here
+ * it is copied
  * there.
  */
 export class Surface {
@@ -55,7 +59,13 @@ export class Surface {
     this.geometry = new THREE.BufferGeometry();
     // Nothing is left out of sight: the buffers change too often to keep a box around them.
     this.geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), Infinity);
-    this.ramp = new THREE.DataTexture(texels(stops("height")), 256, 1, THREE.RGBAFormat, THREE.UnsignedByteType);
+    this.ramp = new THREE.DataTexture(
+      texels(stops("height")),
+      256,
+      1,
+      THREE.RGBAFormat,
+      THREE.UnsignedByteType,
+    );
     this.ramp.magFilter = THREE.LinearFilter;
     this.ramp.minFilter = THREE.LinearFilter;
     this.material = new THREE.ShaderMaterial({
@@ -91,7 +101,10 @@ export class Surface {
 
   /** @param {number} vertices @param {number} indices */
   #allocate(vertices, indices) {
-    const old = this.rooms[0] > 0 ? { position: this.position, normal: this.normal, shade: this.shade, index: this.index } : null;
+    const old =
+      this.rooms[0] > 0
+        ? { position: this.position, normal: this.normal, shade: this.shade, index: this.index }
+        : null;
     // The graphics card's buffers of this size are no more.
     this.geometry.dispose();
     this.position = new Float32Array(3 * vertices);
@@ -104,7 +117,11 @@ export class Surface {
       this.shade.set(old.shade);
       this.index.set(old.index);
     }
-    const attribute = (/** @type {any} */ array, /** @type {number} */ size, /** @type {boolean} */ normalized) => {
+    const attribute = (
+      /** @type {any} */ array,
+      /** @type {number} */ size,
+      /** @type {boolean} */ normalized,
+    ) => {
       const made = new THREE.BufferAttribute(array, size, normalized);
       made.setUsage(THREE.DynamicDrawUsage);
       return made;
@@ -128,7 +145,8 @@ export class Surface {
     if (fresh) this.clear();
     if (vertices > this.rooms[0] || indices > this.rooms[1]) {
       // A large mesh comes with its whole size; one that grows gets more room than it needs now.
-      const more = (/** @type {number} */ need, /** @type {number} */ has) => (need > has ? Math.ceil(Math.max(need * (fresh ? 1.02 : 1.4), 1024)) : has);
+      const more = (/** @type {number} */ need, /** @type {number} */ has) =>
+        need > has ? Math.ceil(Math.max(need * (fresh ? 1.02 : 1.4), 1024)) : has;
       this.#allocate(more(vertices, this.rooms[0]), more(indices, this.rooms[1]));
     }
     const index = this.index;
@@ -177,7 +195,8 @@ export class Surface {
   /** @param {{by: string, ramp: {low: number | null, high: number | null} | null}} color */
   #color({ by, ramp }) {
     const { uniforms } = this.material;
-    if (by === "height" && ramp && ramp.low !== null && ramp.high !== null) uniforms.range.value = [ramp.low, ramp.high];
+    if (by === "height" && ramp && ramp.low !== null && ramp.high !== null)
+      uniforms.range.value = [ramp.low, ramp.high];
     if (by !== this.by) {
       this.by = by;
       this.redraw();

@@ -22,8 +22,18 @@ export default {
   mount(root, app) {
     /** @type {import("../clearance/scene.js").Scene} */
     const scene = {
-      image: undefined, contour: new Float32Array(), lines: new Uint32Array([0]), truth: null, rings: undefined, arrows: undefined, probe: undefined, said: undefined,
-      waypoints: [], checked: undefined, radius: 0.2, visible: { rings: true, arrows: true, contour: true, truth: false },
+      image: undefined,
+      contour: new Float32Array(),
+      lines: new Uint32Array([0]),
+      truth: null,
+      rings: undefined,
+      arrows: undefined,
+      probe: undefined,
+      said: undefined,
+      waypoints: [],
+      checked: undefined,
+      radius: 0.2,
+      visible: { rings: true, arrows: true, contour: true, truth: false },
     };
     /** What the engine has made of which map. @type {any} */
     let opened;
@@ -32,7 +42,11 @@ export default {
     /** The path is the driven way, or will be once there is a map. */
     let driven = false;
 
-    const plane = new Plane({ id: "clearance-canvas", label: "The distance field of the map, a probe into it and a path through it", meter: app.meter });
+    const plane = new Plane({
+      id: "clearance-canvas",
+      label: "The distance field of the map, a probe into it and a path through it",
+      meter: app.meter,
+    });
     const still = new Still(stillLayers(scene));
     plane.layers = [still.draw, ...movingLayers(scene)];
     /** Everything is drawn anew. */
@@ -76,65 +90,116 @@ export default {
       draw: (on) => (drawing = on),
     });
     const exportFile = (/** @type {string} */ file, /** @type {string} */ name) =>
-      el("button", { type: "button", id: `clearance-export-${file}`, onclick: () => app.engine.ask("fusion", { op: "export", file }).then(saveAnswer, app.fail) }, name);
+      el(
+        "button",
+        {
+          type: "button",
+          id: `clearance-export-${file}`,
+          onclick: () => app.engine.ask("fusion", { op: "export", file }).then(saveAnswer, app.fail),
+        },
+        name,
+      );
     root.append(
       el("div", { class: "field" }, plane.node, shown.strip),
       el(
-        "div", { class: "side" }, shown.node, probe.node, path.node, meter.node,
-        group("Take away", el("div", { class: "row" }, exportFile("esdf", "esdf.bin"), exportFile("contour", "contour.geojson"), exportFile("map", "map.portolan"))),
+        "div",
+        { class: "side" },
+        shown.node,
+        probe.node,
+        path.node,
+        meter.node,
+        group(
+          "Take away",
+          el(
+            "div",
+            { class: "row" },
+            exportFile("esdf", "esdf.bin"),
+            exportFile("contour", "contour.geojson"),
+            exportFile("map", "map.portolan"),
+          ),
+        ),
       ),
     );
     path.count(0);
     probe.mark("euclidean");
 
     const ask = (/** @type {object} */ question) => app.engine.ask("clearance", question);
-    /** Takes an answer in, within the picture's work, and asks for everything again where the map has become another. @template Q @param {(a: import("../engine/engine.js").Answer, q: Q) => void} take */
-    const taking = (take) => (/** @type {import("../engine/engine.js").Answer} */ answer, /** @type {Q} */ question) => {
-      app.meter.measure(() => take(answer, question));
-      plane.draw();
-      if (opened && answer.body.revision !== opened.revision) open();
-    };
+    /**
+     * Takes an answer in, within the picture's work, and asks for everything again where the map has become
+     * another.
+     * @template Q
+     * @param {(a: import("../engine/engine.js").Answer, q: Q) => void} take
+     */
+    const taking =
+      (take) => (/** @type {import("../engine/engine.js").Answer} */ answer, /** @type {Q} */ question) => {
+        app.meter.measure(() => take(answer, question));
+        plane.draw();
+        if (opened && answer.body.revision !== opened.revision) open();
+      };
     const askFor = {
-      probe: latest(ask, taking((answer, /** @type {any} */ question) => {
-        scene.said = answer.body;
-        probe.show(answer.body, question.unknown);
-        meter.probe(answer.body);
-      }), app.fail),
-      rings: latest(ask, taking(({ body, arrays }, /** @type {any} */ question) => {
-        if (question.field !== scene.image?.which) return;
-        const f = /** @type {any} */ (arrays);
-        scene.rings = { points: f.points, starts: f.starts, levels: f.levels, spacing: body.spacing };
-        shown.tellRings(body, opened?.truncation);
-        still.changed();
-      }), app.fail),
-      arrows: latest(ask, taking(({ body, arrays }, /** @type {any} */ question) => {
-        if (question.field !== scene.image?.which) return;
-        const f = /** @type {any} */ (arrays);
-        scene.arrows = { points: f.points, gradients: f.gradients, spacing: body.spacing };
-        still.changed();
-      }), app.fail),
-      path: latest(ask, taking((answer) => {
-        if (scene.waypoints.length === 0) return;
-        const f = /** @type {any} */ (answer.arrays);
-        scene.checked = { points: f.points, starts: f.starts, pieces: answer.body.pieces };
-        path.show(answer);
-      }), app.fail),
+      probe: latest(
+        ask,
+        taking((answer, /** @type {any} */ question) => {
+          scene.said = answer.body;
+          probe.show(answer.body, question.unknown);
+          meter.probe(answer.body);
+        }),
+        app.fail,
+      ),
+      rings: latest(
+        ask,
+        taking(({ body, arrays }, /** @type {any} */ question) => {
+          if (question.field !== scene.image?.which) return;
+          const f = /** @type {any} */ (arrays);
+          scene.rings = { points: f.points, starts: f.starts, levels: f.levels, spacing: body.spacing };
+          shown.tellRings(body, opened?.truncation);
+          still.changed();
+        }),
+        app.fail,
+      ),
+      arrows: latest(
+        ask,
+        taking(({ body, arrays }, /** @type {any} */ question) => {
+          if (question.field !== scene.image?.which) return;
+          const f = /** @type {any} */ (arrays);
+          scene.arrows = { points: f.points, gradients: f.gradients, spacing: body.spacing };
+          still.changed();
+        }),
+        app.fail,
+      ),
+      path: latest(
+        ask,
+        taking((answer) => {
+          if (scene.waypoints.length === 0) return;
+          const f = /** @type {any} */ (answer.arrays);
+          scene.checked = { points: f.points, starts: f.starts, pieces: answer.body.pieces };
+          path.show(answer);
+        }),
+        app.fail,
+      ),
     };
 
     function askProbe() {
       if (opened && scene.probe) askFor.probe({ op: "probe", at: scene.probe, unknown: shown.unknown });
     }
     function askRings() {
-      if (opened && scene.visible.rings) askFor.rings({ op: "rings", field: shown.field, spacing: shown.spacing });
+      if (opened && scene.visible.rings)
+        askFor.rings({ op: "rings", field: shown.field, spacing: shown.spacing });
     }
     function askArrows() {
       if (!opened || !scene.visible.arrows || plane.canvas.clientWidth === 0) return;
       const camera = plane.camera();
       const { clientWidth: w, clientHeight: h } = plane.canvas;
-      askFor.arrows({ op: "arrows", field: shown.field, bounds: [camera.toWorld(0, h), camera.toWorld(w, 0)], spacing: round(30 / camera.scale) });
+      askFor.arrows({
+        op: "arrows",
+        field: shown.field,
+        bounds: [camera.toWorld(0, h), camera.toWorld(w, 0)],
+        spacing: round(30 / camera.scale),
+      });
     }
     function askPath() {
-      if (opened && scene.waypoints.length > 0) askFor.path({ op: "path", points: scene.waypoints, clearance: scene.radius, unknown: shown.unknown });
+      if (opened && scene.waypoints.length > 0)
+        askFor.path({ op: "path", points: scene.waypoints, clearance: scene.radius, unknown: shown.unknown });
     }
 
     /** The way on which the map was made. @returns {Point[]} */
@@ -166,7 +231,10 @@ export default {
       const p = /** @type {Point} */ ([x + dx * r, y + dy * r]);
       const [px, py] = plane.camera().toScreen(...p);
       const { clientWidth: w, clientHeight: h } = plane.canvas;
-      const by = [Math.max(24 - px, 0) - Math.max(px - w + 24, 0), Math.max(24 - py, 0) - Math.max(py - h + 24, 0)];
+      const by = [
+        Math.max(24 - px, 0) - Math.max(px - w + 24, 0),
+        Math.max(24 - py, 0) - Math.max(py - h + 24, 0),
+      ];
       if (by[0] || by[1]) plane.pan(by[0], by[1]);
       put(p);
     }
@@ -200,7 +268,9 @@ export default {
       path.count(scene.waypoints.length);
       shown.tellMap(body, image.reach);
       meter.show(body.meter);
-      app.say(`${body.name} after ${body.at} scans: both fields made in ${(1000 * body.seconds).toFixed(0)} ms. Move the pointer, click a path.`);
+      app.say(
+        `${body.name} after ${body.at} scans: both fields made in ${(1000 * body.seconds).toFixed(0)} ms. Move the pointer, click a path.`,
+      );
       askProbe();
       askRings();
       askArrows();
@@ -213,7 +283,16 @@ export default {
       put(p);
       if (scene.waypoints.length < MOST) edit(() => scene.waypoints.push(p));
     };
-    plane.ondrag = (from) => drag({ points: scene.waypoints, scale: () => plane.camera().scale, drawing, changed: () => edit(() => {}) }, from);
+    plane.ondrag = (from) =>
+      drag(
+        {
+          points: scene.waypoints,
+          scale: () => plane.camera().scale,
+          drawing,
+          changed: () => edit(() => {}),
+        },
+        from,
+      );
 
     return {
       async show(state) {
@@ -226,32 +305,57 @@ export default {
       },
       hide() {},
       state: () => ({
-        ...shown.state(), radius: scene.radius.toFixed(2), ...(scene.probe ? { probe: texts([scene.probe]) } : {}),
-        ...(driven ? { path: "driven" } : scene.waypoints.length > 0 ? { path: texts(scene.waypoints) } : {}), ...plane.state(),
+        ...shown.state(),
+        radius: scene.radius.toFixed(2),
+        ...(scene.probe ? { probe: texts([scene.probe]) } : {}),
+        ...(driven ? { path: "driven" } : scene.waypoints.length > 0 ? { path: texts(scene.waypoints) } : {}),
+        ...plane.state(),
       }),
       picture() {
         plane.paint();
         const field = shown.field === "euclidean" ? "Euclidean" : "truncated";
-        return compose(`portolan studio · clearance · ${field} field`, [[plane.canvas], [scene.checked ? path.plot.canvas() : null, meter.plot.canvas()]]);
+        return compose(`portolan studio · clearance · ${field} field`, [
+          [plane.canvas],
+          [scene.checked ? path.plot.canvas() : null, meter.plot.canvas()],
+        ]);
       },
       key(event) {
         const far = event.shiftKey ? 10 : 1;
         const here = () => scene.probe && scene.waypoints.length < MOST && scene.waypoints.push(scene.probe);
         /** @type {Record<string, () => void>} */
         const does = {
-          ArrowLeft: () => nudge(-far, 0), ArrowRight: () => nudge(far, 0), ArrowUp: () => nudge(0, far), ArrowDown: () => nudge(0, -far),
-          Enter: () => edit(here), Backspace: () => edit(() => scene.waypoints.pop()), Escape: () => edit(() => (scene.waypoints.length = 0)),
-          f: () => shown.toggleField(), u: () => shown.toggleUnknown(), r: () => shown.toggle("rings"), g: () => shown.toggle("arrows"),
-          d: () => path.toggleDrawing(), w: () => document.getElementById("path-way")?.click(), "[": () => resize(-0.01), "]": () => resize(0.01),
+          ArrowLeft: () => nudge(-far, 0),
+          ArrowRight: () => nudge(far, 0),
+          ArrowUp: () => nudge(0, far),
+          ArrowDown: () => nudge(0, -far),
+          Enter: () => edit(here),
+          Backspace: () => edit(() => scene.waypoints.pop()),
+          Escape: () => edit(() => (scene.waypoints.length = 0)),
+          f: () => shown.toggleField(),
+          u: () => shown.toggleUnknown(),
+          r: () => shown.toggle("rings"),
+          g: () => shown.toggle("arrows"),
+          d: () => path.toggleDrawing(),
+          w: () => document.getElementById("path-way")?.click(),
+          "[": () => resize(-0.01),
+          "]": () => resize(0.01),
         };
         const what = does[event.key];
         what?.();
         return what !== undefined || plane.key(event);
       },
       keys: [
-        ["Arrows", "move the probe by a cell; with Shift by ten"], ["Enter", "a waypoint where the probe is"], ["Backspace", "remove the last waypoint"], ["Esc", "remove the path"],
-        ["[ ]", "a smaller, a larger robot"], ["F", "Euclidean or truncated field"], ["U", "unknown space an obstacle or not"], ["R G", "rings, gradient arrows"], ["D", "draw by dragging, or not"],
-        ["W", "the way that was driven"], ["+ − 0", "larger, smaller, all"],
+        ["Arrows", "move the probe by a cell; with Shift by ten"],
+        ["Enter", "a waypoint where the probe is"],
+        ["Backspace", "remove the last waypoint"],
+        ["Esc", "remove the path"],
+        ["[ ]", "a smaller, a larger robot"],
+        ["F", "Euclidean or truncated field"],
+        ["U", "unknown space an obstacle or not"],
+        ["R G", "rings, gradient arrows"],
+        ["D", "draw by dragging, or not"],
+        ["W", "the way that was driven"],
+        ["+ − 0", "larger, smaller, all"],
       ],
       redraw() {
         scene.image?.paint();

@@ -20,8 +20,17 @@ export default {
   mount(root, app) {
     /** @type {import("../fusion/scene.js").Scene} */
     const scene = {
-      field: undefined, contour: new Float32Array(), lines: new Uint32Array([0]), beams: new Float32Array(), kinds: new Uint8Array(), pose: null,
-      truth: null, ghost: undefined, held: undefined, cell: undefined, visible: { beams: true, contour: true, truth: true },
+      field: undefined,
+      contour: new Float32Array(),
+      lines: new Uint32Array([0]),
+      beams: new Float32Array(),
+      kinds: new Uint8Array(),
+      pose: null,
+      truth: null,
+      ghost: undefined,
+      held: undefined,
+      cell: undefined,
+      visible: { beams: true, contour: true, truth: true },
     };
     /** Answers that came since the last picture. @type {import("../engine/engine.js").Answer[]} */
     const arrived = [];
@@ -34,7 +43,12 @@ export default {
     /** When the chair was moved, and where to. @type {[number, [number, number]][]} */
     let moves = [];
 
-    const plane = new Plane({ id: "fusion-canvas", label: "The truncated signed distance field while it is fused", meter: app.meter, before: takeIn });
+    const plane = new Plane({
+      id: "fusion-canvas",
+      label: "The truncated signed distance field while it is fused",
+      meter: app.meter,
+      before: takeIn,
+    });
     plane.layers = layers(scene);
     plane.oncamera = app.changed;
 
@@ -70,16 +84,29 @@ export default {
         const box = scene.truth?.chair;
         if (!box) return;
         const sign = home && Math.hypot(box.min[0] - home.min[0], box.min[1] - home.min[1]) < 1e-9 ? 1 : -1;
-        moveChair([(box.min[0] + box.max[0]) / 2 + sign * CHAPTER_MOVE[0], (box.min[1] + box.max[1]) / 2 + sign * CHAPTER_MOVE[1]]);
+        moveChair([
+          (box.min[0] + box.max[0]) / 2 + sign * CHAPTER_MOVE[0],
+          (box.min[1] + box.max[1]) / 2 + sign * CHAPTER_MOVE[1],
+        ]);
       },
       toCell: () => scene.cell && scene.field && moveChair(scene.field.center(scene.cell)),
     });
     const numbers = facts([
-      ["scan-cells", "cells touched by the scan"], ["scan-beams", "beams: hits, free, lost"], ["observed", "cells observed"], ["map-bytes", "memory of the map"],
-      ["step-ms", "computed in"], ["under", "under the pointer"],
+      ["scan-cells", "cells touched by the scan"],
+      ["scan-beams", "beams: hits, free, lost"],
+      ["observed", "cells observed"],
+      ["map-bytes", "memory of the map"],
+      ["step-ms", "computed in"],
+      ["under", "under the pointer"],
     ]);
     const shows = choice({
-      id: "shows", label: "Show", value: "distance", options: [["distance", "signed distance D"], ["weight", "weight W"]],
+      id: "shows",
+      label: "Show",
+      value: "distance",
+      options: [
+        ["distance", "signed distance D"],
+        ["weight", "weight W"],
+      ],
       onchange: (v) => {
         if (!scene.field) return;
         scene.field.shows = v === "weight" ? "weight" : "distance";
@@ -88,15 +115,39 @@ export default {
       },
     });
     const shown = (/** @type {"beams" | "contour" | "truth"} */ what, /** @type {string} */ label) =>
-      toggle({ id: `show-${what}`, label, value: true, onchange: (v) => ((scene.visible[what] = v), plane.draw()) });
+      toggle({
+        id: `show-${what}`,
+        label,
+        value: true,
+        onchange: (v) => ((scene.visible[what] = v), plane.draw()),
+      });
     const truthToggle = shown("truth", "Truth");
     const exportFile = (/** @type {string} */ file, /** @type {string} */ name) =>
-      el("button", { type: "button", id: `export-${file}`, onclick: () => tryAsk({ op: "export", file }).then((answer) => answer && saveAnswer(answer)) }, name);
+      el(
+        "button",
+        {
+          type: "button",
+          id: `export-${file}`,
+          onclick: () => tryAsk({ op: "export", file }).then((answer) => answer && saveAnswer(answer)),
+        },
+        name,
+      );
 
     const legendOf = (/** @type {boolean} */ simulated) =>
       legend([
-        { color: "", text: "behind, in front of a surface", ramp: "linear-gradient(90deg, var(--negative), transparent, color-mix(in srgb, var(--positive) 50%, transparent))" },
-        { color: "beam", text: "beams" }, { color: "contour", text: "contour" }, ...(simulated ? [{ color: "truth", text: "truth", dashed: true }, { color: "chair", text: "chair" }] : []),
+        {
+          color: "",
+          text: "behind, in front of a surface",
+          ramp: "linear-gradient(90deg, var(--negative), transparent, color-mix(in srgb, var(--positive) 50%, transparent))",
+        },
+        { color: "beam", text: "beams" },
+        { color: "contour", text: "contour" },
+        ...(simulated
+          ? [
+              { color: "truth", text: "truth", dashed: true },
+              { color: "chair", text: "chair" },
+            ]
+          : []),
         { color: "unknown", text: "never observed" },
       ]);
     const theLegend = el("div");
@@ -104,12 +155,31 @@ export default {
     root.append(
       el("div", { class: "field" }, plane.node, play.node),
       el(
-        "div", { class: "side" },
-        el("div", { class: "group" }, shows.node, shown("beams", "Beams of the scan").node, shown("contour", "Extracted contour").node, truthToggle.node,
-          theLegend),
-        inspector.node, chair.node, panel.node,
+        "div",
+        { class: "side" },
+        el(
+          "div",
+          { class: "group" },
+          shows.node,
+          shown("beams", "Beams of the scan").node,
+          shown("contour", "Extracted contour").node,
+          truthToggle.node,
+          theLegend,
+        ),
+        inspector.node,
+        chair.node,
+        panel.node,
         group("This scan", numbers.node),
-        group("Take away", el("div", { class: "row" }, exportFile("esdf", "esdf.bin"), exportFile("contour", "contour.geojson"), exportFile("map", "map.portolan"))),
+        group(
+          "Take away",
+          el(
+            "div",
+            { class: "row" },
+            exportFile("esdf", "esdf.bin"),
+            exportFile("contour", "contour.geojson"),
+            exportFile("map", "map.portolan"),
+          ),
+        ),
       ),
     );
 
@@ -136,7 +206,8 @@ export default {
           chair.node.hidden = truthToggle.node.hidden = truth === null;
           if (!greeted) theLegend.append(legendOf(truth !== null));
           scene.field.setColors(s.truncation, s.w_max ?? 256);
-          if (!greeted) app.say(`${name}: ${body.lap} scans. Play, click a cell${truth ? ", move the chair" : ""}.`);
+          if (!greeted)
+            app.say(`${name}: ${body.lap} scans. Play, click a cell${truth ? ", move the chair" : ""}.`);
           greeted = true;
         }
         if (body.fresh) scene.field?.clear();
@@ -156,11 +227,17 @@ export default {
       chair.canGoToCell(scene.cell !== undefined);
       const b = last.beams;
       numbers.set({
-        "scan-cells": String(b.cells), "scan-beams": `${b.hit}, ${b.max_range}, ${b.no_return + b.dropped}`, observed: String(last.observed),
-        "map-bytes": `${(last.bytes / 1024).toFixed(0)} KiB`, "step-ms": `${(1000 * last.seconds).toFixed(2)} ms`,
+        "scan-cells": String(b.cells),
+        "scan-beams": `${b.hit}, ${b.max_range}, ${b.no_return + b.dropped}`,
+        observed: String(last.observed),
+        "map-bytes": `${(last.bytes / 1024).toFixed(0)} KiB`,
+        "step-ms": `${(1000 * last.seconds).toFixed(2)} ms`,
       });
       const half = last.half_life;
-      const note = half === null ? "Nothing is ever forgotten." : `A saturated cell forgets half of an error in ${half.toFixed(2)} observations of weight 1.`;
+      const note =
+        half === null
+          ? "Nothing is ever forgotten."
+          : `A saturated cell forgets half of an error in ${half.toFixed(2)} observations of weight 1.`;
       const out = document.getElementById("half-life-note");
       if (out && out.textContent !== note) out.textContent = note;
     }
@@ -201,7 +278,9 @@ export default {
       const cell = p && scene.field?.cellAt(p);
       if (!cell || !scene.field) return numbers.set({ under: "–" });
       const { distance, weight } = scene.field.at(cell);
-      numbers.set({ under: weight > 0 ? `D ${distance.toFixed(4)} m, W ${weight.toFixed(1)}` : "never observed" });
+      numbers.set({
+        under: weight > 0 ? `D ${distance.toFixed(4)} m, W ${weight.toFixed(1)}` : "never observed",
+      });
     };
     plane.ondrag = (from) => {
       const box = scene.truth?.chair;
@@ -209,9 +288,16 @@ export default {
       play.pause();
       return (p, done) => {
         const by = [p[0] - from[0], p[1] - from[1]];
-        scene.held = { min: [box.min[0] + by[0], box.min[1] + by[1]], max: [box.max[0] + by[0], box.max[1] + by[1]] };
+        scene.held = {
+          min: [box.min[0] + by[0], box.min[1] + by[1]],
+          max: [box.max[0] + by[0], box.max[1] + by[1]],
+        };
         plane.draw();
-        if (done) moveChair([(scene.held.min[0] + scene.held.max[0]) / 2, (scene.held.min[1] + scene.held.max[1]) / 2]);
+        if (done)
+          moveChair([
+            (scene.held.min[0] + scene.held.max[0]) / 2,
+            (scene.held.min[1] + scene.held.max[1]) / 2,
+          ]);
       };
     };
 
@@ -229,21 +315,38 @@ export default {
       state: () => ({ ...(last ? stateOf(last.at) : {}), ...plane.state() }),
       picture() {
         plane.paint();
-        return compose(`portolan studio · fusion · ${document.getElementById("at")?.textContent}`, [[plane.canvas], [inspector.plot.canvas()]]);
+        return compose(`portolan studio · fusion · ${document.getElementById("at")?.textContent}`, [
+          [plane.canvas],
+          [inspector.plot.canvas()],
+        ]);
       },
       key(event) {
         /** @type {Record<string, () => void>} */
         const does = {
-          Enter: () => choose(scene.field?.cellAt(middle())), Escape: () => choose(undefined), m: () => document.getElementById("chair-to-cell")?.click(),
-          w: () => step(0, 1), a: () => step(-1, 0), s: () => step(0, -1), d: () => step(1, 0),
+          Enter: () => choose(scene.field?.cellAt(middle())),
+          Escape: () => choose(undefined),
+          m: () => document.getElementById("chair-to-cell")?.click(),
+          w: () => step(0, 1),
+          a: () => step(-1, 0),
+          s: () => step(0, -1),
+          d: () => step(1, 0),
         };
-        const step = (/** @type {number} */ dx, /** @type {number} */ dy) => scene.cell && choose([scene.cell[0] + dx, scene.cell[1] + dy]);
-        if (event.key in does) return does[event.key](), true;
+        const step = (/** @type {number} */ dx, /** @type {number} */ dy) =>
+          scene.cell && choose([scene.cell[0] + dx, scene.cell[1] + dy]);
+        if (event.key in does) return (does[event.key](), true);
         return play.key(event) || plane.key(event);
       },
       keys: [
-        ["Space", "play or pause"], [". ,", "one scan on, one back"], ["Home End", "start, end of the lap"], ["< >", "slower, faster"], ["Arrows", "move the picture"],
-        ["+ − 0", "larger, smaller, all"], ["Enter", "follow the cell in the middle"], ["W A S D", "the cell above, left, below, right"], ["Esc", "follow no cell"], ["M", "put the chair on the chosen cell"],
+        ["Space", "play or pause"],
+        [". ,", "one scan on, one back"],
+        ["Home End", "start, end of the lap"],
+        ["< >", "slower, faster"],
+        ["Arrows", "move the picture"],
+        ["+ − 0", "larger, smaller, all"],
+        ["Enter", "follow the cell in the middle"],
+        ["W A S D", "the cell above, left, below, right"],
+        ["Esc", "follow no cell"],
+        ["M", "put the chair on the chosen cell"],
       ],
       redraw() {
         recolor();
@@ -257,8 +360,13 @@ export default {
       const { w_max, ...rest } = panel.values;
       const texts = Object.entries({ ...rest, w_max: w_max ?? "inf" }).map(([k, v]) => [k, String(v)]);
       return {
-        ...Object.fromEntries(texts), scan: String(at), ...(scene.cell ? { cell: scene.cell.join(",") } : {}), ...(shows.value === "weight" ? { shows: "weight" } : {}),
-        ...(moves.length ? { chair: moves.map(([scan, [x, y]]) => `${scan},${x.toFixed(4)},${y.toFixed(4)}`).join(";") } : {}),
+        ...Object.fromEntries(texts),
+        scan: String(at),
+        ...(scene.cell ? { cell: scene.cell.join(",") } : {}),
+        ...(shows.value === "weight" ? { shows: "weight" } : {}),
+        ...(moves.length
+          ? { chair: moves.map(([scan, [x, y]]) => `${scan},${x.toFixed(4)},${y.toFixed(4)}`).join(";") }
+          : {}),
       };
     }
 
@@ -271,7 +379,9 @@ export default {
         const text = state.get(key);
         if (text === null) continue;
         if (key === "w_max") wanted[key] = text === "inf" ? null : Number(text);
-        else wanted[key] = typeof value === "number" ? Number(text) : typeof value === "boolean" ? text === "true" : text;
+        else
+          wanted[key] =
+            typeof value === "number" ? Number(text) : typeof value === "boolean" ? text === "true" : text;
       }
       if (JSON.stringify(wanted) !== JSON.stringify(now)) await tryAsk({ op: "set", settings: wanted });
       const numbersOf = (/** @type {string} */ key) => (state.get(key) ?? "").split(",").map(Number);
@@ -281,14 +391,16 @@ export default {
         await tryAsk({ op: "seek", scan: Math.max(0, Math.floor(since)) });
         await tryAsk({ op: "move_chair", to: [x, y] });
       }
-      if (state.has("scan")) await tryAsk({ op: "seek", scan: Math.max(0, Math.floor(Number(state.get("scan"))) || 0) });
+      if (state.has("scan"))
+        await tryAsk({ op: "seek", scan: Math.max(0, Math.floor(Number(state.get("scan"))) || 0) });
       takeIn();
       if (state.get("shows") === "weight" && scene.field) {
         shows.value = scene.field.shows = "weight";
         recolor();
       }
       const cell = numbersOf("cell");
-      if (state.has("cell") && cell.length === 2 && cell.every(Number.isInteger)) await choose([cell[0], cell[1]]);
+      if (state.has("cell") && cell.length === 2 && cell.every(Number.isInteger))
+        await choose([cell[0], cell[1]]);
       plane.restore(state);
     }
   },

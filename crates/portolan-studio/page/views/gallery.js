@@ -7,7 +7,10 @@ import { answersOf, decades, legendOf, ofFusion, verdict } from "../gallery/word
 import { choice, el, facts, group } from "../ui/controls.js";
 import { compose } from "../ui/picture.js";
 
-/** What can be asked of a map: name in the engine, on the button, in a sentence. @type {[string, string, string][]} */
+/**
+ * What can be asked of a map: name in the engine, on the button, in a sentence.
+ * @type {[string, string, string][]}
+ */
 const WORKLOADS = [
   ["occupancy", "Occupancy", "Is this point occupied?"],
   ["distance", "Distance", "How far is the nearest surface?"],
@@ -34,15 +37,40 @@ export default {
     /** The theme that the pictures have the colours of. */
     let theme = document.documentElement.dataset.theme;
 
-    const six = panels(app.meter, { oncamera: () => (app.changed(), middle && pointAtMiddle()), onhover: (p) => !middle && point(p) });
-    const probes = choice({ id: "gallery-probes", label: "Points to ask at", value: "100000", options: PROBES.map((n) => [n, whole(Number(n))]), onchange: () => app.changed() });
+    const six = panels(app.meter, {
+      oncamera: () => (app.changed(), middle && pointAtMiddle()),
+      onhover: (p) => !middle && point(p),
+    });
+    const probes = choice({
+      id: "gallery-probes",
+      label: "Points to ask at",
+      value: "100000",
+      options: PROBES.map((n) => [n, whole(Number(n))]),
+      onchange: () => app.changed(),
+    });
     const buttons = WORKLOADS.map(([name, text, question]) =>
-      el("button", { type: "button", id: `gallery-run-${name}`, "aria-pressed": "false", title: question, onclick: () => run(name) }, text));
+      el(
+        "button",
+        {
+          type: "button",
+          id: `gallery-run-${name}`,
+          "aria-pressed": "false",
+          title: question,
+          onclick: () => run(name),
+        },
+        text,
+      ),
+    );
     const result = el("p", { id: "gallery-result", role: "status" });
     const measured = el("p", { class: "note", id: "gallery-measured" });
     const made = facts([
-      ["gallery-log", "log"], ["gallery-scans", "scans"], ["gallery-cells", "cells"], ["gallery-truncation", "truncation"], ["gallery-clamp", "clamp W_max"],
-      ["gallery-fused", "sweep, weights"], ["gallery-seconds", "built and measured in"],
+      ["gallery-log", "log"],
+      ["gallery-scans", "scans"],
+      ["gallery-cells", "cells"],
+      ["gallery-truncation", "truncation"],
+      ["gallery-clamp", "clamp W_max"],
+      ["gallery-fused", "sweep, weights"],
+      ["gallery-seconds", "built and measured in"],
     ]);
     const moved = el("p", { class: "note", id: "gallery-moved" });
     const scale = el("p", { class: "note", id: "gallery-scale" });
@@ -52,16 +80,38 @@ export default {
     const fields = el("div", { class: "scroll" });
     const tree = treePanel();
     const cloud = cloudPanel();
-    const measureTrees = el("button", { type: "button", id: "gallery-trees-run", onclick: () => runTrees() }, "Measure leaves from 1.75 to 10 cm");
+    const measureTrees = el(
+      "button",
+      { type: "button", id: "gallery-trees-run", onclick: () => runTrees() },
+      "Measure leaves from 1.75 to 10 cm",
+    );
     const treesNote = el("p", { class: "note", id: "gallery-trees-note" });
     const theLegend = el("div", { class: "strip" });
 
     root.append(
       el("div", { class: "field" }, six.node, theLegend),
-      el("div", { class: "side" },
-        el("div", { class: "group" }, el("h2", {}, "Run a workload"), el("div", { class: "row", role: "group", "aria-label": "Workload" }, ...buttons), probes.node, result, measured, scale),
+      el(
+        "div",
+        { class: "side" },
+        el(
+          "div",
+          { class: "group" },
+          el("h2", {}, "Run a workload"),
+          el("div", { class: "row", role: "group", "aria-label": "Workload" }, ...buttons),
+          probes.node,
+          result,
+          measured,
+          scale,
+        ),
         group("Made of", made.node, moved),
-        group("Where a tree breaks even", tree.words, tree.out, el("div", { class: "row" }, measureTrees), treesNote, tree.curve.node),
+        group(
+          "Where a tree breaks even",
+          tree.words,
+          tree.out,
+          el("div", { class: "row" }, measureTrees),
+          treesNote,
+          tree.curve.node,
+        ),
         group("The cloud against the ESDF", cloud.words, cloud.curve.node),
         group("How wrong", errors, errorNote),
         group("All that was measured", all),
@@ -81,9 +131,13 @@ export default {
       const { settings, ...of } = body.of;
       const { shape, resolution } = body.picture.grid;
       made.set({
-        "gallery-log": of.log, "gallery-scans": `${whole(of.scans)} of ${whole(Math.max(of.lap, of.scans))}`, "gallery-cells": `${shape[0]} × ${shape[1]}, ${(100 * resolution).toFixed(1)} cm`,
-        "gallery-truncation": `${settings.truncation.toFixed(2)} m`, "gallery-clamp": settings.w_max === null ? "none" : String(settings.w_max),
-        "gallery-fused": `${settings.sweep}, ${settings.weights}`, "gallery-seconds": time(body.seconds),
+        "gallery-log": of.log,
+        "gallery-scans": `${whole(of.scans)} of ${whole(Math.max(of.lap, of.scans))}`,
+        "gallery-cells": `${shape[0]} × ${shape[1]}, ${(100 * resolution).toFixed(1)} cm`,
+        "gallery-truncation": `${settings.truncation.toFixed(2)} m`,
+        "gallery-clamp": settings.w_max === null ? "none" : String(settings.w_max),
+        "gallery-fused": `${settings.sweep}, ${settings.weights}`,
+        "gallery-seconds": time(body.seconds),
       });
       moved.textContent = ofFusion(body);
       const truth = body.picture.truth !== null;
@@ -101,11 +155,17 @@ export default {
     /** Takes costs in. @param {any} told */
     function tell(told) {
       costs = told;
-      const seconds = costs.rows.flatMap((/** @type {any} */ r) => [r.update, r.occupancy, r.distance, r.surface]).filter((/** @type {any} */ c) => c && c.seconds > 0).map((/** @type {any} */ c) => c.seconds);
-      const sizes = costs.rows.map((/** @type {any} */ r) => r.memory_bytes).filter((/** @type {number} */ b) => b > 0);
+      const seconds = costs.rows
+        .flatMap((/** @type {any} */ r) => [r.update, r.occupancy, r.distance, r.surface])
+        .filter((/** @type {any} */ c) => c && c.seconds > 0)
+        .map((/** @type {any} */ c) => c.seconds);
+      const sizes = costs.rows
+        .map((/** @type {any} */ r) => r.memory_bytes)
+        .filter((/** @type {number} */ b) => b > 0);
       const scales = { memory: decades(sizes, [3, 6]), time: decades(seconds, [-9, -2]) };
       six.meters(costs, scales);
-      const ends = (/** @type {[number, number]} */ [a, b], /** @type {(power: number) => string} */ f) => `${f(a)} to ${f(b)}`;
+      const ends = (/** @type {[number, number]} */ [a, b], /** @type {(power: number) => string} */ f) =>
+        `${f(a)} to ${f(b)}`;
       scale.textContent = `Bars are logarithmic: memory from ${ends(scales.memory, bytesOf)}, times from ${ends(scales.time, timeOf)}.`;
       errors.replaceChildren(errorTable(costs));
       all.replaceChildren(costTable(costs));
@@ -115,7 +175,8 @@ export default {
 
     /** Frames and the sentence for the workload that was run. */
     function frame() {
-      const winner = ran === undefined ? undefined : costs.winners.find((/** @type {any} */ w) => w.workload === ran);
+      const winner =
+        ran === undefined ? undefined : costs.winners.find((/** @type {any} */ w) => w.workload === ran);
       six.frames(winner, costs.rows);
       WORKLOADS.forEach(([name], i) => buttons[i].setAttribute("aria-pressed", String(name === ran)));
       result.textContent = winner ? verdict(winner, costs.rows) : "";
@@ -141,7 +202,10 @@ export default {
     }
 
     async function open() {
-      const answer = await working("Building all representations, and measuring …", { op: "open", have: revision });
+      const answer = await working("Building all representations, and measuring …", {
+        op: "open",
+        have: revision,
+      });
       if (!answer) return;
       if (!answer.body.picture) return app.say("");
       const again = ran;
@@ -159,7 +223,10 @@ export default {
       if (answer.body.revision !== revision) return open();
       ran = workload;
       app.meter.measure(() => tell(answer.body.costs));
-      const asked = workload === "surface" ? "three extractions each, the median counts" : `five rounds of ${whole(n)} points (${whole(Math.ceil(n / 50))} for searches), the median counts`;
+      const asked =
+        workload === "surface"
+          ? "three extractions each, the median counts"
+          : `five rounds of ${whole(n)} points (${whole(Math.ceil(n / 50))} for searches), the median counts`;
       measured.textContent = `Measured now in ${time(answer.body.seconds)}: ${asked}.`;
       app.say(result.textContent ?? "");
       app.changed();
@@ -222,11 +289,20 @@ export default {
         six.draw();
       },
       hide() {},
-      state: () => ({ ...(ran ? { run: ran } : {}), ...(probes.value === "100000" ? {} : { probes: probes.value }), ...(middle ? { middle: "1" } : {}), ...six.plane.state() }),
-      picture: () => compose(`portolan studio · gallery · ${document.getElementById("gallery-log")?.textContent}${ran ? ` · who answers for ${ran}` : ""}`, six.canvases()),
+      state: () => ({
+        ...(ran ? { run: ran } : {}),
+        ...(probes.value === "100000" ? {} : { probes: probes.value }),
+        ...(middle ? { middle: "1" } : {}),
+        ...six.plane.state(),
+      }),
+      picture: () =>
+        compose(
+          `portolan studio · gallery · ${document.getElementById("gallery-log")?.textContent}${ran ? ` · who answers for ${ran}` : ""}`,
+          six.canvases(),
+        ),
       key(event) {
         const workload = WORKLOADS.find(([name]) => name[0] === event.key)?.[0];
-        if (workload) return run(workload), true;
+        if (workload) return (run(workload), true);
         if (event.key === "x") {
           middle = !middle;
           if (middle) pointAtMiddle();
@@ -236,7 +312,12 @@ export default {
         }
         return six.plane.key(event);
       },
-      keys: [["O D S", "run occupancy, distance, surface"], ["X", "ask at the middle of the picture, and stop"], ["Arrows", "move all pictures"], ["+ − 0", "larger, smaller, all"]],
+      keys: [
+        ["O D S", "run occupancy, distance, surface"],
+        ["X", "ask at the middle of the picture, and stop"],
+        ["Arrows", "move all pictures"],
+        ["+ − 0", "larger, smaller, all"],
+      ],
       redraw: recolor,
     };
   },

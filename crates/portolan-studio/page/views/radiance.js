@@ -42,7 +42,11 @@ export default {
       }
     }
     /** Asks; what is refused is in the status line already. @param {object} question */
-    const tryAsk = (question) => ask(question).then((answer) => (app.changed(), answer), () => undefined);
+    const tryAsk = (question) =>
+      ask(question).then(
+        (answer) => (app.changed(), answer),
+        () => undefined,
+      );
 
     const play = player({
       step: (steps) => (turn++, ask({ op: "step", steps })),
@@ -52,21 +56,37 @@ export default {
     const panel = start({ begin, goOn: () => (turn++, tryAsk({ op: "go_on", ...panel.way })) });
     const explanation = new Explanation({ worst, close: () => look({ bin: null }) });
     const ray = choice({
-      id: "radiance-ray", label: "Light of ray", value: "none", options: [["none", "none"]],
+      id: "radiance-ray",
+      label: "Light of ray",
+      value: "none",
+      options: [["none", "none"]],
       onchange: (v) => look({ ray: v === "none" ? null : Number(v) }),
     });
-    const numbers = facts([["radiance-j", "objective J"], ["radiance-misplaced", "matter in empty space, Σ σδ"]]);
+    const numbers = facts([
+      ["radiance-j", "objective J"],
+      ["radiance-misplaced", "matter in empty space, Σ σδ"],
+    ]);
     const residuals = residualTable();
 
     root.append(
       el("div", { class: "field" }, picture.node, curves.node, play.node),
       el(
-        "div", { class: "side" },
+        "div",
+        { class: "side" },
         panel.node,
-        el("div", { class: "group" }, ray.node, legend([
-          { color: "positive", text: "density" }, { color: "beam", text: "training ray, its light" }, { color: "contour", text: "held-out ray, its light", dashed: true },
-          { color: "negative", text: "residual" }, { color: "truth", text: "truth, noise", dashed: true }, { color: "", text: "reflectance 0 to 1", ramp: "linear-gradient(90deg, #000, #fff)" },
-        ])),
+        el(
+          "div",
+          { class: "group" },
+          ray.node,
+          legend([
+            { color: "positive", text: "density" },
+            { color: "beam", text: "training ray, its light" },
+            { color: "contour", text: "held-out ray, its light", dashed: true },
+            { color: "negative", text: "residual" },
+            { color: "truth", text: "truth, noise", dashed: true },
+            { color: "", text: "reflectance 0 to 1", ramp: "linear-gradient(90deg, #000, #fff)" },
+          ]),
+        ),
         group("Residuals, root mean square", residuals.node, numbers.node),
         explanation.node,
       ),
@@ -80,8 +100,17 @@ export default {
           explanation.setNoise(body.all.noise);
           panel.show(body.all.named, body.seed);
           if (ray.node.querySelectorAll("option").length === 1) {
-            ray.node.querySelector("select")?.append(...body.all.rays.map((/** @type {any} */ r, /** @type {number} */ i) =>
-              el("option", { value: i }, `${i + 1} ${r.ascending ? "›" : "‹"} ${r.origin.toFixed(2)} m${r.held_out ? ", held out" : ""}`)));
+            ray.node
+              .querySelector("select")
+              ?.append(
+                ...body.all.rays.map((/** @type {any} */ r, /** @type {number} */ i) =>
+                  el(
+                    "option",
+                    { value: i },
+                    `${i + 1} ${r.ascending ? "›" : "‹"} ${r.origin.toFixed(2)} m${r.held_out ? ", held out" : ""}`,
+                  ),
+                ),
+              );
           }
         }
         picture.fit = { body, arrays: /** @type {any} */ (arrays) };
@@ -118,14 +147,20 @@ export default {
       if (last?.worst !== null) look({ bin: last.worst });
     }
 
-    /** Makes a run again, as a link tells it. @param {number} seed @param {{channels: string, optimizer: string, steps: number}[]} phases */
+    /**
+     * Makes a run again, as a link tells it.
+     * @param {number} seed
+     * @param {{channels: string, optimizer: string, steps: number}[]} phases
+     */
     async function replay(seed, phases) {
       const mine = ++turn;
       const all = phases.reduce((n, p) => n + p.steps, 0);
       let done = 0;
       for (const [i, { channels, optimizer, steps }] of phases.entries()) {
-        await ask(i === 0 ? { op: "start", seed, channels, optimizer } : { op: "go_on", channels, optimizer });
-        for (let left = steps; left > 0 && mine === turn; ) {
+        await ask(
+          i === 0 ? { op: "start", seed, channels, optimizer } : { op: "go_on", channels, optimizer },
+        );
+        for (let left = steps; left > 0 && mine === turn;) {
           const n = Math.min(left, MOST_AT_ONCE);
           await ask({ op: "step", steps: n });
           left -= n;
@@ -178,27 +213,49 @@ export default {
       state: () => {
         if (!last) return {};
         const { ray, bin } = last.look;
-        return { ...writeRun(last), ...(ray === null ? {} : { ray: String(ray) }), ...(bin === null ? {} : { bin: String(bin) }), speed: play.speed };
+        return {
+          ...writeRun(last),
+          ...(ray === null ? {} : { ray: String(ray) }),
+          ...(bin === null ? {} : { bin: String(bin) }),
+          speed: play.speed,
+        };
       },
       picture() {
         picture.paint();
-        return compose(`portolan studio · radiance · seed ${last?.seed}, step ${last?.step}`, [[picture.canvas], curves.plots.map((p) => p.canvas())]);
+        return compose(`portolan studio · radiance · seed ${last?.seed}, step ${last?.step}`, [
+          [picture.canvas],
+          curves.plots.map((p) => p.canvas()),
+        ]);
       },
       key(event) {
         const far = event.shiftKey ? 10 : 1;
         /** @type {Record<string, () => void>} */
         const does = {
-          ArrowLeft: () => moveCursor(-far), ArrowRight: () => moveCursor(far), ArrowUp: () => moveRay(-1), ArrowDown: () => moveRay(1),
-          Enter: () => picture.cursor !== undefined && look({ bin: picture.cursor }), Escape: () => look({ bin: null }),
-          w: worst, r: panel.reroll, c: panel.nextChannels,
+          ArrowLeft: () => moveCursor(-far),
+          ArrowRight: () => moveCursor(far),
+          ArrowUp: () => moveRay(-1),
+          ArrowDown: () => moveRay(1),
+          Enter: () => picture.cursor !== undefined && look({ bin: picture.cursor }),
+          Escape: () => look({ bin: null }),
+          w: worst,
+          r: panel.reroll,
+          c: panel.nextChannels,
         };
-        if (event.key in does) return does[event.key](), true;
+        if (event.key in does) return (does[event.key](), true);
         return play.key(event);
       },
       keys: [
-        ["Space", "play or pause"], [". ,", "one step, as many as a picture has"], ["Home", "the same start again"], ["< >", "slower, faster"], ["R", "another start"],
-        ["C", "other channels, from the field as it stands"], ["← →", "to another bin (with Shift ten further)"], ["Enter", "the gradient of that bin"], ["W", "the most misplaced bin"],
-        ["Esc", "look at no bin"], ["↑ ↓", "the light of another ray"],
+        ["Space", "play or pause"],
+        [". ,", "one step, as many as a picture has"],
+        ["Home", "the same start again"],
+        ["< >", "slower, faster"],
+        ["R", "another start"],
+        ["C", "other channels, from the field as it stands"],
+        ["← →", "to another bin (with Shift ten further)"],
+        ["Enter", "the gradient of that bin"],
+        ["W", "the most misplaced bin"],
+        ["Esc", "look at no bin"],
+        ["↑ ↓", "the light of another ray"],
       ],
       redraw() {
         curves.redraw();
@@ -210,11 +267,28 @@ export default {
 
 /** Three channels, two kinds of rays. */
 function residualTable() {
-  const rows = [["depth", "depth", " m"], ["reflectance", "reflectance", ""], ["second_moment", "second moment", " m²"]];
-  const cells = rows.map(([key]) => ["training", "held-out"].map((kind) => el("td", { id: `radiance-${kind}-${key.replace("_", "-")}` })));
-  const head = ["", "training", "held out"].map((text) => (text ? el("th", { scope: "col" }, text) : el("td")));
+  const rows = [
+    ["depth", "depth", " m"],
+    ["reflectance", "reflectance", ""],
+    ["second_moment", "second moment", " m²"],
+  ];
+  const cells = rows.map(([key]) =>
+    ["training", "held-out"].map((kind) => el("td", { id: `radiance-${kind}-${key.replace("_", "-")}` })),
+  );
+  const head = ["", "training", "held out"].map((text) =>
+    text ? el("th", { scope: "col" }, text) : el("td"),
+  );
   return {
-    node: el("table", {}, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...rows.map(([, name], i) => el("tr", {}, el("th", { scope: "row" }, name), ...cells[i])))),
+    node: el(
+      "table",
+      {},
+      el("thead", {}, el("tr", {}, ...head)),
+      el(
+        "tbody",
+        {},
+        ...rows.map(([, name], i) => el("tr", {}, el("th", { scope: "row" }, name), ...cells[i])),
+      ),
+    ),
     /** @param {any} training @param {any} heldOut */
     show(training, heldOut) {
       for (const [i, [key, , unit]] of rows.entries())

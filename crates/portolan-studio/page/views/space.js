@@ -26,7 +26,8 @@ const FIELDS = /** @type {[string, string][]} */ ([
 const LOADING = 300;
 
 const cm = (/** @type {number} */ m) => `${(100 * m).toFixed(1).replace(/\.0$/, "")} cm`;
-const bytes = (/** @type {number | null} */ n) => (n === null ? "—" : n >= 1 << 20 ? `${(n / (1 << 20)).toFixed(1)} MiB` : `${(n / 1024).toFixed(0)} KiB`);
+const bytes = (/** @type {number | null} */ n) =>
+  n === null ? "—" : n >= 1 << 20 ? `${(n / (1 << 20)).toFixed(1)} MiB` : `${(n / 1024).toFixed(0)} KiB`;
 const count = (/** @type {number} */ n) => n.toLocaleString("en").replaceAll(",", " ");
 const nextPicture = () => new Promise((resolve) => requestAnimationFrame(resolve));
 const wait = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
@@ -38,7 +39,8 @@ export default {
   mount(root, app) {
     const ask = (/** @type {object} */ question) => app.engine.ask("space", question);
 
-    // --- what is shown -------------------------------------------------------------------------------------------
+    // --- what is shown
+    // -------------------------------------------------------------------------------------------
     /** The last answer's words, and what seldom changes. @type {any} */
     let body = null;
     /** @type {any} */
@@ -67,21 +69,46 @@ export default {
     /** Load of the mesh: milliseconds and bytes, for who measures. */
     const load = { started: 0, transfer: 0, take: 0, bytes: 0, done: 0 };
 
-    // --- the canvas ----------------------------------------------------------------------------------------------
-    const canvas = el("canvas", { id: "space-canvas", tabindex: 0, role: "application", "aria-label": "The map in space. Arrow keys go round it, with Shift sideways, plus and minus nearer and further, Enter looks at the voxel in the middle." });
+    // --- the canvas
+    // ----------------------------------------------------------------------------------------------
+    const canvas = el("canvas", {
+      id: "space-canvas",
+      tabindex: 0,
+      role: "application",
+      "aria-label":
+        "The map in space. Arrow keys go round it, with Shift sideways, plus and minus nearer and further, Enter looks at the voxel in the middle.",
+    });
     const legendText = el("span", { id: "space-legend" });
-    const legendRamp = el("i", { class: "ramp", "aria-hidden": "true", style: "display:inline-block;width:110px;height:10px;border:1px solid var(--line);vertical-align:-1px;margin:0 6px" });
+    const legendRamp = el("i", {
+      class: "ramp",
+      "aria-hidden": "true",
+      style:
+        "display:inline-block;width:110px;height:10px;border:1px solid var(--line);vertical-align:-1px;margin:0 6px",
+    });
     const low = el("span", { id: "space-low" });
     const high = el("span", { id: "space-high" });
     const cutLegend = el("div", { id: "space-cut-legend", hidden: true });
     const overlay = el(
       "div",
-      { style: "position:absolute;left:12px;top:10px;font-size:12px;color:var(--muted);pointer-events:none;background:color-mix(in srgb,var(--panel) 85%,transparent);padding:4px 8px;border-radius:6px;font-variant-numeric:tabular-nums" },
+      {
+        style:
+          "position:absolute;left:12px;top:10px;font-size:12px;color:var(--muted);pointer-events:none;background:color-mix(in srgb,var(--panel) 85%,transparent);padding:4px 8px;border-radius:6px;font-variant-numeric:tabular-nums",
+      },
       el("div", {}, legendText, low, legendRamp, high),
       cutLegend,
     );
-    const cross = el("div", { "aria-hidden": "true", hidden: true, style: "position:absolute;left:50%;top:50%;width:15px;height:15px;margin:-8px 0 0 -8px;pointer-events:none;background:linear-gradient(var(--ink),var(--ink)) center/15px 1px no-repeat,linear-gradient(var(--ink),var(--ink)) center/1px 15px no-repeat" });
-    const flat = el("canvas", { id: "space-flat", hidden: true, style: "image-rendering:pixelated;object-fit:contain", "aria-label": "The slice" });
+    const cross = el("div", {
+      "aria-hidden": "true",
+      hidden: true,
+      style:
+        "position:absolute;left:50%;top:50%;width:15px;height:15px;margin:-8px 0 0 -8px;pointer-events:none;background:linear-gradient(var(--ink),var(--ink)) center/15px 1px no-repeat,linear-gradient(var(--ink),var(--ink)) center/1px 15px no-repeat",
+    });
+    const flat = el("canvas", {
+      id: "space-flat",
+      hidden: true,
+      style: "image-rendering:pixelated;object-fit:contain",
+      "aria-label": "The slice",
+    });
     const frame = el("div", { class: "canvas" }, canvas, flat, overlay, cross);
     /** @type {Stage | null} */
     let stage = null;
@@ -90,21 +117,46 @@ export default {
     } catch {
       canvas.hidden = true;
       flat.hidden = false;
-      overlay.append(el("p", { class: "error", id: "space-no-webgl" }, "This browser draws nothing in three dimensions (no WebGL): the mesh is not shown, a slice is."));
+      overlay.append(
+        el(
+          "p",
+          { class: "error", id: "space-no-webgl" },
+          "This browser draws nothing in three dimensions (no WebGL): the mesh is not shown, a slice is.",
+        ),
+      );
     }
     canvas.addEventListener("focus", () => (cross.hidden = !canvas.matches(":focus-visible")));
     canvas.addEventListener("blur", () => (cross.hidden = true));
     const changed = calmly(() => app.changed(), 200);
     if (stage) stage.moved = () => changed(null);
 
-    // --- the strip -----------------------------------------------------------------------------------------------
-    const play = el("button", { type: "button", id: "space-play", "aria-pressed": "false", title: "Space" }, "Play");
+    // --- the strip
+    // -----------------------------------------------------------------------------------------------
+    const play = el(
+      "button",
+      { type: "button", id: "space-play", "aria-pressed": "false", title: "Space" },
+      "Play",
+    );
     const stepOne = el("button", { type: "button", id: "space-step", title: "N" }, "Step");
     const restart = el("button", { type: "button", id: "space-restart", title: "Home" }, "To start");
-    const scrub = el("input", { type: "range", id: "space-frame", min: 0, max: 0, step: 1, value: 0, "aria-label": "Frame" });
-    const where = el("output", { for: "space-frame", id: "space-at", style: "font-variant-numeric:tabular-nums;min-width:74px;text-align:right" });
+    const scrub = el("input", {
+      type: "range",
+      id: "space-frame",
+      min: 0,
+      max: 0,
+      step: 1,
+      value: 0,
+      "aria-label": "Frame",
+    });
+    const where = el("output", {
+      for: "space-frame",
+      id: "space-at",
+      style: "font-variant-numeric:tabular-nums;min-width:74px;text-align:right",
+    });
     const speedChoice = choice({
-      id: "space-speed", label: "Speed", value: "Infinity",
+      id: "space-speed",
+      label: "Speed",
+      value: "Infinity",
       options: SPEEDS.map((s) => [String(s), s === Infinity ? "as fast as it goes" : `${s} frames/s`]),
       onchange: (v) => (speed = Number(v)),
     });
@@ -132,7 +184,8 @@ export default {
       drive();
     }
 
-    // --- the side ------------------------------------------------------------------------------------------------
+    // --- the side
+    // ------------------------------------------------------------------------------------------------
     const state = facts([
       ["space-name", "Log"],
       ["space-hits", "Surfaces in the frame"],
@@ -150,18 +203,53 @@ export default {
     const colorPlace = el("div", {});
     let by = "height";
     function colorChoice() {
-      const options = COLORS.filter(([id]) => !all.colors.find((/** @type {any} */ c) => c.by === id)?.refused);
-      const made = choice({ id: "space-color", label: "Colour by", value: by, options, onchange: (v) => ((newColor = v), drive()) });
+      const options = COLORS.filter(
+        ([id]) => !all.colors.find((/** @type {any} */ c) => c.by === id)?.refused,
+      );
+      const made = choice({
+        id: "space-color",
+        label: "Colour by",
+        value: by,
+        options,
+        onchange: (v) => ((newColor = v), drive()),
+      });
       colorPlace.replaceChildren(made.node);
       const missing = all.colors.filter((/** @type {any} */ c) => c.refused);
-      colorNote.textContent = missing.map((/** @type {any} */ c) => `No ${c.by === "color" ? "colour" : c.by}: ${c.refused}.`).join(" ");
+      colorNote.textContent = missing
+        .map((/** @type {any} */ c) => `No ${c.by === "color" ? "colour" : c.by}: ${c.refused}.`)
+        .join(" ");
     }
     const fit = el("button", { type: "button", id: "space-fit", title: "F" }, "See all");
     fit.onclick = () => see();
 
-    const fieldChoice = choice({ id: "space-slice", label: "Slice", value: "none", options: FIELDS, onchange: (v) => cutThrough({ field: v }) });
-    const axisChoice = choice({ id: "space-axis", label: "across", value: "2", options: [["0", "x"], ["1", "y"], ["2", "z"]], onchange: (v) => cutThrough({ axis: Number(v), at: null }) });
-    const atSlider = slider({ id: "space-cut", label: "at", min: 0, max: 1, step: 0.01, value: 0, format: () => cutWords(), oninput: (v) => cutThrough({ at: v }) });
+    const fieldChoice = choice({
+      id: "space-slice",
+      label: "Slice",
+      value: "none",
+      options: FIELDS,
+      onchange: (v) => cutThrough({ field: v }),
+    });
+    const axisChoice = choice({
+      id: "space-axis",
+      label: "across",
+      value: "2",
+      options: [
+        ["0", "x"],
+        ["1", "y"],
+        ["2", "z"],
+      ],
+      onchange: (v) => cutThrough({ axis: Number(v), at: null }),
+    });
+    const atSlider = slider({
+      id: "space-cut",
+      label: "at",
+      min: 0,
+      max: 1,
+      step: 0.01,
+      value: 0,
+      format: () => cutWords(),
+      oninput: (v) => cutThrough({ at: v }),
+    });
     const cutNote = el("p", { class: "note", id: "space-cut-note" });
 
     const settings = el("div", { class: "group", style: "border:0;padding:0" });
@@ -193,7 +281,17 @@ export default {
         group("Slice", fieldChoice.node, axisChoice.node, atSlider.node, cutNote),
         inspector.node,
         group("Settings", settings),
-        group("Files", el("div", { class: "row", style: "justify-content:flex-start" }, file("ply", "mesh.ply", "ply"), file("glb", "mesh.glb", "glb"), file("esdf", "esdf.bin", "esdf"), octree)),
+        group(
+          "Files",
+          el(
+            "div",
+            { class: "row", style: "justify-content:flex-start" },
+            file("ply", "mesh.ply", "ply"),
+            file("glb", "mesh.glb", "glb"),
+            file("esdf", "esdf.bin", "esdf"),
+            octree,
+          ),
+        ),
       ),
     );
 
@@ -205,27 +303,81 @@ export default {
     const setCalmly = calmly((/** @type {any} */ change) => set(change), 250);
     function settingsControls() {
       if (all.fixed) {
-        settings.replaceChildren(el("p", { class: "note" }, `The map was made before, in cells of ${cm(all.resolution)}, truncation ${cm(all.truncation)}.`));
+        settings.replaceChildren(
+          el(
+            "p",
+            { class: "note" },
+            `The map was made before, in cells of ${cm(all.resolution)}, truncation ${cm(all.truncation)}.`,
+          ),
+        );
         return;
       }
       const s = all.settings;
       const sensor = choice({
-        id: "space-sensor", label: "Sensor", value: s.sensor, options: [["lidar", "lidar"], ["camera", "depth camera"]],
+        id: "space-sensor",
+        label: "Sensor",
+        value: s.sensor,
+        options: [
+          ["lidar", "lidar"],
+          ["camera", "depth camera"],
+        ],
         onchange: (v) => set({ sensor: v }),
       });
-      const truncation = slider({ id: "space-truncation", label: "Truncation", min: 1, max: 10, step: 0.5, value: s.truncation / s.resolution, format: (v) => `${v} cells`, oninput: (v) => setCalmly({ truncation: v * resolution.value }) });
+      const truncation = slider({
+        id: "space-truncation",
+        label: "Truncation",
+        min: 1,
+        max: 10,
+        step: 0.5,
+        value: s.truncation / s.resolution,
+        format: (v) => `${v} cells`,
+        oninput: (v) => setCalmly({ truncation: v * resolution.value }),
+      });
       const resolution = slider({
-        id: "space-resolution", label: "Resolution", values: RESOLUTIONS, value: s.resolution, format: cm,
+        id: "space-resolution",
+        label: "Resolution",
+        values: RESOLUTIONS,
+        value: s.resolution,
+        format: cm,
         oninput: (v) => setCalmly({ resolution: v, truncation: truncation.value * v }),
       });
-      const clamp = slider({ id: "space-wmax", label: "W_max", values: [1, 2, 4, 8, 16, 32, 64, 128, 256], value: s.w_max, oninput: (v) => setCalmly({ w_max: v }) });
-      const carve = toggle({ id: "space-carve", label: "Carve free space", value: s.carve, onchange: (v) => set({ carve: v }) });
-      const halfLife = el("p", { class: "note", id: "space-half-life" }, `Half-life of what has gone: ${all.half_life.toFixed(1)} observations.`);
-      const occupancy = toggle({ id: "space-occupancy", label: "Occupancy too (slower)", value: s.occupancy, onchange: (v) => set({ occupancy: v }) });
-      settings.replaceChildren(...(all.simulated ? [sensor.node] : []), resolution.node, truncation.node, clamp.node, halfLife, carve.node, occupancy.node);
+      const clamp = slider({
+        id: "space-wmax",
+        label: "W_max",
+        values: [1, 2, 4, 8, 16, 32, 64, 128, 256],
+        value: s.w_max,
+        oninput: (v) => setCalmly({ w_max: v }),
+      });
+      const carve = toggle({
+        id: "space-carve",
+        label: "Carve free space",
+        value: s.carve,
+        onchange: (v) => set({ carve: v }),
+      });
+      const halfLife = el(
+        "p",
+        { class: "note", id: "space-half-life" },
+        `Half-life of what has gone: ${all.half_life.toFixed(1)} observations.`,
+      );
+      const occupancy = toggle({
+        id: "space-occupancy",
+        label: "Occupancy too (slower)",
+        value: s.occupancy,
+        onchange: (v) => set({ occupancy: v }),
+      });
+      settings.replaceChildren(
+        ...(all.simulated ? [sensor.node] : []),
+        resolution.node,
+        truncation.node,
+        clamp.node,
+        halfLife,
+        carve.node,
+        occupancy.node,
+      );
     }
 
-    // --- answers -------------------------------------------------------------------------------------------------
+    // --- answers
+    // -------------------------------------------------------------------------------------------------
     /** @param {import("../engine/engine.js").Answer} answer */
     function take(answer) {
       const before = body;
@@ -239,12 +391,18 @@ export default {
         settingsControls();
         octree.disabled = !all.occupancy;
         octree.title = all.occupancy ? "" : "Switch on occupancy in the settings";
-        for (const id of ["play", "step", "restart", "frame"]) /** @type {any} */ (strip.querySelector(`#space-${id}`)).disabled = body.frames === 0;
+        for (const id of ["play", "step", "restart", "frame"])
+          /** @type {any} */ (strip.querySelector(`#space-${id}`)).disabled = body.frames === 0;
       }
       by = body.color.by;
       const news = stage?.surface.apply(answer) ?? false;
       stage?.showScan(/** @type {Float32Array} */ (answer.arrays.points), body.pose);
-      if (stage?.fitted && body.surface && (!before?.surface || String(before.surface) !== String(body.surface))) stage.fit(body.surface);
+      if (
+        stage?.fitted &&
+        body.surface &&
+        (!before?.surface || String(before.surface) !== String(body.surface))
+      )
+        stage.fit(body.surface);
       scrub.max = String(body.frames);
       if (document.activeElement !== scrub || goal === null) scrub.value = String(body.at);
       where.textContent = body.frames ? `${body.at} of ${body.frames}` : "";
@@ -258,10 +416,16 @@ export default {
         "space-bytes-occupancy": bytes(body.bytes.occupancy),
         "space-bytes-esdf": bytes(body.bytes.esdf),
         "space-bytes-mesh": bytes(body.bytes.mesh),
-        "space-time": body.bytes?.occupancy ? `${ms(body.seconds.tsdf)} + occupancy ${ms(body.seconds.occupancy)}` : ms(body.seconds.tsdf),
+        "space-time": body.bytes?.occupancy
+          ? `${ms(body.seconds.tsdf)} + occupancy ${ms(body.seconds.occupancy)}`
+          : ms(body.seconds.tsdf),
         "space-time-mesh": ms(body.seconds.mesh),
       });
-      const why = body.full ?? (body.left_out.frames ? `${body.left_out.frames} frames were left out; the first: ${body.left_out.why}` : "");
+      const why =
+        body.full ??
+        (body.left_out.frames
+          ? `${body.left_out.frames} frames were left out; the first: ${body.left_out.why}`
+          : "");
       trouble.hidden = !why;
       trouble.textContent = why;
       legend();
@@ -287,18 +451,33 @@ export default {
 
     function legend() {
       const { ramp } = body.color;
-      legendText.textContent = { height: "Height ", color: "Colours as they were seen", weight: "Weight ", error: "Distance to the true surface " }[/** @type {"height"} */ (by)] ?? "";
+      legendText.textContent =
+        {
+          height: "Height ",
+          color: "Colours as they were seen",
+          weight: "Weight ",
+          error: "Distance to the true surface ",
+        }[/** @type {"height"} */ (by)] ?? "";
       legendRamp.hidden = low.hidden = high.hidden = !ramp;
       legendRamp.style.display = ramp ? "inline-block" : "none";
       if (!ramp) return;
       legendRamp.style.background = gradient(stops(by));
-      const words = (/** @type {number | null} */ v) => (v === null ? "" : by === "error" ? `${v > 0 ? "+" : "−"}${cm(Math.abs(v))}` : `${by === "height" ? (v + all.height).toFixed(2) : v.toFixed(0)}${ramp.unit && ` ${ramp.unit}`}`);
+      const words = (/** @type {number | null} */ v) =>
+        v === null
+          ? ""
+          : by === "error"
+            ? `${v > 0 ? "+" : "−"}${cm(Math.abs(v))}`
+            : `${by === "height" ? (v + all.height).toFixed(2) : v.toFixed(0)}${ramp.unit && ` ${ramp.unit}`}`;
       low.textContent = words(ramp.low);
       high.textContent = words(ramp.high);
     }
 
-    // --- the slice -----------------------------------------------------------------------------------------------
-    const sliceNow = () => (slice.field === "none" || slice.at === null ? null : { field: slice.field, axis: slice.axis, at: slice.at });
+    // --- the slice
+    // -----------------------------------------------------------------------------------------------
+    const sliceNow = () =>
+      slice.field === "none" || slice.at === null
+        ? null
+        : { field: slice.field, axis: slice.axis, at: slice.at };
     function cutWords() {
       return cut && slice.field !== "none" ? `${"xyz"[slice.axis]} = ${cut.body.world.toFixed(3)} m` : "";
     }
@@ -325,7 +504,8 @@ export default {
       if (slice.field === "none" || !body?.bounds) return;
       const [a, b] = body.bounds;
       const k = slice.axis;
-      if (slice.at === null) slice.at = (body.surface ?? body.bounds)[0][k] * 0.5 + (body.surface ?? body.bounds)[1][k] * 0.5;
+      if (slice.at === null)
+        slice.at = (body.surface ?? body.bounds)[0][k] * 0.5 + (body.surface ?? body.bounds)[1][k] * 0.5;
       slice.at = Math.min(Math.max(slice.at, a[k]), b[k]);
       const field = slice.field;
       const answer = await ask({ op: "slice", slice: sliceNow() });
@@ -339,12 +519,25 @@ export default {
         atSlider.value = /** @type {number} */ (slice.at);
         stage?.cut.show(answer, field);
         if (!stage) paintFlat(answer, field);
-        cutNote.textContent = field === "esdf" && answer.body.seconds > 0 ? `The field was made in ${(1000 * answer.body.seconds).toFixed(0)} ms.` : "";
+        cutNote.textContent =
+          field === "esdf" && answer.body.seconds > 0
+            ? `The field was made in ${(1000 * answer.body.seconds).toFixed(0)} ms.`
+            : "";
         if (answer.body.step > 1) cutNote.textContent += ` Every ${answer.body.step}. cell is shown.`;
-        const ends = field === "occupancy" ? ["occupied", "free"] : [`−${cm(answer.body.most)}`, `+${cm(answer.body.most)}`];
+        const ends =
+          field === "occupancy"
+            ? ["occupied", "free"]
+            : [`−${cm(answer.body.most)}`, `+${cm(answer.body.most)}`];
         const name = FIELDS.find(([id]) => id === field)?.[1];
         cutLegend.hidden = false;
-        cutLegend.replaceChildren(`Slice, ${name} ${ends[0]} `, el("i", { "aria-hidden": "true", style: `display:inline-block;width:110px;height:10px;border:1px solid var(--line);vertical-align:-1px;margin:0 2px;background:${rampCss()}` }), ` ${ends[1]}`);
+        cutLegend.replaceChildren(
+          `Slice, ${name} ${ends[0]} `,
+          el("i", {
+            "aria-hidden": "true",
+            style: `display:inline-block;width:110px;height:10px;border:1px solid var(--line);vertical-align:-1px;margin:0 2px;background:${rampCss()}`,
+          }),
+          ` ${ends[1]}`,
+        );
         stage?.draw();
       });
       app.changed();
@@ -355,11 +548,13 @@ export default {
       const { width, height, bytes } = image(answer, field);
       [flat.width, flat.height] = [width, height];
       const rows = new ImageData(width, height);
-      for (let y = 0; y < height; y++) rows.data.set(bytes.subarray(4 * width * y, 4 * width * (y + 1)), 4 * width * (height - 1 - y));
+      for (let y = 0; y < height; y++)
+        rows.data.set(bytes.subarray(4 * width * y, 4 * width * (y + 1)), 4 * width * (height - 1 - y));
       flat.getContext("2d")?.putImageData(rows, 0, 0);
     }
 
-    // --- the voxel -----------------------------------------------------------------------------------------------
+    // --- the voxel
+    // -----------------------------------------------------------------------------------------------
     /** @param {number} x @param {number} y from -1 to 1, to the right and up */
     async function pick(x, y) {
       if (!stage) return;
@@ -391,11 +586,15 @@ export default {
       app.changed();
     }
 
-    // --- the one loop that asks ----------------------------------------------------------------------------------
+    // --- the one loop that asks
+    // ----------------------------------------------------------------------------------
     async function drive() {
       if (driving || !visible) return;
       driving = true;
-      /** The next part of a large mesh, which the engine makes while this one is taken in. @type {ReturnType<typeof ask> | null} */
+      /**
+       * The next part of a large mesh, which the engine makes while this one is taken in.
+       * @type {ReturnType<typeof ask> | null}
+       */
       let ahead = null;
       try {
         while (visible || ahead) {
@@ -412,7 +611,8 @@ export default {
           } else if (newColor) {
             question = { op: "color", by: newColor };
             newColor = null;
-          } else if (goal !== null && goal !== body.at && (goal < body.at || !body.full)) question = { op: "seek", frame: goal };
+          } else if (goal !== null && goal !== body.at && (goal < body.at || !body.full))
+            question = { op: "seek", frame: goal };
           else if (body.mesh.pending > 0) question = { op: "mesh" };
           else if (newVoxel !== undefined) {
             await askVoxel();
@@ -420,7 +620,8 @@ export default {
           } else if (newCut) {
             await askCut();
             continue;
-          } else if (playing && body.at < body.frames && !body.full) question = { op: "step", frames: speed === Infinity ? 2 : 1 };
+          } else if (playing && body.at < body.frames && !body.full)
+            question = { op: "step", frames: speed === Infinity ? 2 : 1 };
           if (question === null) {
             goal = null;
             if (playing) setPlaying(false);
@@ -440,7 +641,12 @@ export default {
           const answer = await (ahead ?? ask(question));
           const arrived = performance.now();
           ahead = null;
-          if (answer.body.mesh.pending > 0 && answer.body.mesh.triangles >= LARGE && !newSettings && !newColor) {
+          if (
+            answer.body.mesh.pending > 0 &&
+            answer.body.mesh.triangles >= LARGE &&
+            !newSettings &&
+            !newColor
+          ) {
             ahead = ask({ op: "mesh" });
             // It is waited for below; until then nobody else need hear that it failed.
             ahead.catch(() => {});
@@ -454,8 +660,16 @@ export default {
           load.bytes += Object.values(answer.arrays).reduce((n, a) => n + a.byteLength, 0);
           load.done = performance.now();
           if (goal === body.at) goal = null;
-          if (slice.field !== "none" && slice.field !== "esdf" && cutAt !== body.revision && body.mesh.pending === 0 && body.bounds) await askCut();
-          if (playing && goal === null && speed < Infinity) await wait(Math.max(0, 1000 / speed - (performance.now() - started)));
+          if (
+            slice.field !== "none" &&
+            slice.field !== "esdf" &&
+            cutAt !== body.revision &&
+            body.mesh.pending === 0 &&
+            body.bounds
+          )
+            await askCut();
+          if (playing && goal === null && speed < Infinity)
+            await wait(Math.max(0, 1000 / speed - (performance.now() - started)));
         }
       } catch (error) {
         playing = false;
@@ -477,14 +691,18 @@ export default {
       }
     }
 
-    // --- the pointer ---------------------------------------------------------------------------------------------
+    // --- the pointer
+    // ---------------------------------------------------------------------------------------------
     let down = [0, 0];
     canvas.addEventListener("pointerdown", (event) => (down = [event.clientX, event.clientY]));
     canvas.addEventListener("pointerup", (event) => {
       // A drag turns the eye.
       if (event.button !== 0 || Math.hypot(event.clientX - down[0], event.clientY - down[1]) > 4) return;
       const box = canvas.getBoundingClientRect();
-      pick((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
+      pick(
+        (2 * (event.clientX - box.left)) / box.width - 1,
+        1 - (2 * (event.clientY - box.top)) / box.height,
+      );
     });
 
     const numbers = (/** @type {string | null} */ text, /** @type {number} */ n) => {
@@ -503,7 +721,11 @@ export default {
         const frameWanted = wanted !== null && Number.isInteger(Number(wanted)) ? Number(wanted) : null;
         const cutWanted = (params.get("slice") ?? "").split(",");
         const cutAtWanted = Number(cutWanted[2]);
-        if (FIELDS.some(([id]) => id === cutWanted[0]) && ["0", "1", "2"].includes(cutWanted[1]) && Number.isFinite(cutAtWanted)) {
+        if (
+          FIELDS.some(([id]) => id === cutWanted[0]) &&
+          ["0", "1", "2"].includes(cutWanted[1]) &&
+          Number.isFinite(cutAtWanted)
+        ) {
           Object.assign(slice, { field: cutWanted[0], axis: Number(cutWanted[1]), at: cutAtWanted });
           fieldChoice.value = slice.field;
           axisChoice.value = cutWanted[1];
@@ -520,11 +742,20 @@ export default {
           const set = numbers(params.get("settings"), 5);
           if (set && !all.fixed) {
             const sensor = params.get("sensor") ?? all.settings.sensor;
-            newSettings = { resolution: set[0], truncation: set[1], w_max: set[2], carve: set[3] !== 0, occupancy: set[4] !== 0, sensor };
+            newSettings = {
+              resolution: set[0],
+              truncation: set[1],
+              w_max: set[2],
+              carve: set[3] !== 0,
+              occupancy: set[4] !== 0,
+              sensor,
+            };
           }
           if (frameWanted !== null) goal = Math.max(0, Math.min(frameWanted, body.frames));
           else if (body.frames > 0) setPlaying(true);
-          app.say(all.fixed ? `${all.name}: a map that was made before.` : `${all.name}: ${body.frames} frames.`);
+          app.say(
+            all.fixed ? `${all.name}: a map that was made before.` : `${all.name}: ${body.frames} frames.`,
+          );
         } else if (frameWanted !== null) goal = Math.max(0, Math.min(frameWanted, body.frames));
         const color = params.get("color");
         // A link may come from another log, whose surface can be coloured in other ways.
@@ -547,33 +778,53 @@ export default {
         return {
           frame: String(body.at),
           color: by,
-          ...(all.fixed ? {} : { settings: [s.resolution, s.truncation, s.w_max, Number(s.carve), Number(s.occupancy)].map((v) => Number(v.toFixed(4))).join(","), sensor: s.sensor }),
-          ...(sliceNow() ? { slice: `${slice.field},${slice.axis},${/** @type {number} */ (slice.at).toFixed(3)}` } : {}),
+          ...(all.fixed
+            ? {}
+            : {
+                settings: [s.resolution, s.truncation, s.w_max, Number(s.carve), Number(s.occupancy)]
+                  .map((v) => Number(v.toFixed(4)))
+                  .join(","),
+                sensor: s.sensor,
+              }),
+          ...(sliceNow()
+            ? { slice: `${slice.field},${slice.axis},${/** @type {number} */ (slice.at).toFixed(3)}` }
+            : {}),
           ...(voxel ? { voxel: voxel.cell.join(",") } : {}),
-          ...(stage && !stage.fitted ? { eye: stage.eye().map((v) => v.toFixed(2)).join(",") } : {}),
+          ...(stage && !stage.fitted
+            ? {
+                eye: stage
+                  .eye()
+                  .map((v) => v.toFixed(2))
+                  .join(","),
+              }
+            : {}),
         };
       },
       picture() {
         const title = `${all?.name ?? "space"}, frame ${body?.at ?? 0} of ${body?.frames ?? 0}`;
-        return compose(title, [[stage ? stage.picture() : flat], ...(voxel && inspector.plot.canvas() ? [[inspector.plot.canvas()]] : [])]);
+        return compose(title, [
+          [stage ? stage.picture() : flat],
+          ...(voxel && inspector.plot.canvas() ? [[inspector.plot.canvas()]] : []),
+        ]);
       },
       key(event) {
-        if (event.key === " ") return setPlaying(!playing), true;
+        if (event.key === " ") return (setPlaying(!playing), true);
         const k = event.key.toLowerCase();
-        if (k === "n") return stepOne.click(), true;
-        if (k === "f") return see(), true;
-        if (event.key === "Home") return restart.click(), true;
-        if (event.key === "End") return setPlaying(false), seek(body?.frames ?? 0), true;
-        if (event.key === "Enter") return pick(0, 0), true;
-        if (event.key === "Escape" && voxel) return look(null), true;
+        if (k === "n") return (stepOne.click(), true);
+        if (k === "f") return (see(), true);
+        if (event.key === "Home") return (restart.click(), true);
+        if (event.key === "End") return (setPlaying(false), seek(body?.frames ?? 0), true);
+        if (event.key === "Enter") return (pick(0, 0), true);
+        if (event.key === "Escape" && voxel) return (look(null), true);
         const axis = "xyz".indexOf(k);
         if (k.length === 1 && axis >= 0 && voxel) {
           const cell = [...voxel.cell];
           cell[axis] += event.shiftKey ? -1 : 1;
-          return look(cell), true;
+          return (look(cell), true);
         }
         const move = { "[": -1, "]": 1, "{": -10, "}": 10 }[event.key];
-        if (move && slice.at !== null && slice.field !== "none") return cutThrough({ at: slice.at + move * all.resolution }), true;
+        if (move && slice.at !== null && slice.field !== "none")
+          return (cutThrough({ at: slice.at + move * all.resolution }), true);
         return stage?.key(event) ?? false;
       },
       keys: [
