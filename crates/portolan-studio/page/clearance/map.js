@@ -1,5 +1,5 @@
 // @ts-check
-import { Cells, diverging, step, STEPS, word } from "../plane/cells.js";
+import { Cells, diverging, step, STEPS, word } from "../canvas2d/cells.js";
 import { colors, rgb } from "../ui/theme.js";
 
 /** @typedef {"euclidean" | "truncated"} Which */
@@ -45,7 +45,10 @@ export class FieldImage {
     return [x, y, x + w * r, y + h * r];
   }
 
-  /** Calm hatching where the map is, and over it what is known. @type {import("../plane/plane.js").Layer} */
+  /**
+   * Calm hatching where the map is, and over it what is known.
+   * @type {import("../canvas2d/canvas2d.js").Layer}
+   */
   draw = (g, camera) => {
     const [x0, y0, x1, y1] = this.box();
     const [left, top] = camera.toScreen(x0, y1);

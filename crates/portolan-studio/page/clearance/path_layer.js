@@ -23,7 +23,7 @@ const HANDLES = 60;
 
 /**
  * @param {CanvasRenderingContext2D} g
- * @param {import("../plane/plane.js").Camera} camera
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
  * @param {import("./scene.js").Scene} s
  */
 export function drawPath(g, camera, s) {

@@ -1,5 +1,5 @@
 // @ts-check
-import { strokeLines } from "../plane/lines.js";
+import { strokeLines } from "../canvas2d/lines.js";
 import { colors } from "../ui/theme.js";
 
 /** Pixels between labels of one ring, and the least between any two. */
@@ -11,7 +11,7 @@ const NEXT = 24;
 /**
  * Rings and their distances.
  * @param {CanvasRenderingContext2D} g
- * @param {import("../plane/plane.js").Camera} camera
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
  * @param {import("./scene.js").Rings} rings
  */
 export function drawRings(g, camera, { points, starts, levels }) {

@@ -8,7 +8,7 @@
  * otherwise does beside it.
  */
 export class Still {
-  /** @param {import("../plane/plane.js").Layer[]} layers from back to front */
+  /** @param {import("../canvas2d/canvas2d.js").Layer[]} layers from back to front */
   constructor(layers) {
     this.layers = layers;
     this.canvas = new OffscreenCanvas(1, 1);
@@ -23,7 +23,7 @@ export class Still {
     this.kept = this.last = "";
   }
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   draw = (g, camera) => {
     const { width, height } = g.canvas;
     const key = [width, height, devicePixelRatio, camera.scale, ...camera.toScreen(0, 0)].join(" ");
@@ -40,7 +40,7 @@ export class Still {
     g.drawImage(this.canvas, 0, 0);
   };
 
-  /** @param {number} width @param {number} height @param {import("../plane/plane.js").Camera} camera */
+  /** @param {number} width @param {number} height @param {import("../canvas2d/canvas2d.js").Camera} camera */
   #keep(width, height, camera) {
     if (this.canvas.width !== width || this.canvas.height !== height)
       this.canvas = new OffscreenCanvas(width, height);
@@ -52,7 +52,7 @@ export class Still {
     this.#layers(g, camera);
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {import("../plane/plane.js").Camera} camera */
+  /** @param {CanvasRenderingContext2D} g @param {import("../canvas2d/canvas2d.js").Camera} camera */
   #layers(g, camera) {
     for (const layer of this.layers) {
       g.save();

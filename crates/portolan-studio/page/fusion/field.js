@@ -1,5 +1,5 @@
 // @ts-check
-import { Cells, diverging, sequential, step, word } from "../plane/cells.js";
+import { Cells, diverging, sequential, step, word } from "../canvas2d/cells.js";
 import { colors, rgb } from "../ui/theme.js";
 
 /** The page's copy of the truncated field, and its image. */

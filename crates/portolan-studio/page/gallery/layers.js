@@ -1,6 +1,6 @@
 // @ts-check
-import { Cells, STEPS, diverging, sequential, step, word } from "../plane/cells.js";
-import { strokeFaces, strokeLines } from "../plane/lines.js";
+import { Cells, STEPS, diverging, sequential, step, word } from "../canvas2d/cells.js";
+import { strokeFaces, strokeLines } from "../canvas2d/lines.js";
 import { colors, rgb } from "../ui/theme.js";
 import { Pixels } from "./pixels.js";
 
@@ -75,7 +75,7 @@ export class Picture {
 
   /**
    * Layers of each panel, from back to front.
-   * @returns {Record<string, import("../plane/plane.js").Layer[]>}
+   * @returns {Record<string, import("../canvas2d/canvas2d.js").Layer[]>}
    */
   layers() {
     const squares = this.#squares;
@@ -89,7 +89,7 @@ export class Picture {
     };
   }
 
-  /** The cells of the grid, where they are large enough. @type {import("../plane/plane.js").Layer} */
+  /** The cells of the grid, where they are large enough. @type {import("../canvas2d/canvas2d.js").Layer} */
   #squares = (g, camera) => {
     const { origin, resolution: r, shape } = this.grid;
     if (r * camera.scale < 2 * BORDERED) return;
@@ -118,7 +118,10 @@ export class Picture {
     g.stroke();
   };
 
-  /** Borders of the leaves; the larger the leaf, the stronger. @type {import("../plane/plane.js").Layer} */
+  /**
+   * Borders of the leaves; the larger the leaf, the stronger.
+   * @type {import("../canvas2d/canvas2d.js").Layer}
+   */
   #leafBorders = (g, camera) => {
     const {
       origin: [ox, oy],
@@ -153,7 +156,7 @@ export class Picture {
     });
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #truth = (g, camera) => {
     if (!this.truth) return;
     g.strokeStyle = colors().truth;
@@ -163,7 +166,7 @@ export class Picture {
     g.setLineDash([]);
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #contour = (g, camera) => {
     g.strokeStyle = colors().contour;
     g.lineWidth = Math.min(1.8, Math.max(0.7, 0.6 * this.grid.resolution * camera.scale));
@@ -171,7 +174,7 @@ export class Picture {
     strokeLines(g, camera, this.arrays.contour, this.arrays.contour_starts);
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #rings = (g, camera) => {
     g.strokeStyle = colors().ink;
     g.globalAlpha = 0.5;
@@ -180,7 +183,7 @@ export class Picture {
     g.globalAlpha = 1;
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #cloud = (g, camera) => {
     const { cloud } = this.arrays;
     const colour = word(...rgb(colors().beam), 200);

@@ -34,31 +34,13 @@ export class Explanation {
       ["bin-opacity", "ends of the light that comes"],
       ["bin-reflectance", "reflectance"],
     ]);
-    this.tables = CHANNELS.map(({ key, title, units }) => {
-      const unit = (/** @type {string} */ u) => (u ? el("span", { class: "unit" }, ` ${u}`) : "");
-      const head = el(
-        "tr",
-        {},
-        ...[
-          ["ray"],
-          ["passes", "%"],
-          ["residual", "× s"],
-          ["contrast", units[0]],
-          ["slope", units[1]],
-          ["pull", "m"],
-        ].map(([name, u]) => el("th", { scope: "col" }, name, u ? el("br") : "", unit(u ?? ""))),
-      );
-      const caption = el("caption", {}, title);
-      const body = el("tbody", { id: `terms-${key.replace("_", "-")}` });
-      const table = el("table", { class: "terms" }, caption, el("thead", {}, head), body);
-      return { key, title, unit: units[0], caption, table, body };
-    });
+    this.tables = CHANNELS.map(termTable);
     this.sums = facts([
       ["bin-pulls", "sum of pulls, ∂J/∂σ"],
       ["bin-chain", "× ∂σ/∂θ"],
       ["bin-prior", "+ prior"],
       ["bin-sum", "= ∂J/∂θ"],
-      ["bin-gradient", "the optimiser has"],
+      ["bin-gradient", "the optimizer has"],
       ["bin-phi", "by the reflectance, ∂J/∂φ"],
     ]);
     this.says = el("p", { class: "note", id: "bin-says" });
@@ -175,4 +157,24 @@ function fill(body, rows) {
 /** @param {HTMLElement} node @param {string} text */
 function set(node, text) {
   if (node.textContent !== text) node.textContent = text;
+}
+
+/** The table of a channel: a row per ray. @param {(typeof CHANNELS)[number]} channel */
+function termTable({ key, title, units }) {
+  const unit = (/** @type {string} */ u) => (u ? el("span", { class: "unit" }, ` ${u}`) : "");
+  const columns = [
+    ["ray"],
+    ["passes", "%"],
+    ["residual", "× s"],
+    ["contrast", units[0]],
+    ["slope", units[1]],
+    ["pull", "m"],
+  ];
+  const heads = columns.map(([name, u]) =>
+    el("th", { scope: "col" }, name, u ? el("br") : "", unit(u ?? "")),
+  );
+  const caption = el("caption", {}, title);
+  const body = el("tbody", { id: `terms-${key.replace("_", "-")}` });
+  const table = el("table", { class: "terms" }, caption, el("thead", {}, el("tr", {}, ...heads)), body);
+  return { key, title, unit: units[0], caption, table, body };
 }
