@@ -1,7 +1,8 @@
 // @ts-check
 
 /**
- * Asks one question at a time: while one is under way only the latest of those that come waits, the others are never
+ * Asks one question at a time: while one is under way only the latest of those that come waits, the others
+ * are never
  * asked.
  *
  * @template Q, A

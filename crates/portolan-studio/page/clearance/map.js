@@ -1,10 +1,13 @@
 // @ts-check
-import { Cells, diverging, step, STEPS, word } from "../plane/cells.js";
+import { Cells, diverging, step, STEPS, word } from "../canvas2d/cells.js";
 import { colors, rgb } from "../ui/theme.js";
 
 /** @typedef {"euclidean" | "truncated"} Which */
 
-/** Both fields of the map as an image, one of them shown. Cells of which nothing is known are left transparent. */
+/**
+ * Both fields of the map as an image, one of them shown. Cells of which nothing is known are left
+ * transparent.
+ */
 export class FieldImage {
   /** @param {{origin: [number, number], resolution: number, shape: [number, number]}} grid */
   constructor(grid) {
@@ -34,11 +37,18 @@ export class FieldImage {
 
   /** The box of the map: x0, y0, x1, y1. @returns {[number, number, number, number]} */
   box() {
-    const { origin: [x, y], resolution: r, shape: [w, h] } = this.grid;
+    const {
+      origin: [x, y],
+      resolution: r,
+      shape: [w, h],
+    } = this.grid;
     return [x, y, x + w * r, y + h * r];
   }
 
-  /** Calm hatching where the map is, and over it what is known. @type {import("../plane/plane.js").Layer} */
+  /**
+   * Calm hatching where the map is, and over it what is known.
+   * @type {import("../canvas2d/canvas2d.js").Layer}
+   */
   draw = (g, camera) => {
     const [x0, y0, x1, y1] = this.box();
     const [left, top] = camera.toScreen(x0, y1);
@@ -61,7 +71,8 @@ function opaque(ramp) {
   const out = new Uint32Array(STEPS);
   ramp.forEach((w, i) => {
     const a = (w >>> 24) / 255;
-    const mix = (/** @type {number} */ shift, /** @type {number} */ k) => Math.round(((w >>> shift) & 255) * a + paper[k] * (1 - a));
+    const mix = (/** @type {number} */ shift, /** @type {number} */ k) =>
+      Math.round(((w >>> shift) & 255) * a + paper[k] * (1 - a));
     out[i] = word(mix(0, 0), mix(8, 1), mix(16, 2), 255);
   });
   return out;

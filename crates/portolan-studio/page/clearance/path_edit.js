@@ -9,14 +9,25 @@ export const MOST = 1000;
 
 /** @typedef {[number, number]} Point */
 
-/** The waypoint that a place is on; -1: on none. @param {Point[]} points @param {Point} p @param {number} scale pixels per metre */
+/**
+ * The waypoint that a place is on; -1: on none.
+ * @param {Point[]} points
+ * @param {Point} p
+ * @param {number} scale pixels per metre
+ */
 export function waypointAt(points, p, scale) {
   // The last one lies on top.
-  for (let i = points.length - 1; i >= 0; i--) if (Math.hypot(points[i][0] - p[0], points[i][1] - p[1]) * scale <= CATCH) return i;
+  for (let i = points.length - 1; i >= 0; i--)
+    if (Math.hypot(points[i][0] - p[0], points[i][1] - p[1]) * scale <= CATCH) return i;
   return -1;
 }
 
-/** The leg that a place is on, by its first waypoint; -1: on none. @param {Point[]} points @param {Point} p @param {number} scale */
+/**
+ * The leg that a place is on, by its first waypoint; -1: on none.
+ * @param {Point[]} points
+ * @param {Point} p
+ * @param {number} scale
+ */
 function legAt(points, p, scale) {
   for (let i = points.length - 2; i >= 0; i--) {
     const [a, b] = [points[i], points[i + 1]];
@@ -28,10 +39,12 @@ function legAt(points, p, scale) {
 }
 
 /**
- * What a drag that begins at `from` does to a path: moves a waypoint, bends a leg, or (where `drawing`) draws a line on
+ * What a drag that begins at `from` does to a path: moves a waypoint, bends a leg, or (where `drawing`) draws
+ * a line on
  * from the end. Nothing: the plane pans.
  *
- * @param {{points: Point[], scale: () => number, drawing: boolean, changed: () => void}} path `points` is changed in place
+ * @param {{points: Point[], scale: () => number, drawing: boolean, changed: () => void}} path `points` is
+ *   changed in place
  * @param {Point} from
  * @returns {((p: Point, last: boolean) => void) | undefined}
  */

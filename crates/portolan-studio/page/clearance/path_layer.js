@@ -3,11 +3,15 @@ import { colors } from "../ui/theme.js";
 
 /**
  * A path as the engine has checked it: lines of its parts, and what is said of each.
- * @typedef {{points: Float32Array, starts: Uint32Array, pieces: {from: number, to: number, verdict: Verdict, cause: string | null}[]}} Checked
+ * @typedef {{points: Float32Array, starts: Uint32Array, pieces: {from: number, to: number, verdict: Verdict,
+ *   cause: string | null}[]}} Checked
  * @typedef {"certified" | "violated" | "undecided"} Verdict
  */
 
-/** Colours by the names of style.css, and dashes: the verdicts differ without colour, too. @type {Record<Verdict, {color: string, dash: number[]}>} */
+/**
+ * Colours by the names of style.css, and dashes: the verdicts differ without colour, too.
+ * @type {Record<Verdict, {color: string, dash: number[]}>}
+ */
 export const VERDICTS = {
   certified: { color: "good", dash: [] },
   violated: { color: "bad", dash: [7, 5] },
@@ -17,7 +21,11 @@ export const VERDICTS = {
 /** More waypoints than this have no handles. */
 const HANDLES = 60;
 
-/** @param {CanvasRenderingContext2D} g @param {import("../plane/plane.js").Camera} camera @param {import("./scene.js").Scene} s */
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
+ * @param {import("./scene.js").Scene} s
+ */
 export function drawPath(g, camera, s) {
   const c = colors();
   g.lineJoin = g.lineCap = "round";
@@ -25,7 +33,8 @@ export function drawPath(g, camera, s) {
   if (checked) {
     const trace = (/** @type {number} */ k) => {
       g.beginPath();
-      for (let i = checked.starts[k]; i < checked.starts[k + 1]; i++) g.lineTo(...camera.toScreen(checked.points[2 * i], checked.points[2 * i + 1]));
+      for (let i = checked.starts[k]; i < checked.starts[k + 1]; i++)
+        g.lineTo(...camera.toScreen(checked.points[2 * i], checked.points[2 * i + 1]));
     };
     // The room that the robot takes; one stroke each, so that it is even.
     for (let k = 0; k < checked.pieces.length; k++) {

@@ -2,85 +2,122 @@
 import { el, facts, slider } from "../ui/controls.js";
 import { plot } from "../ui/plot.js";
 
-/** What is said of why a path is refused. @type {Record<string, string>} */
+/** Why a path is refused, by the word of the engine. @type {Record<string, string>} */
 const CAUSES = {
   "too near": "a surface is nearer than the robot's radius",
   "unknown space": "unknown space is nearer than the robot's radius",
   "outside of the map": "it leaves the map",
   undecided: "the bounds lie on both sides of the radius",
 };
+const VERDICTS = ["certified", "violated", "undecided"];
+const PROFILE = [
+  { label: "at least", color: "accent", fill: true },
+  { label: "at most", color: "muted", dashed: true },
+  { label: "demanded, certified", color: "good", width: 3 },
+  { label: "demanded, violated", color: "bad", width: 3 },
+  { label: "demanded, not certifiable", color: "warn", width: 3 },
+];
 
-const metres = (/** @type {number | null} */ v) => (v === null ? "no bound" : `${v.toFixed(v < 10 ? 3 : 2)} m`);
+const metres = (/** @type {number | null} */ v) =>
+  v === null ? "no bound" : `${v.toFixed(v < 10 ? 3 : 2)} m`;
 
-/**
- * The path: the robot's radius, what may be done to it, what is certified, and the profile.
- * @param {{radius: number, setRadius: (v: number) => void, undo: () => void, clear: () => void, way: () => void, draw: (on: boolean) => void}} o
- */
-export function pathPanel(o) {
-  const radius = slider({
-    id: "robot-radius", label: "Robot's radius", min: 0, max: 1, step: 0.01, value: o.radius,
-    format: (v) => `${v.toFixed(2)} m`, oninput: o.setRadius,
-  });
-  const draw = el("button", { type: "button", id: "path-draw", "aria-pressed": "false", title: "Draw by dragging (D)" }, "Draw");
-  const undo = el("button", { type: "button", id: "path-undo", title: "Remove the last waypoint (Backspace)", onclick: o.undo }, "Undo");
-  const clear = el("button", { type: "button", id: "path-clear", title: "Remove all (Esc)", onclick: o.clear }, "Clear");
-  const way = el("button", { type: "button", id: "path-way", title: "The way on which the map was made (W)", onclick: o.way }, "Driven way");
-  draw.onclick = () => setDrawing(draw.getAttribute("aria-pressed") !== "true");
-  const setDrawing = (/** @type {boolean} */ on) => {
-    draw.setAttribute("aria-pressed", String(on));
-    o.draw(on);
-  };
-  const verdict = el("p", { id: "path-verdict", "aria-live": "polite" });
-  const numbers = facts([
-    ["path-length", "length"], ["path-certified", "certified"], ["path-violated", "violated"], ["path-undecided", "not certifiable"], ["path-least", "least clearance"],
-  ]);
-  const profile = plot({
-    id: "path-profile", label: "Clearance along the path: lower and upper bound, and what is demanded", x: "along the path (m)", y: "clearance (m)", height: 170,
-    series: [
-      { label: "at least", color: "accent", fill: true }, { label: "at most", color: "muted", dashed: true },
-      { label: "demanded, certified", color: "good", width: 3 }, { label: "demanded, violated", color: "bad", width: 3 }, { label: "demanded, not certifiable", color: "warn", width: 3 },
-    ],
-  });
-  const found = el("div", { class: "group", id: "path-found", hidden: true }, verdict, profile.node, numbers.node);
-  const hint = el("p", { class: "note", id: "path-hint" });
-  const node = el("div", { class: "group" }, el("h2", {}, "Path"), radius.node, el("div", { class: "row" }, draw, undo, clear, way), hint, found);
+/** The path: the robot's radius, buttons that edit it, its verdict, and the profile of its clearance. */
+export class PathPanel {
+  /**
+   * @param {{radius: number, setRadius: (v: number) => void, undo: () => void, clear: () => void, drive: ()
+   *   => void,
+   *   draw: (on: boolean) => void}} o `drive`: takes the driven way
+   */
+  constructor(o) {
+    this.radius = slider({
+      id: "robot-radius",
+      label: "Robot's radius",
+      min: 0,
+      max: 1,
+      step: 0.01,
+      value: o.radius,
+      format: (v) => `${v.toFixed(2)} m`,
+      oninput: o.setRadius,
+    });
+    const button = (
+      /** @type {string} */ id,
+      /** @type {string} */ text,
+      /** @type {string} */ title,
+      /** @type {() => void} */ onclick,
+    ) => el("button", { type: "button", id: `path-${id}`, title, onclick }, text);
+    this.draw = button("draw", "Draw", "Draw by dragging (D)", () => {
+      const on = this.draw.getAttribute("aria-pressed") !== "true";
+      this.draw.setAttribute("aria-pressed", String(on));
+      o.draw(on);
+    });
+    this.draw.setAttribute("aria-pressed", "false");
+    this.undo = button("undo", "Undo", "Remove the last waypoint (Backspace)", o.undo);
+    this.clear = button("clear", "Clear", "Remove all (Esc)", o.clear);
+    this.drive = button("way", "Driven way", "The way on which the map was made (W)", o.drive);
+    this.hint = el("p", { class: "note", id: "path-hint" });
+    this.verdict = el("p", { id: "path-verdict", "aria-live": "polite" });
+    this.plot = plot({
+      id: "path-profile",
+      label: "Clearance along the path: lower and upper bound, and what is demanded",
+      x: "along the path (m)",
+      y: "clearance (m)",
+      height: 170,
+      series: PROFILE,
+    });
+    this.facts = facts([
+      ["path-length", "length"],
+      ["path-certified", "certified"],
+      ["path-violated", "violated"],
+      ["path-undecided", "not certifiable"],
+      ["path-least", "least clearance"],
+    ]);
+    const result = { class: "group", id: "path-found", hidden: true };
+    this.result = el("div", result, this.verdict, this.plot.node, this.facts.node);
+    const buttons = el("div", { class: "row" }, this.draw, this.undo, this.clear, this.drive);
+    const heading = el("h2", {}, "Path");
+    this.node = el("div", { class: "group" }, heading, this.radius.node, buttons, this.hint, this.result);
+    this.count(0);
+  }
 
-  return {
-    node, radius, setDrawing, plot: profile,
-    toggleDrawing: () => draw.click(),
-    /** How many waypoints there are. @param {number} n */
-    count(n) {
-      undo.disabled = clear.disabled = n === 0;
-      hint.textContent = n === 0 ? "Click to set waypoints, or press Enter where the probe is." : n === 1 ? "One waypoint; a second makes a path." : `${n} waypoints. Drag them, or a leg to bend it.`;
-      if (n === 0) found.hidden = true;
-    },
-    /** @param {import("../engine/engine.js").Answer} answer */
-    show({ body, arrays }) {
-      found.hidden = false;
-      const { check, lengths, pieces } = body;
-      verdict.className = check.certified ? "verdict good" : check.cause === "too near" ? "verdict bad" : "verdict warn";
-      verdict.textContent = check.certified
-        ? `Certified: no point of it comes nearer than ${body.clearance.toFixed(2)} m.`
-        : `Not certified from ${check.from.toFixed(2)} m on: ${CAUSES[check.cause] ?? check.cause}.`;
-      numbers.set({
-        "path-length": metres(body.length), "path-certified": metres(lengths.certified), "path-violated": metres(lengths.violated), "path-undecided": metres(lengths.undecided),
-        "path-least": check.certified ? `${metres(check.lower)} to ${metres(check.upper)}` : "–",
-      });
-      const at = Array.from(arrays.at);
-      const finite = (/** @type {number} */ v) => (Number.isNaN(v) ? null : v);
-      /** @type {(number | null)[][]} */
-      const demand = [[], [], []];
-      const names = ["certified", "violated", "undecided"];
-      let k = 0;
-      for (const s of at) {
-        while (k + 1 < pieces.length && s >= pieces[k].to) k++;
-        for (const [i, name] of names.entries()) demand[i].push(pieces[k].verdict === name ? body.clearance : null);
-      }
-      profile.set([at, Array.from(arrays.lower, finite), Array.from(arrays.upper, finite), ...demand]);
-    },
-    /** A path that cannot be checked. */
-    refused() {
-      found.hidden = true;
-    },
-  };
+  /** How many waypoints there are. @param {number} n */
+  count(n) {
+    this.undo.disabled = this.clear.disabled = n === 0;
+    if (n === 0) this.hint.textContent = "Click to set waypoints, or press Enter where the probe is.";
+    else if (n === 1) this.hint.textContent = "One waypoint; a second makes a path.";
+    else this.hint.textContent = `${n} waypoints. Drag them, or a leg to bend it.`;
+    if (n === 0) this.result.hidden = true;
+  }
+
+  /** @param {import("../engine/engine.js").Answer} answer */
+  show({ body, arrays }) {
+    this.result.hidden = false;
+    const { check, lengths } = body;
+    const bad = check.cause === "too near" ? "bad" : "warn";
+    this.verdict.className = `verdict ${check.certified ? "good" : bad}`;
+    this.verdict.textContent = check.certified
+      ? `Certified: no point of it comes nearer than ${body.clearance.toFixed(2)} m.`
+      : `Not certified from ${check.from.toFixed(2)} m on: ${CAUSES[check.cause] ?? check.cause}.`;
+    this.facts.set({
+      "path-length": metres(body.length),
+      "path-certified": metres(lengths.certified),
+      "path-violated": metres(lengths.violated),
+      "path-undecided": metres(lengths.undecided),
+      "path-least": check.certified ? `${metres(check.lower)} to ${metres(check.upper)}` : "–",
+    });
+    this.#showProfile(body, arrays);
+  }
+
+  /** @param {any} body @param {any} arrays */
+  #showProfile({ pieces, clearance }, { at, lower, upper }) {
+    const finite = (/** @type {number} */ v) => (Number.isNaN(v) ? null : v);
+    /** @type {(number | null)[][]} */
+    const demand = VERDICTS.map(() => []);
+    let k = 0;
+    for (const s of at) {
+      while (k + 1 < pieces.length && s >= pieces[k].to) k++;
+      for (const [i, verdict] of VERDICTS.entries())
+        demand[i].push(pieces[k].verdict === verdict ? clearance : null);
+    }
+    this.plot.set([Array.from(at), Array.from(lower, finite), Array.from(upper, finite), ...demand]);
+  }
 }

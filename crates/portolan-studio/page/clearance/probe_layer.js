@@ -3,13 +3,15 @@ import { colors } from "../ui/theme.js";
 
 /** Gradients shorter than this are dots: there is no direction in them. */
 const NONE = 0.05;
-/** Longer ones are drawn as if they were of this length: projective distances can grow faster than one walks. */
+/**
+ * Longer ones are drawn as if they were of this length: projective distances can grow faster than one walks.
+ */
 const MOST = 1.3;
 
 /**
  * Arrows of one field, as long as the gradients are: one of length 1 takes most of its square.
  * @param {CanvasRenderingContext2D} g
- * @param {import("../plane/plane.js").Camera} camera
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
  * @param {import("./scene.js").Arrows} arrows
  */
 export function drawArrows(g, camera, { points, gradients, spacing }) {
@@ -36,7 +38,15 @@ export function drawArrows(g, camera, { points, gradients, spacing }) {
   g.globalAlpha = 1;
 }
 
-/** Adds an arrow from x, y by dx, dy. @param {CanvasRenderingContext2D} g @param {number} x @param {number} y @param {number} dx @param {number} dy @param {number} head */
+/**
+ * Adds an arrow from x, y by dx, dy.
+ * @param {CanvasRenderingContext2D} g
+ * @param {number} x
+ * @param {number} y
+ * @param {number} dx
+ * @param {number} dy
+ * @param {number} head
+ */
 function arrow(g, x, y, dx, dy, head) {
   const length = Math.hypot(dx, dy);
   const [ux, uy] = [dx / length, dy / length];
@@ -48,18 +58,20 @@ function arrow(g, x, y, dx, dy, head) {
 }
 
 /**
- * The probe: the circle in which nothing is, the one in which something is, and the gradient of the field that is shown.
+ * The probe: the circle in which nothing is, the one in which something is, and the gradient of the field
+ * that is shown.
  * @param {CanvasRenderingContext2D} g
- * @param {import("../plane/plane.js").Camera} camera
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
  * @param {import("./scene.js").Scene} s
  */
 export function drawProbe(g, camera, s) {
   if (!s.probe) return;
   const c = colors();
   const [x, y] = camera.toScreen(...s.probe);
-  const said = s.said && s.said.at[0] === s.probe[0] && s.said.at[1] === s.probe[1] ? s.said : undefined;
+  const answer =
+    s.answer && s.answer.at[0] === s.probe[0] && s.answer.at[1] === s.probe[1] ? s.answer : undefined;
   // While the answer for this place is under way, that of the last one is drawn where it was given.
-  const last = said ?? s.said;
+  const last = answer ?? s.answer;
   if (last) {
     const [cx, cy] = camera.toScreen(last.at[0], last.at[1]);
     const { lower, upper, status } = last.euclidean;

@@ -3,13 +3,20 @@ import { el } from "../ui/controls.js";
 
 /** @typedef {import("./map.js").Which} Which */
 
-/** Rows of the table: id, label, and what a field's answer says there. @type {[string, string, (f: any) => string][]} */
+/**
+ * Rows of the table: id, label, and what a field's answer says there.
+ * @type {[string, string, (f: any) => string][]}
+ */
 const ROWS = [
   ["status", "status", (f) => f.status],
   ["distance", "distance (m)", (f) => metres(f.distance)],
   ["lower", "at least (m)", (f) => metres(f.lower)],
   ["upper", "at most (m)", (f) => (f.upper === null && f.lower > 0 ? "no bound" : metres(f.upper))],
-  ["gradient", "gradient", (f) => (f.gradient ? f.gradient.map((/** @type {number} */ v) => v.toFixed(3)).join(", ") : "–")],
+  [
+    "gradient",
+    "gradient",
+    (f) => (f.gradient ? f.gradient.map((/** @type {number} */ v) => v.toFixed(3)).join(", ") : "–"),
+  ],
   ["norm", "‖∇d‖", (f) => (typeof f.norm === "number" ? f.norm.toFixed(3) : "–")],
 ];
 
@@ -19,19 +26,44 @@ const metres = (/** @type {unknown} */ v) => (typeof v === "number" ? v.toFixed(
 export function probePanel() {
   const column = (/** @type {Which} */ which) => ROWS.map(([id]) => el("td", { id: `probe-${which}-${id}` }));
   const cells = { euclidean: column("euclidean"), truncated: column("truncated") };
-  const heads = { euclidean: el("th", { scope: "col" }, "Euclidean"), truncated: el("th", { scope: "col" }, "Truncated") };
+  const heads = {
+    euclidean: el("th", { scope: "col" }, "Euclidean"),
+    truncated: el("th", { scope: "col" }, "Truncated"),
+  };
   const at = el("output", { id: "probe-at" }, "–");
-  const row = el("code", { id: "probe-row", class: "answer", tabindex: 0, "aria-label": "The row that query prints" });
+  const row = el("code", {
+    id: "probe-row",
+    class: "answer",
+    tabindex: 0,
+    "aria-label": "The row that query prints",
+  });
   const command = el("span", { id: "probe-command" });
   const table = el(
-    "table", { id: "probe-table" },
+    "table",
+    { id: "probe-table" },
     el("thead", {}, el("tr", {}, el("td", {}), heads.euclidean, heads.truncated)),
-    el("tbody", {}, ...ROWS.map(([, label], i) => el("tr", {}, el("th", { scope: "row" }, label), cells.euclidean[i], cells.truncated[i]))),
+    el(
+      "tbody",
+      {},
+      ...ROWS.map(([, label], i) =>
+        el("tr", {}, el("th", { scope: "row" }, label), cells.euclidean[i], cells.truncated[i]),
+      ),
+    ),
   );
   const note = el("p", { class: "note", id: "probe-note" });
   const node = el(
-    "div", { class: "group" }, el("div", { class: "row" }, el("h2", {}, "Probe"), at), table, note,
-    el("details", { id: "probe-query" }, el("summary", {}, "As ", el("code", {}, "query"), " prints it"), el("p", { class: "note" }, "status, occupancy, distance, lower, upper and gradient, with ", command), row),
+    "div",
+    { class: "group" },
+    el("div", { class: "row" }, el("h2", {}, "Probe"), at),
+    table,
+    note,
+    el(
+      "details",
+      { id: "probe-query" },
+      el("summary", {}, "As ", el("code", {}, "query"), " prints it"),
+      el("p", { class: "note" }, "status, occupancy, distance, lower, upper and gradient, with ", command),
+      row,
+    ),
   );
   return {
     node,
@@ -46,12 +78,16 @@ export function probePanel() {
         cells[which][0].dataset.status = said[which].status;
       }
       put(row, said.row);
-      put(note, `At least and at most are certified, to the nearest surface${unknown === "pessimistic" ? " or unknown cell" : ""}; the distance is interpolated.`);
+      put(
+        note,
+        `At least and at most are certified, to the nearest surface${unknown === "pessimistic" ? " or unknown cell" : ""}; the distance is interpolated.`,
+      );
       put(command, `--unknown ${unknown}`);
     },
     /** Which field is on the picture. @param {Which} which */
     mark(which) {
-      for (const w of /** @type {Which[]} */ (["euclidean", "truncated"])) heads[w].classList.toggle("shown", w === which);
+      for (const w of /** @type {Which[]} */ (["euclidean", "truncated"]))
+        heads[w].classList.toggle("shown", w === which);
     },
   };
 }

@@ -1,5 +1,5 @@
 // @ts-check
-import { strokeLines } from "../plane/lines.js";
+import { strokeLines } from "../canvas2d/lines.js";
 import { colors } from "../ui/theme.js";
 
 /** Pixels between labels of one ring, and the least between any two. */
@@ -11,7 +11,7 @@ const NEXT = 24;
 /**
  * Rings and their distances.
  * @param {CanvasRenderingContext2D} g
- * @param {import("../plane/plane.js").Camera} camera
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
  * @param {import("./scene.js").Rings} rings
  */
 export function drawRings(g, camera, { points, starts, levels }) {
@@ -23,11 +23,13 @@ export function drawRings(g, camera, { points, starts, levels }) {
   const [width, height] = [g.canvas.width / devicePixelRatio, g.canvas.height / devicePixelRatio];
   /** Labels that are there, by squares of the least distance. @type {Map<number, [number, number][]>} */
   const placed = new Map();
-  const square = (/** @type {number} */ x, /** @type {number} */ y) => Math.floor(x / APART) * 65536 + Math.floor(y / APART);
+  const square = (/** @type {number} */ x, /** @type {number} */ y) =>
+    Math.floor(x / APART) * 65536 + Math.floor(y / APART);
   const room = (/** @type {number} */ x, /** @type {number} */ y) => {
     for (const dx of [-APART, 0, APART])
       for (const dy of [-APART, 0, APART])
-        for (const [a, b] of placed.get(square(x + dx, y + dy)) ?? []) if (Math.hypot(a - x, b - y) < APART) return false;
+        for (const [a, b] of placed.get(square(x + dx, y + dy)) ?? [])
+          if (Math.hypot(a - x, b - y) < APART) return false;
     return true;
   };
   const [ox, oy] = camera.toScreen(0, 0);
@@ -57,7 +59,13 @@ export function drawRings(g, camera, { points, starts, levels }) {
 /** Labels as pictures: a text with a halo takes long to draw. @type {Map<string, OffscreenCanvas>} */
 const pictures = new Map();
 
-/** @param {CanvasRenderingContext2D} g @param {string} text @param {number} x @param {number} y @param {number} angle */
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {string} text
+ * @param {number} x
+ * @param {number} y
+ * @param {number} angle
+ */
 function label(g, text, x, y, angle) {
   const [w, h] = [56, 18];
   const { paper, ink } = colors();

@@ -1,12 +1,12 @@
 // @ts-check
-import { strokeFaces, strokeLines } from "../plane/lines.js";
+import { strokeFaces, strokeLines } from "../canvas2d/lines.js";
 import { colors } from "../ui/theme.js";
 import { drawPath } from "./path_layer.js";
 import { drawArrows, drawProbe } from "./probe_layer.js";
 import { drawRings } from "./rings_layer.js";
 
 /**
- * What is drawn, as the last answers told it.
+ * What is drawn: the last answers, and what is chosen on the canvas.
  * @typedef {object} Scene
  * @property {import("./map.js").FieldImage | undefined} image
  * @property {Float32Array} contour
@@ -15,7 +15,7 @@ import { drawRings } from "./rings_layer.js";
  * @property {Rings | undefined} rings
  * @property {Arrows | undefined} arrows
  * @property {[number, number] | undefined} probe where it is (world)
- * @property {any} said what was answered there
+ * @property {any} answer what the engine answered there
  * @property {[number, number][]} waypoints
  * @property {import("./path_layer.js").Checked | undefined} checked the path as it was answered last
  * @property {number} radius of the robot (metres)
@@ -25,7 +25,29 @@ import { drawRings } from "./rings_layer.js";
  * @typedef {{points: Float32Array, gradients: Float32Array, spacing: number}} Arrows
  */
 
-/** What stays while the probe moves, from back to front. @param {Scene} s @returns {import("../plane/plane.js").Layer[]} */
+/** Nothing yet. @returns {Scene} */
+export function newScene() {
+  return {
+    image: undefined,
+    contour: new Float32Array(),
+    lines: new Uint32Array([0]),
+    truth: null,
+    rings: undefined,
+    arrows: undefined,
+    probe: undefined,
+    answer: undefined,
+    waypoints: [],
+    checked: undefined,
+    radius: 0.2,
+    visible: { rings: true, arrows: true, contour: true, truth: false },
+  };
+}
+
+/**
+ * What stays while the probe moves, from back to front.
+ * @param {Scene} s
+ * @returns {import("../canvas2d/canvas2d.js").Layer[]}
+ */
 export function stillLayers(s) {
   return [
     (g, camera) => s.image?.draw(g, camera),
@@ -48,7 +70,7 @@ export function stillLayers(s) {
   ];
 }
 
-/** What moves, over it. @param {Scene} s @returns {import("../plane/plane.js").Layer[]} */
+/** What moves, over it. @param {Scene} s @returns {import("../canvas2d/canvas2d.js").Layer[]} */
 export function movingLayers(s) {
   return [(g, camera) => drawPath(g, camera, s), (g, camera) => drawProbe(g, camera, s)];
 }

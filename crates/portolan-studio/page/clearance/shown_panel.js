@@ -1,5 +1,6 @@
 // @ts-check
 import { choice, el, legend, toggle } from "../ui/controls.js";
+import { pair } from "./pair.js";
 
 /**
  * @typedef {import("./map.js").Which} Which
@@ -8,110 +9,134 @@ import { choice, el, legend, toggle } from "../ui/controls.js";
 
 /** Metres between rings. */
 const SPACINGS = ["0.05", "0.1", "0.25", "0.5", "1"];
+const TOGGLES = { rings: "Level rings", arrows: "Gradients", contour: "Contour", truth: "Truth" };
+const RAMP = "background: linear-gradient(90deg, var(--negative), var(--paper), var(--positive))";
 
-/**
- * What is shown, and what unknown space is to mean.
- * @param {{visible: Record<string, boolean>, field: (which: Which) => void, unknown: () => void, spacing: () => void, toggled: () => void}} o
- */
-export function shownPanel(o) {
-  const field = pair("field", "Field", [["euclidean", "Euclidean"], ["truncated", "Truncated"]], "euclidean", (v) => o.field(/** @type {Which} */ (v)));
-  const unknown = pair("unknown", "Unknown space", [["pessimistic", "obstacle"], ["optimistic", "no obstacle"]], "pessimistic", o.unknown);
-  const spacing = choice({
-    id: "ring-spacing", label: "Rings every", value: "0.25", options: SPACINGS.map((v) => [v, `${v} m`]), onchange: o.spacing,
-  });
-  const toggles = Object.fromEntries(
-    Object.entries({ rings: "Level rings", arrows: "Gradients", contour: "Contour", truth: "Truth" }).map(([what, label]) => [
+/** What is shown, and how unknown space counts. */
+export class ShownPanel {
+  /**
+   * @param {{visible: Record<string, boolean>, field: (which: Which) => void, unknown: () => void, spacing:
+   *   () => void,
+   *   toggled: () => void}} o
+   */
+  constructor(o) {
+    this.visible = o.visible;
+    this.fieldPair = pair({
+      id: "field",
+      label: "Field",
+      options: [
+        ["euclidean", "Euclidean"],
+        ["truncated", "Truncated"],
+      ],
+      value: "euclidean",
+      onchange: (v) => o.field(/** @type {Which} */ (v)),
+    });
+    this.unknownPair = pair({
+      id: "unknown",
+      label: "Unknown space",
+      options: [
+        ["pessimistic", "obstacle"],
+        ["optimistic", "no obstacle"],
+      ],
+      value: "pessimistic",
+      onchange: o.unknown,
+    });
+    this.spacingChoice = choice({
+      id: "ring-spacing",
+      label: "Rings every",
+      value: "0.25",
+      options: SPACINGS.map((v) => [v, `${v} m`]),
+      onchange: o.spacing,
+    });
+    const changed = (/** @type {string} */ what, /** @type {boolean} */ on) => {
+      o.visible[what] = on;
+      if (what === "rings" && on) o.spacing();
+      o.toggled();
+    };
+    const toggles = Object.entries(TOGGLES).map(([what, label]) => [
       what,
-      toggle({ id: `clearance-${what}`, label, value: o.visible[what], onchange: (v) => ((o.visible[what] = v), what === "rings" && v && o.spacing(), o.toggled()) }),
-    ]),
-  );
-  const rings = el("p", { class: "note", id: "ring-note" });
-  const ramp = el("i", { class: "ramp", "aria-hidden": "true" });
-  ramp.style.background = "linear-gradient(90deg, var(--negative), var(--paper), var(--positive))";
-  const reach = el("span", { id: "ramp-reach" });
-  const strip = el(
-    "div", { class: "strip" },
-    el("ul", { class: "legend", "aria-label": "Legend" }, el("li", {}, ramp, reach), ...legend([
-      { color: "contour", text: "contour" }, { color: "accent", text: "nothing is nearer" }, { color: "good", text: "certified" }, { color: "bad", text: "violated", dashed: true }, { color: "warn", text: "not certifiable", dashed: true },
-    ]).children, el("li", {}, el("i", { class: "hatch", "aria-hidden": "true" }), "unknown")),
-  );
-  const node = el(
-    "div", { class: "group" }, field.node, unknown.node, spacing.node, rings,
-    el("div", { class: "toggles" }, ...Object.values(toggles).map((t) => t.node)),
-  );
+      toggle({ id: `clearance-${what}`, label, value: o.visible[what], onchange: (on) => changed(what, on) }),
+    ]);
+    /** @type {Record<string, ReturnType<typeof toggle>>} */
+    this.toggles = Object.fromEntries(toggles);
+    this.ringNote = el("p", { class: "note", id: "ring-note" });
+    this.reach = el("span", { id: "ramp-reach" });
+    this.strip = el("div", { class: "strip" }, this.#legend());
+    const shown = el("div", { class: "toggles" }, ...Object.values(this.toggles).map((t) => t.node));
+    const controls = [this.fieldPair, this.unknownPair, this.spacingChoice].map((c) => c.node);
+    this.node = el("div", { class: "group" }, ...controls, this.ringNote, shown);
+  }
 
-  return {
-    node, strip,
-    get field() {
-      return /** @type {Which} */ (field.value);
-    },
-    get unknown() {
-      return /** @type {Unknown} */ (unknown.value);
-    },
-    get spacing() {
-      return Number(spacing.value);
-    },
-    toggleField: () => field.next(),
-    toggleUnknown: () => unknown.next(),
-    /** @param {string} what */
-    toggle(what) {
-      document.getElementById(`clearance-${what}`)?.click();
-    },
-    /** @param {any} body @param {number} length at the ends of the ramp */
-    tellMap(body, length) {
-      reach.textContent = `−${length.toFixed(2)} to ${length.toFixed(2)} m`;
-      toggles.truth.node.hidden = body.truth === null;
-    },
-    /** @param {any} body of the rings @param {number} truncation */
-    tellRings(body, truncation) {
-      const first = Number(spacing.value);
-      const wider = body.spacing > first ? `Drawn every ${body.spacing} m: closer they would be too many. ` : "";
-      const none = body.largest < body.spacing ? `No ring: the field ends ${truncation} m from the surface. ` : field.value === "truncated" ? `The rings end where the field does, ${truncation} m from the surface. ` : "";
-      rings.textContent = wider + none;
-      rings.hidden = rings.textContent === "";
-    },
-    /** @returns {Record<string, string>} */
-    state: () => ({
-      field: field.value, unknown: unknown.value, rings: o.visible.rings ? spacing.value : "none",
-      ...(o.visible.arrows ? {} : { arrows: "none" }), ...(o.visible.contour ? {} : { contour: "none" }), ...(o.visible.truth ? { truth: "shown" } : {}),
-    }),
-    /** @param {URLSearchParams} state */
-    restore(state) {
-      field.value = state.get("field") ?? field.value;
-      unknown.value = state.get("unknown") ?? unknown.value;
-      const every = state.get("rings");
-      if (every && SPACINGS.includes(every)) spacing.value = every;
-      for (const what of ["rings", "arrows", "contour"]) if (state.get(what) === "none") toggles[what].value = o.visible[what] = false;
-      if (state.get("truth") === "shown") toggles.truth.value = o.visible.truth = true;
-    },
-  };
-}
+  #legend() {
+    const lines = legend([
+      { color: "contour", text: "contour" },
+      { color: "accent", text: "nothing is nearer" },
+      { color: "good", text: "certified" },
+      { color: "bad", text: "violated", dashed: true },
+      { color: "warn", text: "not certifiable", dashed: true },
+    ]);
+    const ramp = el("i", { class: "ramp", style: RAMP, "aria-hidden": "true" });
+    const unknown = el("li", {}, el("i", { class: "hatch", "aria-hidden": "true" }), "unknown");
+    const items = [el("li", {}, ramp, this.reach), ...lines.children, unknown];
+    return el("ul", { class: "legend", "aria-label": "Legend" }, ...items);
+  }
 
-/**
- * Two buttons of which one is pressed.
- * @param {string} id
- * @param {string} label
- * @param {[string, string][]} options
- * @param {string} value
- * @param {(v: string) => void} onchange
- */
-function pair(id, label, options, value, onchange) {
-  const buttons = options.map(([v, text]) => el("button", { type: "button", id: `${id}-${v}`, "aria-pressed": String(v === value), onclick: () => choose(v, true) }, text));
-  const choose = (/** @type {string} */ v, /** @type {boolean} */ tell) => {
-    if (v === value || !options.some(([o]) => o === v)) return;
-    value = v;
-    for (const [i, b] of buttons.entries()) b.setAttribute("aria-pressed", String(options[i][0] === v));
-    if (tell) onchange(v);
-  };
-  const name = el("span", { id: `${id}-label` }, label);
-  return {
-    node: el("div", { class: "row" }, name, el("div", { class: "pair", role: "group", "aria-labelledby": `${id}-label` }, ...buttons)),
-    get value() {
-      return value;
-    },
-    set value(v) {
-      choose(v, false);
-    },
-    next: () => choose(options[(options.findIndex(([o]) => o === value) + 1) % options.length][0], true),
-  };
+  get field() {
+    return /** @type {Which} */ (this.fieldPair.value);
+  }
+
+  get unknown() {
+    return /** @type {Unknown} */ (this.unknownPair.value);
+  }
+
+  get spacing() {
+    return Number(this.spacingChoice.value);
+  }
+
+  /** @param {string} what */
+  toggle(what) {
+    document.getElementById(`clearance-${what}`)?.click();
+  }
+
+  /** @param {any} body of a map @param {number} length at the ends of the ramp (metres) */
+  showMap(body, length) {
+    this.reach.textContent = `−${length.toFixed(2)} to ${length.toFixed(2)} m`;
+    this.toggles.truth.node.hidden = body.truth === null;
+  }
+
+  /** @param {any} body of the rings @param {number} truncation */
+  showRings({ spacing, largest }, truncation) {
+    const wider = spacing > this.spacing ? `Drawn every ${spacing} m: closer they would be too many. ` : "";
+    const end = `the field ends ${truncation} m from the surface.`;
+    let ends = "";
+    if (largest < spacing) ends = `No ring: ${end}`;
+    else if (this.field === "truncated") ends = `The last ring is where ${end}`;
+    this.ringNote.textContent = wider + ends;
+    this.ringNote.hidden = this.ringNote.textContent === "";
+  }
+
+  /** @returns {Record<string, string>} */
+  link() {
+    const { rings, arrows, contour, truth } = this.visible;
+    return {
+      field: this.field,
+      unknown: this.unknown,
+      rings: rings ? this.spacingChoice.value : "none",
+      ...(arrows ? {} : { arrows: "none" }),
+      ...(contour ? {} : { contour: "none" }),
+      ...(truth ? { truth: "shown" } : {}),
+    };
+  }
+
+  /** @param {URLSearchParams} link */
+  restore(link) {
+    this.fieldPair.value = link.get("field") ?? this.field;
+    this.unknownPair.value = link.get("unknown") ?? this.unknown;
+    const every = link.get("rings");
+    if (every && SPACINGS.includes(every)) this.spacingChoice.value = every;
+    const set = (/** @type {string} */ what, /** @type {boolean} */ on) =>
+      (this.toggles[what].value = this.visible[what] = on);
+    for (const what of ["rings", "arrows", "contour"]) if (link.get(what) === "none") set(what, false);
+    if (link.get("truth") === "shown") set("truth", true);
+  }
 }

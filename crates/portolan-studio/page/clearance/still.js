@@ -1,12 +1,14 @@
 // @ts-check
 
 /**
- * Layers that stay as they are while the probe moves: kept as a picture once the camera rests, and copied until it moves or
- * what they show changes. While it moves they are drawn as they are: a picture costs the main thread what a browser
+ * Layers that stay as they are while the probe moves: kept as a picture once the camera rests, and copied
+ * until it moves or
+ * what they show changes. While it moves they are drawn as they are: a picture costs the main thread what a
+ * browser
  * otherwise does beside it.
  */
 export class Still {
-  /** @param {import("../plane/plane.js").Layer[]} layers from back to front */
+  /** @param {import("../canvas2d/canvas2d.js").Layer[]} layers from back to front */
   constructor(layers) {
     this.layers = layers;
     this.canvas = new OffscreenCanvas(1, 1);
@@ -21,7 +23,7 @@ export class Still {
     this.kept = this.last = "";
   }
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   draw = (g, camera) => {
     const { width, height } = g.canvas;
     const key = [width, height, devicePixelRatio, camera.scale, ...camera.toScreen(0, 0)].join(" ");
@@ -38,9 +40,10 @@ export class Still {
     g.drawImage(this.canvas, 0, 0);
   };
 
-  /** @param {number} width @param {number} height @param {import("../plane/plane.js").Camera} camera */
+  /** @param {number} width @param {number} height @param {import("../canvas2d/canvas2d.js").Camera} camera */
   #keep(width, height, camera) {
-    if (this.canvas.width !== width || this.canvas.height !== height) this.canvas = new OffscreenCanvas(width, height);
+    if (this.canvas.width !== width || this.canvas.height !== height)
+      this.canvas = new OffscreenCanvas(width, height);
     // The layers use what both kinds of canvas have.
     const g = /** @type {CanvasRenderingContext2D} */ (/** @type {unknown} */ (this.canvas.getContext("2d")));
     g.setTransform(1, 0, 0, 1, 0, 0);
@@ -49,7 +52,7 @@ export class Still {
     this.#layers(g, camera);
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {import("../plane/plane.js").Camera} camera */
+  /** @param {CanvasRenderingContext2D} g @param {import("../canvas2d/canvas2d.js").Camera} camera */
   #layers(g, camera) {
     for (const layer of this.layers) {
       g.save();

@@ -1,6 +1,7 @@
 // @ts-check
 /**
- * The one thing that the page knows of what computes: it is asked and it answers. Today a socket to the server stands
+ * The one thing that the page knows of what computes: it is asked and it answers. Today a socket to the
+ * server stands
  * behind it; the library compiled to WebAssembly can.
  *
  * @typedef {Float32Array | Uint32Array | Uint16Array | Uint8Array | Int8Array} Values
@@ -10,8 +11,10 @@
  * @property {Record<string, Values>} arrays what comes in bulk
  *
  * @typedef {object} Engine
- * @property {(view: string, ask: object) => Promise<Answer>} ask rejects with an Error whose message is for people
- * @property {(listener: (why: string) => void) => void} onClosed called once, when there will be no more answers
+ * @property {(view: string, ask: object) => Promise<Answer>} ask rejects with an Error whose message is for
+ *   people
+ * @property {(listener: (why: string) => void) => void} onClosed called once, when there will be no more
+ *   answers
  */
 
 /** @type {Record<string, any>} */

@@ -44,7 +44,8 @@ export function connect(url = `ws://${location.host}/engine`) {
     socket.onopen = () =>
       resolve({
         ask(view, ask) {
-          if (socket.readyState !== WebSocket.OPEN) return Promise.reject(new Error("the studio has stopped; start it again and reload this page"));
+          if (socket.readyState !== WebSocket.OPEN)
+            return Promise.reject(new Error("the studio has stopped; start it again and reload this page"));
           const id = next++;
           return new Promise((resolve, reject) => {
             waiting.set(id, { resolve, reject });

@@ -1,5 +1,5 @@
 // @ts-check
-import { Cells, diverging, sequential, step, word } from "../plane/cells.js";
+import { Cells, diverging, sequential, step, word } from "../canvas2d/cells.js";
 import { colors, rgb } from "../ui/theme.js";
 
 /** The page's copy of the truncated field, and its image. */
@@ -24,7 +24,11 @@ export class Field {
     this.unknown = 0;
   }
 
-  /** Colours of the theme; distances up to the truncation, weights up to the clamp. @param {number} truncation @param {number} wMax */
+  /**
+   * Colours of the theme; distances up to the truncation, weights up to the clamp.
+   * @param {number} truncation
+   * @param {number} wMax
+   */
   setColors(truncation, wMax) {
     const c = colors();
     this.truncation = truncation;
@@ -43,7 +47,12 @@ export class Field {
     this.cells.touch(0, this.grid.shape[1]);
   }
 
-  /** Takes blocks in. @param {Uint32Array} blocks @param {Float32Array} distance @param {Float32Array} weight */
+  /**
+   * Takes blocks in.
+   * @param {Uint32Array} blocks
+   * @param {Float32Array} distance
+   * @param {Float32Array} weight
+   */
   apply(blocks, distance, weight) {
     const { block: b, grid } = this;
     const [w, h] = grid.shape;

@@ -9,6 +9,8 @@ import { plot } from "../ui/plot.js";
 
 const metres = (/** @type {number | null} */ v) => (v === null ? "unknown" : `${v.toFixed(6)} m`);
 
+const HINT = "Click a cell of the field, or press Enter for the one in the middle.";
+
 /** One cell's filter, step by step, and its history. */
 export class Inspector {
   /** @param {{move: (dx: number, dy: number) => void, close: () => void}} o */
@@ -19,12 +21,25 @@ export class Inspector {
     this.picked = undefined;
     /** @type {any} */
     this.decay = null;
-    this.title = el("p", { id: "cell" }, "Click a cell of the field, or press Enter for the one in the middle.");
+    this.title = el("p", { id: "cell" }, HINT);
     this.facts = facts([
-      ["cell-before", "prior D"], ["cell-observed", "observation d"], ["cell-gain", "gain K = w / (W + w)"],
-      ["cell-after", "posterior D = D + K (d − D)"], ["cell-weight-before", "weight W before"], ["cell-weight", "weight W after"], ["cell-scan", "scan"],
+      ["cell-before", "prior D"],
+      ["cell-observed", "observation d"],
+      ["cell-gain", "gain K = w / (W + w)"],
+      ["cell-after", "posterior D = D + K (d − D)"],
+      ["cell-weight-before", "weight W before"],
+      ["cell-weight", "weight W after"],
+      ["cell-scan", "scan"],
     ]);
-    this.pick = el("input", { type: "range", id: "cell-event", min: 0, max: 0, step: 1, "aria-label": "Which observation of the cell" });
+    const label = "Which observation of the cell";
+    this.pick = el("input", {
+      type: "range",
+      id: "cell-event",
+      min: 0,
+      max: 0,
+      step: 1,
+      "aria-label": label,
+    });
     this.which = el("output", { for: "cell-event", id: "cell-count" });
     this.pick.oninput = () => {
       const n = Number(this.pick.value);
@@ -32,7 +47,10 @@ export class Inspector {
       this.show();
     };
     this.plot = plot({
-      id: "cell-history", label: "History of the cell: observations, estimate, and the decay that theory predicts", x: "observation", y: "distance (m)",
+      id: "cell-history",
+      label: "History of the cell: observations, estimate, and the decay that theory predicts",
+      x: "observation",
+      y: "distance (m)",
       series: [
         { label: "observation d", color: "beam", width: 0, points: true },
         { label: "estimate D", color: "positive", width: 2 },
@@ -40,14 +58,20 @@ export class Inspector {
       ],
     });
     this.note = el("p", { class: "note", id: "cell-decay" });
-    const button = (/** @type {string} */ text, /** @type {string} */ label, /** @type {() => void} */ onclick) => el("button", { type: "button", "aria-label": label, title: label, onclick }, text);
+    const which = el("label", { for: "cell-event" }, "Observation", this.which);
     this.details = el(
-      "div", { class: "group", hidden: true },
-      el("div", { class: "control" }, el("label", { for: "cell-event" }, "Observation", this.which), this.pick),
-      this.facts.node, this.plot.node, this.note,
-      el("div", { class: "row" }, el("span", { class: "note" }, "Neighbour (W A S D)"),
-        el("span", {}, button("←", "Cell to the left", () => move(-1, 0)), " ", button("↑", "Cell above", () => move(0, 1)), " ", button("↓", "Cell below", () => move(0, -1)), " ",
-          button("→", "Cell to the right", () => move(1, 0)), " ", button("✕", "Follow no cell", close))),
+      "div",
+      { class: "group", hidden: true },
+      el("div", { class: "control" }, which, this.pick),
+      this.facts.node,
+      this.plot.node,
+      this.note,
+      el(
+        "div",
+        { class: "row" },
+        el("span", { class: "note" }, "Neighbor (W A S D)"),
+        neighbors(move, close),
+      ),
     );
     this.node = group("A cell's filter", this.title, this.details);
     this.shownAt = 0;
@@ -58,7 +82,7 @@ export class Inspector {
     if (!told) {
       this.events = [];
       this.details.hidden = true;
-      this.title.textContent = "Click a cell of the field, or press Enter for the one in the middle.";
+      this.title.textContent = HINT;
       return;
     }
     this.details.hidden = false;
@@ -84,10 +108,20 @@ export class Inspector {
     this.facts.set(
       e
         ? {
-            "cell-before": metres(e[1]), "cell-observed": metres(e[3]), "cell-gain": e[4].toFixed(6), "cell-after": metres(e[5]),
-            "cell-weight-before": e[2].toFixed(4), "cell-weight": e[6].toFixed(4), "cell-scan": String(e[0] + 1),
+            "cell-before": metres(e[1]),
+            "cell-observed": metres(e[3]),
+            "cell-gain": e[4].toFixed(6),
+            "cell-after": metres(e[5]),
+            "cell-weight-before": e[2].toFixed(4),
+            "cell-weight": e[6].toFixed(4),
+            "cell-scan": String(e[0] + 1),
           }
-        : Object.fromEntries(["before", "observed", "gain", "after", "weight-before", "weight", "scan"].map((k) => [`cell-${k}`, none])),
+        : Object.fromEntries(
+            ["before", "observed", "gain", "after", "weight-before", "weight", "scan"].map((k) => [
+              `cell-${k}`,
+              none,
+            ]),
+          ),
     );
     // The plot costs more than the numbers, and nobody reads it sixty times a second.
     if (performance.now() - this.shownAt > 120 || this.picked !== undefined) this.showPlot();
@@ -114,4 +148,20 @@ export class Inspector {
   redraw() {
     this.plot.redraw();
   }
+}
+
+/** Buttons to the cells beside. @param {(dx: number, dy: number) => void} move @param {() => void} close */
+function neighbors(move, close) {
+  const buttons = /** @type {[string, string, () => void][]} */ ([
+    ["←", "Cell to the left", () => move(-1, 0)],
+    ["↑", "Cell above", () => move(0, 1)],
+    ["↓", "Cell below", () => move(0, -1)],
+    ["→", "Cell to the right", () => move(1, 0)],
+    ["✕", "Follow no cell", close],
+  ]);
+  const made = buttons.flatMap(([text, title, onclick]) => [
+    el("button", { type: "button", "aria-label": title, title, onclick }, text),
+    " ",
+  ]);
+  return el("span", {}, ...made.slice(0, -1));
 }

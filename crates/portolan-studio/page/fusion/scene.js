@@ -1,120 +1,92 @@
 // @ts-check
-import { strokeFaces, strokeLines, strokeRays } from "../plane/lines.js";
-import { colors } from "../ui/theme.js";
+import { Field } from "./field.js";
 
 /**
- * What is drawn over the field, as the last answer told it.
- * @typedef {object} Scene
- * @property {import("./field.js").Field | undefined} field
- * @property {Float32Array} contour
- * @property {Uint32Array} lines
- * @property {Float32Array} beams
- * @property {Uint8Array} kinds
- * @property {[number, number, number] | null} pose
- * @property {{faces: any, chair: Box} | null} truth
- * @property {Box | undefined} ghost where the chair was
- * @property {Box | undefined} held where the chair is being dragged to
- * @property {[number, number] | undefined} cell that is inspected
- * @property {{beams: boolean, contour: boolean, truth: boolean}} visible
- *
  * @typedef {{min: [number, number], max: [number, number]}} Box
+ * @typedef {{name: string, settings: import("./settings.js").Values, grid: Field["grid"], block: number, lap:
+ *   number,
+ *   truth: {faces: any, chair: Box} | null, moves: [number, [number, number]][]}} All what seldom changes
  */
 
-/** Layers from back to front. @param {Scene} s @returns {import("../plane/plane.js").Layer[]} */
-export function layers(s) {
-  return [
-    (g, camera) => s.field?.cells.draw(g, camera),
-    (g, camera) => {
-      if (!s.visible.beams || !s.pose) return;
-      g.strokeStyle = colors().beam;
-      g.lineWidth = 0.7;
-      g.globalAlpha = 0.4;
-      strokeRays(g, camera, [s.pose[0], s.pose[1]], s.beams);
-      g.globalAlpha = 1;
-      g.fillStyle = colors().beam;
-      for (let i = 0; i < s.kinds.length; i++) {
-        if (s.kinds[i] !== 0) continue;
-        const [x, y] = camera.toScreen(s.beams[2 * i], s.beams[2 * i + 1]);
-        g.fillRect(x - 1.25, y - 1.25, 2.5, 2.5);
-      }
-    },
-    (g, camera) => {
-      if (!s.visible.truth || !s.truth) return;
-      g.strokeStyle = colors().truth;
-      g.lineWidth = 1.25;
-      g.setLineDash([5, 4]);
-      strokeFaces(g, camera, s.truth.faces);
-    },
-    (g, camera) => {
-      if (!s.visible.contour) return;
-      g.strokeStyle = colors().contour;
-      // Of a map seen from afar the line must not be wider than its walls.
-      g.lineWidth = Math.min(1.8, Math.max(0.7, 0.35 * (s.field?.grid.resolution ?? 1) * camera.scale));
-      g.lineJoin = "round";
-      strokeLines(g, camera, s.contour, s.lines);
-    },
-    (g, camera) => {
-      g.strokeStyle = colors().chair;
-      if (s.ghost) {
-        g.setLineDash([3, 3]);
-        outline(g, camera, s.ghost);
-        label(g, camera, s.ghost, "it was here");
-      }
-      g.setLineDash([]);
-      g.lineWidth = 2;
-      if (s.truth) {
-        outline(g, camera, s.held ?? s.truth.chair);
-        label(g, camera, s.held ?? s.truth.chair, "chair");
-      }
-    },
-    (g, camera) => {
-      if (!s.pose) return;
-      const [x, y] = camera.toScreen(s.pose[0], s.pose[1]);
-      const r = Math.max(7, 0.16 * camera.scale);
-      g.translate(x, y);
-      g.rotate(-s.pose[2]);
-      g.fillStyle = colors().robot;
-      g.strokeStyle = colors().paper;
-      g.beginPath();
-      g.moveTo(r, 0);
-      g.lineTo(-0.7 * r, 0.65 * r);
-      g.lineTo(-0.4 * r, 0);
-      g.lineTo(-0.7 * r, -0.65 * r);
-      g.closePath();
-      g.fill();
-      g.stroke();
-    },
-    (g, camera) => {
-      if (!s.cell || !s.field) return;
-      const [x, y] = camera.toScreen(...s.field.center(s.cell));
-      const half = Math.max(4, 0.5 * s.field.grid.resolution * camera.scale);
-      for (const [width, color] of /** @type {[number, string][]} */ ([[4, colors().paper], [2, colors().ink]])) {
-        g.lineWidth = width;
-        g.strokeStyle = color;
-        g.strokeRect(x - half, y - half, 2 * half, 2 * half);
-      }
-    },
-  ];
+/** What is drawn: field and scan of the last answer, and what is chosen on the canvas. */
+export class Scene {
+  constructor() {
+    /** @type {Field | undefined} */
+    this.field = undefined;
+    this.contour = new Float32Array();
+    /** Where each line of the contour begins. */
+    this.lines = new Uint32Array([0]);
+    this.beams = new Float32Array();
+    this.kinds = new Uint8Array();
+    /** @type {[number, number, number] | null} */
+    this.pose = null;
+    /** Of the simulated world. @type {All["truth"]} */
+    this.truth = null;
+    /** When the chair was moved, and where to. @type {All["moves"]} */
+    this.moves = [];
+    /** Where the chair stood first. @type {Box | undefined} */
+    this.home = undefined;
+    /** Where the chair was before it was moved. @type {Box | undefined} */
+    this.ghost = undefined;
+    /** Where the chair is being dragged to. @type {Box | undefined} */
+    this.held = undefined;
+    /** The cell that is followed. @type {[number, number] | undefined} */
+    this.cell = undefined;
+    this.visible = { beams: true, contour: true, truth: true };
+  }
+
+  /** @param {any} body @param {any} arrays of an answer */
+  take(body, arrays) {
+    if (body.fresh) this.field?.clear();
+    this.field?.apply(arrays.blocks, arrays.distance, arrays.weight);
+    [this.contour, this.lines] = [arrays.contour, arrays.lines];
+    this.beams = arrays.beam_ends ?? new Float32Array();
+    this.kinds = arrays.beam_kinds ?? new Uint8Array();
+    this.pose = body.pose;
+    this.ghost = body.ghost?.old;
+  }
+
+  /** @param {All} all @param {Field["shows"]} shows */
+  takeAll({ settings, grid, block, truth, moves }, shows) {
+    const before = this.field?.grid;
+    if (!before || JSON.stringify(before) !== JSON.stringify(grid)) {
+      this.field = new Field(grid, block);
+      this.field.shows = shows;
+      // Another resolution has other cells.
+      if (before && before.resolution !== grid.resolution) this.cell = undefined;
+    }
+    this.truth = truth;
+    this.held = undefined;
+    this.home ??= truth?.chair;
+    this.moves = moves;
+    this.field?.setColors(settings.truncation, settings.w_max ?? 256);
+  }
+
+  /** Whether a point lies on the chair. @param {[number, number]} p */
+  onChair(p) {
+    const box = this.truth?.chair;
+    return box !== undefined && [0, 1].every((k) => p[k] >= box.min[k] && p[k] <= box.max[k]);
+  }
+
+  /** Whether the chair stands where it stood first. */
+  get chairAtHome() {
+    const [at, home] = [this.truth?.chair, this.home];
+    return at && home && Math.hypot(at.min[0] - home.min[0], at.min[1] - home.min[1]) < 1e-9;
+  }
+
+  /** Whether there is such a cell. @param {[number, number]} cell */
+  has([x, y]) {
+    const [w, h] = this.field?.grid.shape ?? [Infinity, Infinity];
+    return x >= 0 && y >= 0 && x < w && y < h;
+  }
 }
 
-/** @param {CanvasRenderingContext2D} g @param {import("../plane/plane.js").Camera} camera @param {Box} box */
-function outline(g, camera, { min, max }) {
-  const [x, y] = camera.toScreen(min[0], max[1]);
-  g.strokeRect(x, y, (max[0] - min[0]) * camera.scale, (max[1] - min[1]) * camera.scale);
+/** @param {Box} box @param {number[]} by @returns {Box} */
+export function movedBy({ min, max }, [dx, dy]) {
+  return { min: [min[0] + dx, min[1] + dy], max: [max[0] + dx, max[1] + dy] };
 }
 
-/** @param {CanvasRenderingContext2D} g @param {import("../plane/plane.js").Camera} camera @param {Box} box @param {string} text */
-function label(g, camera, { min, max }, text) {
-  if (camera.scale < 40) return;
-  const [x, y] = camera.toScreen((min[0] + max[0]) / 2, max[1]);
-  g.font = "600 11px system-ui, sans-serif";
-  g.textAlign = "center";
-  g.lineWidth = 3;
-  const stroke = g.strokeStyle;
-  g.strokeStyle = colors().paper;
-  g.strokeText(text, x, y - 5);
-  g.strokeStyle = stroke;
-  g.fillStyle = colors().chair;
-  g.fillText(text, x, y - 5);
-  g.lineWidth = 1.5;
+/** @param {Box} box @returns {[number, number]} */
+export function middleOf({ min, max }) {
+  return [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2];
 }

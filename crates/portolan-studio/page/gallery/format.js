@@ -4,13 +4,28 @@
 const three = (v) => v.toFixed(v >= 100 ? 0 : v >= 10 ? 1 : 2);
 
 /** A power of ten of bytes. @param {number} power */
-export const bytesOf = (power) => (power >= 9 ? `${10 ** (power - 9)} GB` : power >= 6 ? `${10 ** (power - 6)} MB` : power >= 3 ? `${10 ** (power - 3)} kB` : `${10 ** power} B`);
+export const bytesOf = (power) =>
+  power >= 9
+    ? `${10 ** (power - 9)} GB`
+    : power >= 6
+      ? `${10 ** (power - 6)} MB`
+      : power >= 3
+        ? `${10 ** (power - 3)} kB`
+        : `${10 ** power} B`;
 
 /** A power of ten of seconds. @param {number} power */
-export const timeOf = (power) => (power >= 0 ? `${10 ** power} s` : power >= -3 ? `${10 ** (power + 3)} ms` : power >= -6 ? `${10 ** (power + 6)} µs` : `${10 ** (power + 9)} ns`);
+export const timeOf = (power) =>
+  power >= 0
+    ? `${10 ** power} s`
+    : power >= -3
+      ? `${10 ** (power + 3)} ms`
+      : power >= -6
+        ? `${10 ** (power + 6)} µs`
+        : `${10 ** (power + 9)} ns`;
 
 /** Bytes, in thousands. @param {number} n */
-export const bytes = (n) => (n >= 1e9 ? `${three(n / 1e9)} GB` : n >= 1e6 ? `${three(n / 1e6)} MB` : `${three(n / 1e3)} kB`);
+export const bytes = (n) =>
+  n >= 1e9 ? `${three(n / 1e9)} GB` : n >= 1e6 ? `${three(n / 1e6)} MB` : `${three(n / 1e3)} kB`;
 
 /** Seconds in the unit that suits them. @param {number} s */
 export function time(s) {
@@ -21,7 +36,8 @@ export function time(s) {
 }
 
 /** How many times. @param {number} n */
-export const times = (n) => `${n >= 100 ? Math.round(n).toLocaleString("en") : n >= 10 ? n.toFixed(0) : n.toFixed(1)} ×`;
+export const times = (n) =>
+  `${n >= 100 ? Math.round(n).toLocaleString("en") : n >= 10 ? n.toFixed(0) : n.toFixed(1)} ×`;
 
 /** Whole numbers with their thousands apart. @param {number} n */
 export const whole = (n) => n.toLocaleString("en");

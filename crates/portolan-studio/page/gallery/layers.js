@@ -1,6 +1,6 @@
 // @ts-check
-import { Cells, STEPS, diverging, sequential, step, word } from "../plane/cells.js";
-import { strokeFaces, strokeLines } from "../plane/lines.js";
+import { Cells, STEPS, diverging, sequential, step, word } from "../canvas2d/cells.js";
+import { strokeFaces, strokeLines } from "../canvas2d/lines.js";
 import { colors, rgb } from "../ui/theme.js";
 import { Pixels } from "./pixels.js";
 
@@ -8,7 +8,10 @@ import { Pixels } from "./pixels.js";
 const FAR = 1.5;
 /** Value of cells that were never observed, where chances are bytes. */
 const UNOBSERVED = 255;
-/** Borders are drawn of cells that are at least so large (CSS pixels); of smaller ones they would cover what is inside. */
+/**
+ * Borders are drawn of cells that are at least so large (CSS pixels); of smaller ones they would cover what
+ * is inside.
+ */
 const BORDERED = 2.5;
 
 /** What the engine sent of all representations, ready to be drawn. */
@@ -29,9 +32,16 @@ export class Picture {
     this.recolor();
   }
 
-  /** The box of the world that is shown: what the grid fills, and below it room for the scale. @returns {[number, number, number, number]} */
+  /**
+   * The box of the world that is shown: what the grid fills, and below it room for the scale.
+   * @returns {[number, number, number, number]}
+   */
   box() {
-    const { origin: [x, y], resolution: r, shape: [w, h] } = this.grid;
+    const {
+      origin: [x, y],
+      resolution: r,
+      shape: [w, h],
+    } = this.grid;
     return [x, y - 0.07 * h * r, x + w * r, y + h * r];
   }
 
@@ -43,8 +53,10 @@ export class Picture {
     // Squared below: what is clamped at a small chance looks free.
     const chance = sequential(c.paper, c.ink);
     const ramp = diverging(c.negative, c.positive);
-    const share = (/** @type {number} */ p) => (p === UNOBSERVED ? unknown : chance[Math.round((p / 254) ** 2 * (STEPS - 1))]);
-    const signed = (/** @type {number} */ d, /** @type {number} */ end) => (Number.isNaN(d) ? unknown : ramp[step(d, -end, end)]);
+    const share = (/** @type {number} */ p) =>
+      p === UNOBSERVED ? unknown : chance[Math.round((p / 254) ** 2 * (STEPS - 1))];
+    const signed = (/** @type {number} */ d, /** @type {number} */ end) =>
+      Number.isNaN(d) ? unknown : ramp[step(d, -end, end)];
     this.occupancy.fill((i) => share(a.occupancy[i]));
     this.tsdf.fill((i) => signed(a.tsdf[i], this.truncation));
     this.esdf.fill((i) => signed(a.esdf[i], FAR));
@@ -55,12 +67,16 @@ export class Picture {
       const colour = share(a.leaf_occupancy[n]);
       const right = Math.min(w, x + size);
       // The root covers more than the grid does.
-      for (let j = y; j < Math.min(h, y + size); j++) if (x < right) this.leaves.words.fill(colour, this.leaves.at(x, j), this.leaves.at(x, j) + right - x);
+      for (let j = y; j < Math.min(h, y + size); j++)
+        if (x < right) this.leaves.words.fill(colour, this.leaves.at(x, j), this.leaves.at(x, j) + right - x);
     }
     this.leaves.touch(0, h);
   }
 
-  /** Layers of each panel, from back to front. @returns {Record<string, import("../plane/plane.js").Layer[]>} */
+  /**
+   * Layers of each panel, from back to front.
+   * @returns {Record<string, import("../canvas2d/canvas2d.js").Layer[]>}
+   */
   layers() {
     const squares = this.#squares;
     return {
@@ -73,14 +89,20 @@ export class Picture {
     };
   }
 
-  /** The cells of the grid, where they are large enough. @type {import("../plane/plane.js").Layer} */
+  /** The cells of the grid, where they are large enough. @type {import("../canvas2d/canvas2d.js").Layer} */
   #squares = (g, camera) => {
     const { origin, resolution: r, shape } = this.grid;
     if (r * camera.scale < 2 * BORDERED) return;
     const { clientWidth: w, clientHeight: h } = g.canvas;
     const [low, high] = [camera.toWorld(0, h), camera.toWorld(w, 0)];
-    const clamp = (/** @type {number} */ k, /** @type {number} */ v) => Math.min(shape[k], Math.max(0, Math.floor((v - origin[k]) / r)));
-    const [x0, x1, y0, y1] = [clamp(0, low[0]), clamp(0, high[0] + r), clamp(1, low[1]), clamp(1, high[1] + r)];
+    const clamp = (/** @type {number} */ k, /** @type {number} */ v) =>
+      Math.min(shape[k], Math.max(0, Math.floor((v - origin[k]) / r)));
+    const [x0, x1, y0, y1] = [
+      clamp(0, low[0]),
+      clamp(0, high[0] + r),
+      clamp(1, low[1]),
+      clamp(1, high[1] + r),
+    ];
     g.strokeStyle = colors().line;
     g.globalAlpha = 0.8;
     g.lineWidth = 1;
@@ -96,9 +118,15 @@ export class Picture {
     g.stroke();
   };
 
-  /** Borders of the leaves; the larger the leaf, the stronger. @type {import("../plane/plane.js").Layer} */
+  /**
+   * Borders of the leaves; the larger the leaf, the stronger.
+   * @type {import("../canvas2d/canvas2d.js").Layer}
+   */
   #leafBorders = (g, camera) => {
-    const { origin: [ox, oy], resolution: r } = this.tree;
+    const {
+      origin: [ox, oy],
+      resolution: r,
+    } = this.tree;
     const { leaves, leaf_occupancy: occupancy } = this.arrays;
     const line = rgb(colors().positive);
     this.borders.over(g, () => {
@@ -108,19 +136,27 @@ export class Picture {
       const [x0, y0] = [sx * p.ratio, sy * p.ratio];
       const strength = Array.from({ length: 32 }, (_, height) => {
         const edge = (2 ** height * scale) / p.ratio;
-        return edge < BORDERED ? 0 : word(...line, Math.round(255 * Math.min(0.95, 0.22 + 0.14 * height + 0.012 * edge)));
+        return edge < BORDERED
+          ? 0
+          : word(...line, Math.round(255 * Math.min(0.95, 0.22 + 0.14 * height + 0.012 * edge)));
       });
       for (let n = 0, k = 0; n < occupancy.length; n++, k += 3) {
         const size = leaves[k + 2];
         const colour = strength[31 - Math.clz32(size)];
         if (colour === 0) continue;
         const [x, y] = [leaves[k], leaves[k + 1]];
-        p.corner(Math.round(x0 + x * scale), Math.round(y0 - (y + size) * scale), Math.round(x0 + (x + size) * scale), Math.round(y0 - y * scale), colour);
+        p.corner(
+          Math.round(x0 + x * scale),
+          Math.round(y0 - (y + size) * scale),
+          Math.round(x0 + (x + size) * scale),
+          Math.round(y0 - y * scale),
+          colour,
+        );
       }
     });
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #truth = (g, camera) => {
     if (!this.truth) return;
     g.strokeStyle = colors().truth;
@@ -130,7 +166,7 @@ export class Picture {
     g.setLineDash([]);
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #contour = (g, camera) => {
     g.strokeStyle = colors().contour;
     g.lineWidth = Math.min(1.8, Math.max(0.7, 0.6 * this.grid.resolution * camera.scale));
@@ -138,7 +174,7 @@ export class Picture {
     strokeLines(g, camera, this.arrays.contour, this.arrays.contour_starts);
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #rings = (g, camera) => {
     g.strokeStyle = colors().ink;
     g.globalAlpha = 0.5;
@@ -147,7 +183,7 @@ export class Picture {
     g.globalAlpha = 1;
   };
 
-  /** @type {import("../plane/plane.js").Layer} */
+  /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #cloud = (g, camera) => {
     const { cloud } = this.arrays;
     const colour = word(...rgb(colors().beam), 200);

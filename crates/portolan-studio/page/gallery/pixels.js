@@ -1,7 +1,8 @@
 // @ts-check
 
 /**
- * Thousands of small things, written straight into the pixels of a panel: as paths they would take longer than a picture may.
+ * Thousands of small things, written straight into the pixels of a panel: as paths they would take longer
+ * than a picture may.
  */
 export class Pixels {
   constructor() {
@@ -28,7 +29,11 @@ export class Pixels {
     } else this.words.fill(0);
     this.ratio = width / clientWidth;
     fill();
-    /** @type {OffscreenCanvasRenderingContext2D} */ (this.image.getContext("2d")).putImageData(this.data, 0, 0);
+    /** @type {OffscreenCanvasRenderingContext2D} */ (this.image.getContext("2d")).putImageData(
+      this.data,
+      0,
+      0,
+    );
     g.drawImage(this.image, 0, 0, clientWidth, clientHeight);
   }
 
@@ -45,11 +50,18 @@ export class Pixels {
     if (y1 <= h) this.words.fill(word, (y1 - 1) * w + left, (y1 - 1) * w + right);
   }
 
-  /** A square dot. @param {number} x its middle @param {number} y @param {number} size @param {number} word */
+  /**
+   * A square dot.
+   * @param {number} x its middle
+   * @param {number} y
+   * @param {number} size
+   * @param {number} word
+   */
   dot(x, y, size, word) {
     const x0 = Math.round(x - size / 2);
     const y0 = Math.round(y - size / 2);
     if (x0 < 0 || y0 < 0 || x0 + size > this.width || y0 + size > this.height) return;
-    for (let i = 0, k = y0 * this.width + x0; i < size; i++, k += this.width) for (let j = 0; j < size; j++) this.words[k + j] = word;
+    for (let i = 0, k = y0 * this.width + x0; i < size; i++, k += this.width)
+      for (let j = 0; j < size; j++) this.words[k + j] = word;
   }
 }

@@ -19,10 +19,17 @@ export function ofFusion({ of, picture }) {
     of.settings.carve ? "" : "Here the TSDF carves free space, though Fusion does not now.",
     of.moved ? "The chair was moved: the truth is as it is now." : "",
     picture.every > 1 ? `Of the cloud one point in ${picture.every} is drawn.` : "",
-  ].filter(Boolean).join(" ");
+  ]
+    .filter(Boolean)
+    .join(" ");
 }
 
-/** Powers of ten around all values. @param {number[]} values @param {[number, number]} otherwise @returns {[number, number]} */
+/**
+ * Powers of ten around all values.
+ * @param {number[]} values
+ * @param {[number, number]} otherwise
+ * @returns {[number, number]}
+ */
 export function decades(values, otherwise) {
   if (values.length === 0) return otherwise;
   const logs = values.map(Math.log10);
@@ -32,12 +39,14 @@ export function decades(values, otherwise) {
 
 /** What each representation answers, in words. @param {any} a @returns {Record<string, string>} */
 export function answersOf(a) {
-  const chance = (/** @type {number | null} */ p) => (p === null ? "never observed" : `occupied ${(100 * p).toFixed(1)} %`);
+  const chance = (/** @type {number | null} */ p) =>
+    p === null ? "never observed" : `occupied ${(100 * p).toFixed(1)} %`;
   const far = (/** @type {number | null} */ d) => (d === null ? "not known" : length(d));
   return {
     grid: `${chance(a.grid.occupied)}; ring search ${far(a.grid.searched)}`,
     tree: chance(a.tree.occupied),
-    tsdf: a.tsdf.weight === null ? "never observed" : `D ${far(a.tsdf.distance)}, W ${a.tsdf.weight.toFixed(1)}`,
+    tsdf:
+      a.tsdf.weight === null ? "never observed" : `D ${far(a.tsdf.distance)}, W ${a.tsdf.weight.toFixed(1)}`,
     esdf: `d ${a.esdf.distance === null ? a.esdf.status : far(a.esdf.distance)}${a.truth === null ? "" : `; true ${far(a.truth)}`}`,
     contour: `${a.contour.inside === null ? "" : a.contour.inside ? "inside, " : "outside, "}${far(a.contour.distance)} away`,
     cloud: `nearest point ${far(a.cloud.distance)}`,
@@ -47,9 +56,16 @@ export function answersOf(a) {
 /** @param {boolean} truth */
 export function legendOf(truth) {
   return legend([
-    { color: "", text: "free … occupied", ramp: "linear-gradient(90deg, var(--paper), var(--ink))" }, { color: "unknown", text: "never observed" },
-    { color: "", text: "distance below … above zero", ramp: "linear-gradient(90deg, var(--negative), transparent, var(--positive))" },
-    { color: "positive", text: "borders of leaves" }, { color: "contour", text: "contour" }, { color: "beam", text: "end points" },
+    { color: "", text: "free … occupied", ramp: "linear-gradient(90deg, var(--paper), var(--ink))" },
+    { color: "unknown", text: "never observed" },
+    {
+      color: "",
+      text: "distance below … above zero",
+      ramp: "linear-gradient(90deg, var(--negative), transparent, var(--positive))",
+    },
+    { color: "positive", text: "borders of leaves" },
+    { color: "contour", text: "contour" },
+    { color: "beam", text: "end points" },
     ...(truth ? [{ color: "truth", text: "truth", dashed: true }] : []),
   ]);
 }

@@ -2,7 +2,10 @@
 import { el } from "../ui/controls.js";
 import { plot } from "../ui/plot.js";
 
-/** Values of a point: step, objective, then depth, reflectance and second moment of training and held-out rays. */
+/**
+ * Values of a point: step, objective, then depth, reflectance and second moment of training and held-out
+ * rays.
+ */
 const ROW = 8;
 
 /** What a way of fitting is called where there is little room. @type {Record<string, string>} */
@@ -18,19 +21,39 @@ export class Curves {
     this.noise = { depth: 0, reflectance: 0 };
     const marks = () => this.changes;
     const lines = [
-      { label: "training rays", color: "beam", width: 2 }, { label: "held-out rays", color: "contour", width: 2 }, { label: "noise of a measurement", color: "truth", dashed: true },
+      { label: "training rays", color: "beam", width: 2 },
+      { label: "held-out rays", color: "contour", width: 2 },
+      { label: "noise of a measurement", color: "truth", dashed: true },
     ];
     this.depth = plot({
-      id: "radiance-depth", label: "Root mean square residual of depth over the steps: training rays, held-out rays, noise", x: "step", y: "RMS depth (m)",
-      height: 178, log: true, series: lines, marks,
+      id: "radiance-depth",
+      label: "Root mean square residual of depth over the steps: training rays, held-out rays, noise",
+      x: "step",
+      y: "RMS depth (m)",
+      height: 178,
+      log: true,
+      series: lines,
+      marks,
     });
     this.reflectance = plot({
-      id: "radiance-reflectance", label: "Root mean square residual of reflectance over the steps: training rays, held-out rays, noise", x: "step",
-      y: "RMS reflectance", height: 178, log: true, series: lines, marks,
+      id: "radiance-reflectance",
+      label: "Root mean square residual of reflectance over the steps: training rays, held-out rays, noise",
+      x: "step",
+      y: "RMS reflectance",
+      height: 178,
+      log: true,
+      series: lines,
+      marks,
     });
     this.objective = plot({
-      id: "radiance-objective", label: "Objective over the steps: negative logarithm of the posterior", x: "step", y: "objective J", height: 178, log: true,
-      series: [{ label: "J", color: "positive", width: 2 }], marks,
+      id: "radiance-objective",
+      label: "Objective over the steps: negative logarithm of the posterior",
+      x: "step",
+      y: "objective J",
+      height: 178,
+      log: true,
+      series: [{ label: "J", color: "positive", width: 2 }],
+      marks,
     });
     /** The plot that is drawn next while playing. */
     this.next = 0;
@@ -47,7 +70,16 @@ export class Curves {
     this.points.length = Math.min(this.points.length, body.curve_from);
     for (let i = 0; i < values.length; i += ROW) this.points.push(Array.from(values.subarray(i, i + ROW)));
     const { training: t, held_out: h } = body;
-    this.now = [body.step, body.objective, t.depth, t.reflectance, t.second_moment, h.depth, h.reflectance, h.second_moment];
+    this.now = [
+      body.step,
+      body.objective,
+      t.depth,
+      t.reflectance,
+      t.second_moment,
+      h.depth,
+      h.reflectance,
+      h.second_moment,
+    ];
     let at = 0;
     this.changes = body.phases.map((/** @type {any} */ phase) => {
       const change = { x: at, text: SHORT[phase.channels] + (phase.optimizer === "adam" ? ", Adam" : "") };
@@ -56,7 +88,10 @@ export class Curves {
     });
   }
 
-  /** Draws them; while playing, one at a time: three in one picture are more than a picture has time for. @param {boolean} playing */
+  /**
+   * Draws them; while playing, one at a time: three in one picture are more than a picture has time for.
+   * @param {boolean} playing
+   */
   show(playing) {
     if (!this.now) return;
     const turn = this.next++ % this.plots.length;

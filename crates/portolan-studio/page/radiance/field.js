@@ -1,25 +1,39 @@
 // @ts-check
 
-/** @typedef {import("./picture.js").Scene} Scene @typedef {import("./picture.js").Fit} Fit @typedef {import("./picture.js").Frame} Frame */
+/**
+ * @typedef {import("./picture.js").Scene} Scene
+ * @typedef {import("./picture.js").Fit} Fit
+ * @typedef {import("./picture.js").Frame} Frame
+ */
 
 /**
- * Density as bars, as high as the share of light that ends in the bin; what of the chosen ray's light does, solid in
+ * Density as bars, as high as the share of light that ends in the bin; what of the chosen ray's light does,
+ * solid in
  * them, and how much of it is left, as a curve; reflectance as a strip; and what descent wants of every bin.
- * @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Fit} fit @param {Record<string, string>} c
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Fit} fit
+ * @param {Record<string, string>} c
  */
 export function drawField(g, f, scene, fit, c) {
   const y = (/** @type {number} */ share) => f.field.bottom - share * (f.field.bottom - f.field.top);
   marks(g, f, scene, c, y);
   const { opacity, reflectance, gradient, light, light_at: at, ends } = fit.arrays;
-  const [held, chosen] = [fit.body.look.ray !== null && scene.rays[fit.body.look.ray].held_out, fit.body.look.ray];
+  const [held, chosen] = [
+    fit.body.look.ray !== null && scene.rays[fit.body.look.ray].held_out,
+    fit.body.look.ray,
+  ];
   const ray = held ? c.contour : c.beam;
   const edge = (/** @type {number} */ i) => f.x(i * scene.resolution);
 
   g.fillStyle = `${c.positive}66`;
-  for (let i = 0; i < scene.bins; i++) g.fillRect(edge(i) + 0.5, y(opacity[i]), edge(i + 1) - edge(i) - 1, f.field.bottom - y(opacity[i]));
+  for (let i = 0; i < scene.bins; i++)
+    g.fillRect(edge(i) + 0.5, y(opacity[i]), edge(i + 1) - edge(i) - 1, f.field.bottom - y(opacity[i]));
   if (ends) {
     g.fillStyle = ray;
-    for (let i = 0; i < scene.bins; i++) g.fillRect(edge(i) + 0.5, y(ends[i]), edge(i + 1) - edge(i) - 1, f.field.bottom - y(ends[i]));
+    for (let i = 0; i < scene.bins; i++)
+      g.fillRect(edge(i) + 0.5, y(ends[i]), edge(i + 1) - edge(i) - 1, f.field.bottom - y(ends[i]));
   }
   truth(g, f, scene, c, y);
   if (light) {
@@ -47,7 +61,14 @@ export function drawField(g, f, scene, fit, c) {
   }
 }
 
-/** Left the densities, right the shares of light: the same height. @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Record<string, string>} c @param {(s: number) => number} y */
+/**
+ * Left the densities, right the shares of light: the same height.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Record<string, string>} c
+ * @param {(s: number) => number} y
+ */
 function marks(g, f, scene, c, y) {
   g.lineWidth = 1;
   g.textBaseline = "middle";
@@ -69,7 +90,13 @@ function marks(g, f, scene, c, y) {
   for (const share of [0, 0.5, 1]) g.fillText(`${100 * share} %`, f.right + 8, y(share));
 }
 
-/** @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Record<string, string>} c @param {(s: number) => number} y */
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Record<string, string>} c
+ * @param {(s: number) => number} y
+ */
 function truth(g, f, scene, c, y) {
   g.strokeStyle = c.truth;
   g.lineWidth = 1.5;
@@ -92,7 +119,14 @@ const gray = (/** @type {number} */ v) => {
   return `rgb(${level},${level},${level})`;
 };
 
-/** What the bins reflect, and below it what the bodies do. @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Float32Array} reflectance @param {Record<string, string>} c */
+/**
+ * What the bins reflect, and below it what the bodies do.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Float32Array} reflectance
+ * @param {Record<string, string>} c
+ */
 function strip(g, f, scene, reflectance, c) {
   const { top, bottom } = f.strip;
   const middle = bottom - 7;
@@ -108,7 +142,8 @@ function strip(g, f, scene, reflectance, c) {
   g.strokeRect(f.left, top + 0.5, f.right - f.left, middle - top);
   g.strokeStyle = c.truth;
   g.setLineDash([3, 2]);
-  for (const [low, high] of scene.bodies) g.strokeRect(f.x(low), middle, f.x(high) - f.x(low), bottom - middle);
+  for (const [low, high] of scene.bodies)
+    g.strokeRect(f.x(low), middle, f.x(high) - f.x(low), bottom - middle);
   g.setLineDash([]);
   g.fillStyle = c.muted;
   g.textAlign = "right";
@@ -117,9 +152,14 @@ function strip(g, f, scene, reflectance, c) {
 }
 
 /**
- * Up: descent wants more density in the bin; down: less. Heights are roots, so that small pulls are seen beside the
+ * Up: descent wants more density in the bin; down: less. Heights are roots, so that small pulls are seen
+ * beside the
  * largest, which fills its half.
- * @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Float32Array} gradient @param {Record<string, string>} c
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Float32Array} gradient
+ * @param {Record<string, string>} c
  */
 function pulls(g, f, scene, gradient, c) {
   const { top, bottom } = f.pull;

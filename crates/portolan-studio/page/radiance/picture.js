@@ -13,7 +13,8 @@ import { drawRays } from "./rays.js";
  * @property {[number, number][]} bodies where they begin and end (metres)
  * @property {{opacity: number[], reflectance: number[]}} truth
  * @property {[number, number][]} marks density (1/m) and the opacity of a bin that has it
- * @property {{origin: number, ascending: boolean, held_out: boolean, depth: number, at: number, reflectance: number}[]} rays
+ * @property {{origin: number, ascending: boolean, held_out: boolean, depth: number, at: number, reflectance:
+ *   number}[]} rays
  * @property {{depth: number, reflectance: number, second_moment: number}} noise
  * @property {number} far metres
  * @property {number} margin metres
@@ -42,11 +43,17 @@ export const FONT = "11px system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu 
 
 /** The corridor on one canvas: density and light above, reflectance and gradient below it, then the rays. */
 export class Picture {
-  /** @param {{meter: import("../ui/meter.js").Meter, before: () => void}} o `before`: called before each picture */
+  /**
+   * @param {{meter: import("../ui/meter.js").Meter, before: () => void}} o `before`: called before each
+   *   picture
+   */
   constructor({ meter, before }) {
     this.canvas = el("canvas", {
-      id: "radiance-canvas", tabindex: 0, role: "img",
-      "aria-label": "The corridor: density of every bin, light of the chosen ray, reflectance, gradient, and ten rays with what they measured and what they render",
+      id: "radiance-canvas",
+      tabindex: 0,
+      role: "img",
+      "aria-label":
+        "The corridor: density of every bin, light of the chosen ray, reflectance, gradient, and ten rays with what they measured and what they render",
     });
     this.node = el("div", { class: "canvas" }, this.canvas);
     this.meter = meter;
@@ -157,15 +164,33 @@ function layout(scene, w, h) {
   };
 }
 
-/** Where there is something in truth: through all of the picture. @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Record<string, string>} c */
+/**
+ * Where there is something in truth: through all of the picture.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Record<string, string>} c
+ */
 function bodies(g, f, scene, c) {
   g.fillStyle = c.soft;
-  for (const [low, high] of scene.bodies) g.fillRect(f.x(low), f.field.top, f.x(high) - f.x(low), f.rays.bottom - f.field.top);
+  for (const [low, high] of scene.bodies)
+    g.fillRect(f.x(low), f.field.top, f.x(high) - f.x(low), f.rays.bottom - f.field.top);
 }
 
-/** The bin that is looked at and the one under the cursor. @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Fit} fit @param {number | undefined} cursor @param {Record<string, string>} c */
+/**
+ * The bin that is looked at and the one under the cursor.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Fit} fit
+ * @param {number | undefined} cursor
+ * @param {Record<string, string>} c
+ */
 function columns(g, f, scene, fit, cursor, c) {
-  const column = (/** @type {number} */ bin) => [f.x(bin * scene.resolution), f.x((bin + 1) * scene.resolution)];
+  const column = (/** @type {number} */ bin) => [
+    f.x(bin * scene.resolution),
+    f.x((bin + 1) * scene.resolution),
+  ];
   const bin = fit.body.look.bin;
   if (bin !== null) {
     const [a, b] = column(bin);
@@ -182,21 +207,39 @@ function columns(g, f, scene, fit, cursor, c) {
   }
 }
 
-/** Metres, between reflectance and gradient. @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Record<string, string>} c */
+/**
+ * Metres, between reflectance and gradient.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Record<string, string>} c
+ */
 function axis(g, f, scene, c) {
   g.fillStyle = c.muted;
   g.textAlign = "center";
   g.textBaseline = "top";
-  for (let m = 0; m <= scene.length; m++) g.fillText(m === scene.length ? `${m} m` : String(m), f.x(m), f.strip.bottom + 4);
+  for (let m = 0; m <= scene.length; m++)
+    g.fillText(m === scene.length ? `${m} m` : String(m), f.x(m), f.strip.bottom + 4);
 }
 
-/** What there is under the cursor, in words. @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Fit} fit @param {number} bin @param {Record<string, string>} c */
+/**
+ * What there is under the cursor, in words.
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Fit} fit
+ * @param {number} bin
+ * @param {Record<string, string>} c
+ */
 function readout(g, f, scene, fit, bin, c) {
   const { density, opacity, reflectance } = fit.arrays;
   const at = (bin + 0.5) * scene.resolution;
   g.fillStyle = c.ink;
   g.textAlign = "center";
   g.textBaseline = "bottom";
-  g.fillText(`bin ${bin} at ${at.toFixed(2)} m: ${density[bin].toPrecision(3)} /m, ends ${(100 * opacity[bin]).toPrecision(3)} % of light, reflects ${reflectance[bin].toFixed(2)}`,
-    (f.left + f.right) / 2, f.field.top - 8);
+  g.fillText(
+    `bin ${bin} at ${at.toFixed(2)} m: ${density[bin].toPrecision(3)} /m, ends ${(100 * opacity[bin]).toPrecision(3)} % of light, reflects ${reflectance[bin].toFixed(2)}`,
+    (f.left + f.right) / 2,
+    f.field.top - 8,
+  );
 }

@@ -1,11 +1,20 @@
 // @ts-check
 
-/** @typedef {import("./picture.js").Scene} Scene @typedef {import("./picture.js").Fit} Fit @typedef {import("./picture.js").Frame} Frame */
+/**
+ * @typedef {import("./picture.js").Scene} Scene
+ * @typedef {import("./picture.js").Fit} Fit
+ * @typedef {import("./picture.js").Frame} Frame
+ */
 
 /**
- * One row per ray: a line from its origin to what it measured, a ring at what it renders, the residual between them,
+ * One row per ray: a line from its origin to what it measured, a ring at what it renders, the residual
+ * between them,
  * and where a bin is looked at, what the ray wants of it.
- * @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene} scene @param {Fit} fit @param {Record<string, string>} c
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene} scene
+ * @param {Fit} fit
+ * @param {Record<string, string>} c
  */
 export function drawRays(g, f, scene, fit, c) {
   g.textBaseline = "middle";
@@ -26,7 +35,11 @@ export function drawRays(g, f, scene, fit, c) {
     g.fillStyle = chosen ? c.ink : c.muted;
     g.fillText(`${i + 1}${ray.ascending ? " ›" : " ‹"}`, 26, y + 0.5);
     const off = rendered.residual;
-    g.fillText(off === null ? "–" : `${off < 0 ? "−" : "+"}${Math.abs(off).toFixed(2)} m`, f.right + 8, y + 0.5);
+    g.fillText(
+      off === null ? "–" : `${off < 0 ? "−" : "+"}${Math.abs(off).toFixed(2)} m`,
+      f.right + 8,
+      y + 0.5,
+    );
     const term = bin?.terms.find((/** @type {any} */ t) => t.ray === i);
     if (term) wants(g, f.x((bin.low + bin.high) / 2), y, term.pull, largest, f.pitch, c);
   }
@@ -37,7 +50,14 @@ export function drawRays(g, f, scene, fit, c) {
   turned(g, "held out", 12, (f.row(7) + f.row(9)) / 2, c.muted);
 }
 
-/** @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene["rays"][number]} ray @param {number} y @param {string} color @param {boolean} chosen */
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene["rays"][number]} ray
+ * @param {number} y
+ * @param {string} color
+ * @param {boolean} chosen
+ */
 function line(g, f, ray, y, color, chosen) {
   const [from, to] = [f.x(ray.origin), f.x(ray.at)];
   g.strokeStyle = g.fillStyle = color;
@@ -59,7 +79,15 @@ function line(g, f, ray, y, color, chosen) {
   g.stroke();
 }
 
-/** @param {CanvasRenderingContext2D} g @param {Frame} f @param {Scene["rays"][number]} ray @param {{at: number | null}} rendered @param {number} y @param {Record<string, string>} c @param {string} color */
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {Frame} f
+ * @param {Scene["rays"][number]} ray
+ * @param {{at: number | null}} rendered
+ * @param {number} y
+ * @param {Record<string, string>} c
+ * @param {string} color
+ */
 function residual(g, f, ray, rendered, y, c, color) {
   if (rendered.at === null) return;
   const measured = f.x(ray.at);
@@ -90,7 +118,16 @@ function residual(g, f, ray, rendered, y, c, color) {
   g.stroke();
 }
 
-/** A wedge: up where the ray wants more density in the bin. @param {CanvasRenderingContext2D} g @param {number} x @param {number} y @param {number} pull @param {number} largest @param {number} pitch @param {Record<string, string>} c */
+/**
+ * A wedge: up where the ray wants more density in the bin.
+ * @param {CanvasRenderingContext2D} g
+ * @param {number} x
+ * @param {number} y
+ * @param {number} pull
+ * @param {number} largest
+ * @param {number} pitch
+ * @param {Record<string, string>} c
+ */
 function wants(g, x, y, pull, largest, pitch, c) {
   // What is too little to matter would be a speck.
   if (Math.abs(pull) < 1e-3 * largest) return;
@@ -108,7 +145,13 @@ function wants(g, x, y, pull, largest, pitch, c) {
   g.fill();
 }
 
-/** @param {CanvasRenderingContext2D} g @param {string} text @param {number} x @param {number} y @param {string} color */
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {string} text
+ * @param {number} x
+ * @param {number} y
+ * @param {string} color
+ */
 function turned(g, text, x, y, color) {
   g.save();
   g.translate(x, y);

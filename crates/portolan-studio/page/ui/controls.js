@@ -4,7 +4,8 @@
  * An element with attributes and children.
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag
- * @param {Record<string, any>} [attributes] `class`, `id`, `aria-…`, `data-…`, or properties such as `onclick`
+ * @param {Record<string, any>} [attributes] `class`, `id`, `aria-…`, `data-…`, or properties such as
+ *   `onclick`
  * @param {...(Node | string)} children
  * @returns {HTMLElementTagNameMap[K]}
  */
@@ -22,12 +23,15 @@ export function el(tag, attributes = {}, ...children) {
 
 /**
  * A slider with its name and value. `values`: the choices, for steps that are not equal.
- * @param {{id: string, label: string, values?: number[], min?: number, max?: number, step?: number, value: number,
+ * @param {{id: string, label: string, values?: number[], min?: number, max?: number, step?: number, value:
+ *   number,
  *   format?: (v: number) => string, oninput: (v: number) => void}} o
  */
 export function slider(o) {
   const { values } = o;
-  const range = values ? { min: 0, max: values.length - 1, step: 1 } : { min: o.min, max: o.max, step: o.step };
+  const range = values
+    ? { min: 0, max: values.length - 1, step: 1 }
+    : { min: o.min, max: o.max, step: o.step };
   const format = o.format ?? String;
   const output = el("output", { for: o.id }, format(o.value));
   const input = el("input", { type: "range", id: o.id, ...range });
@@ -56,10 +60,15 @@ export function slider(o) {
 
 /**
  * A choice among words.
- * @param {{id: string, label: string, options: [string, string][], value: string, onchange: (v: string) => void}} o
+ * @param {{id: string, label: string, options: [string, string][], value: string, onchange: (v: string) =>
+ *   void}} o
  */
 export function choice(o) {
-  const select = el("select", { id: o.id }, ...o.options.map(([value, text]) => el("option", { value }, text)));
+  const select = el(
+    "select",
+    { id: o.id },
+    ...o.options.map(([value, text]) => el("option", { value }, text)),
+  );
   select.value = o.value;
   select.onchange = () => o.onchange(select.value);
   const node = el("div", { class: "row control" }, el("label", { for: o.id }, o.label), select);
@@ -100,7 +109,11 @@ export function toggle(o) {
  */
 export function facts(rows) {
   const outs = new Map(rows.map(([id]) => [id, el("dd", { id })]));
-  const node = el("dl", { class: "facts" }, ...rows.flatMap(([id, label]) => [el("dt", {}, label), /** @type {HTMLElement} */ (outs.get(id))]));
+  const node = el(
+    "dl",
+    { class: "facts" },
+    ...rows.flatMap(([id, label]) => [el("dt", {}, label), /** @type {HTMLElement} */ (outs.get(id))]),
+  );
   return {
     node,
     /** @param {Record<string, string>} values */
@@ -120,7 +133,8 @@ export function group(title, ...children) {
 
 /**
  * A legend: a colour (or `ramp`), and what it means.
- * @param {{color: string, text: string, dashed?: boolean, ramp?: string}[]} items colours by the names of style.css
+ * @param {{color: string, text: string, dashed?: boolean, ramp?: string}[]} items colours by the names of
+ *   style.css
  */
 export function legend(items) {
   return el(
@@ -135,7 +149,12 @@ export function legend(items) {
   );
 }
 
-/** Calls at most every `ms` milliseconds, with the latest argument. @template T @param {(v: T) => void} f @param {number} ms */
+/**
+ * Calls at most every `ms` milliseconds, with the latest argument.
+ * @template T
+ * @param {(v: T) => void} f
+ * @param {number} ms
+ */
 export function calmly(f, ms) {
   let timer = 0;
   /** @type {T} */

@@ -18,5 +18,8 @@ export function save(name, blob) {
  * @param {import("../engine/engine.js").Answer} answer with `name` and the array `file`
  */
 export function saveAnswer(answer) {
-  save(answer.body.name, new Blob([/** @type {any} */ (answer.arrays.file)], { type: "application/octet-stream" }));
+  save(
+    answer.body.name,
+    new Blob([/** @type {any} */ (answer.arrays.file)], { type: "application/octet-stream" }),
+  );
 }

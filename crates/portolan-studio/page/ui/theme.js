@@ -21,8 +21,28 @@ export function nextTheme() {
 
 /** @type {Record<string, string> | undefined} */
 let palette;
-const NAMES = ["bg", "panel", "ink", "muted", "line", "accent", "good", "bad", "warn", "soft", "negative", "positive", "beam", "contour", "truth",
-  "paper", "grid-line", "robot", "chair", "unknown"];
+const NAMES = [
+  "bg",
+  "panel",
+  "ink",
+  "muted",
+  "line",
+  "accent",
+  "good",
+  "bad",
+  "warn",
+  "soft",
+  "negative",
+  "positive",
+  "beam",
+  "contour",
+  "truth",
+  "paper",
+  "grid-line",
+  "robot",
+  "chair",
+  "unknown",
+];
 
 /** The colours of the theme by the names of style.css, as CSS colours. @returns {Record<string, string>} */
 export function colors() {

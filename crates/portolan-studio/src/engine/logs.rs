@@ -9,15 +9,15 @@ use portolan_io::scan_log::ScanLog;
 #[derive(Default)]
 pub struct Logs {
     /// What the views of the plane show.
-    pub plane: PlaneLog,
+    pub source_2d: Source2d,
     /// What the view of space shows.
-    pub space: SpaceSource,
+    pub source_3d: Source3d,
 }
 
 /// Scans of the plane.
 #[derive(Default)]
-pub enum PlaneLog {
-    /// The textbook's lap through the Apartment, over and over.
+pub enum Source2d {
+    /// The chapter's lap through the Apartment, over and over.
     #[default]
     Apartment,
     /// A log that was read.
@@ -31,7 +31,7 @@ pub enum PlaneLog {
 
 /// Scans of space.
 #[derive(Default)]
-pub enum SpaceSource {
+pub enum Source3d {
     /// The simulated building, of which the truth is known.
     #[default]
     Building,

@@ -9,9 +9,9 @@ mod logs;
 mod protocol;
 mod radiance;
 mod session;
-mod space;
+mod view3d;
 
 pub use clock::Clock;
-pub use logs::{Logs, PlaneLog, SpaceSource};
+pub use logs::{Logs, Source2d, Source3d};
 pub use protocol::{Array, Refusal, Reply, Values, Wire};
 pub use session::{Limits, Session, check};

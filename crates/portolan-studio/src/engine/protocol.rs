@@ -36,7 +36,8 @@ pub(super) enum View {
     Gallery,
     Clearance,
     Radiance,
-    Space,
+    #[serde(rename = "3d")]
+    View3d,
 }
 
 /// An answer.

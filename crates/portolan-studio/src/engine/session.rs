@@ -7,7 +7,7 @@ use super::fusion::Fusion;
 use super::gallery::Gallery;
 use super::protocol::{Message, Refusal, Reply, View, Wire, encode};
 use super::radiance::Radiance;
-use super::space::Space;
+use super::view3d::View3d;
 use super::{Clock, Logs};
 
 /// What one session may take.
@@ -39,7 +39,7 @@ pub struct Session {
     gallery: Gallery,
     clearance: Clearance,
     radiance: Radiance,
-    space: Space,
+    view3d: View3d,
 }
 
 impl Session {
@@ -51,7 +51,7 @@ impl Session {
             gallery: Gallery::new(limits, clock),
             clearance: Clearance::new(limits, clock),
             radiance: Radiance::new(clock),
-            space: Space::new(logs, limits, clock),
+            view3d: View3d::new(logs, limits, clock),
         }
     }
 
@@ -70,7 +70,7 @@ impl Session {
             View::Gallery => self.gallery.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Clearance => self.clearance.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Radiance => self.radiance.ask(&serde_json::from_str(ask)?),
-            View::Space => self.space.ask(serde_json::from_str(ask)?),
+            View::View3d => self.view3d.ask(serde_json::from_str(ask)?),
         }?;
         let held = self.memory_bytes();
         if held > self.limits.memory {
@@ -91,7 +91,7 @@ impl Session {
             + self.gallery.memory_bytes()
             + self.clearance.memory_bytes()
             + self.radiance.memory_bytes()
-            + self.space.memory_bytes()
+            + self.view3d.memory_bytes()
     }
 
     fn forget(&mut self, view: View) {
@@ -100,7 +100,7 @@ impl Session {
             View::Gallery => self.gallery.forget(),
             View::Clearance => self.clearance.forget(),
             View::Radiance => self.radiance.forget(),
-            View::Space => self.space.forget(),
+            View::View3d => self.view3d.forget(),
         }
     }
 }

@@ -1,12 +1,11 @@
-//! The page: its files are in the binary (debug builds read them from the folder, so that a reload shows an edit).
+//! The page: its files are in the binary. Debug builds read them from the folder, so that a reload shows an edit.
+
+use std::borrow::Cow;
 
 use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use rust_embed::RustEmbed;
 
-#[derive(RustEmbed)]
-#[folder = "page/"]
-struct Page;
+use super::files::FILES;
 
 /// A file of the page.
 pub(super) async fn serve(method: Method, uri: Uri) -> Response {
@@ -17,10 +16,25 @@ pub(super) async fn serve(method: Method, uri: Uri) -> Response {
         "" => "index.html",
         path => path,
     };
-    match Page::get(path) {
-        Some(file) => ([(header::CONTENT_TYPE, kind(path))], file.data).into_response(),
+    match read(path) {
+        Some(bytes) => ([(header::CONTENT_TYPE, kind(path))], bytes).into_response(),
         None => (StatusCode::NOT_FOUND, "the studio has no such file\n").into_response(),
     }
+}
+
+/// The content of a file; `None` for a path that is not in the table.
+fn read(path: &str) -> Option<Cow<'static, [u8]>> {
+    let (_, bytes) = FILES.iter().find(|(p, _)| *p == path)?;
+    #[cfg(debug_assertions)]
+    if let Ok(edited) = std::fs::read(folder().join(path)) {
+        return Some(edited.into());
+    }
+    Some((*bytes).into())
+}
+
+#[cfg(any(debug_assertions, test))]
+fn folder() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("page")
 }
 
 fn kind(path: &str) -> &'static str {
@@ -30,5 +44,43 @@ fn kind(path: &str) -> &'static str {
         Some("css") => "text/css; charset=utf-8",
         Some("svg") => "image/svg+xml",
         _ => "text/plain; charset=utf-8",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn walk(folder: &Path, prefix: &str, found: &mut Vec<String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let entry = entry.unwrap();
+            let name = format!("{prefix}{}", entry.file_name().to_str().unwrap());
+            if entry.file_type().unwrap().is_dir() {
+                walk(&entry.path(), &format!("{name}/"), found);
+            } else {
+                found.push(name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_table_holds_every_file_of_the_page() {
+        let mut found = Vec::new();
+        walk(&folder(), "", &mut found);
+        found.sort();
+        let listed: Vec<_> = FILES.iter().map(|(path, _)| path.to_string()).collect();
+        assert_eq!(listed, found, "src/server/files.rs lists the files of page/ in order");
+        for (path, bytes) in FILES {
+            assert_eq!(read(path).as_deref(), Some(*bytes), "{path}");
+        }
+    }
+
+    #[test]
+    fn paths_out_of_the_page_are_not_found() {
+        for path in ["../Cargo.toml", "page/index.html", "/etc/passwd", ""] {
+            assert!(read(path).is_none(), "{path}");
+        }
     }
 }

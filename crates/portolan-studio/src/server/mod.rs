@@ -12,6 +12,7 @@
 
 mod assets;
 mod connections;
+mod files;
 mod guard;
 mod socket;
 

@@ -11,7 +11,7 @@ mod gallery;
 mod keys;
 mod page;
 mod radiance;
-mod space;
+mod view3d;
 
 use portolan_studio::engine::Logs;
 use portolan_studio::server::{Server, Settings};

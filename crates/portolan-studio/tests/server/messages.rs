@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use portolan_sim::{LapConfig, apartment, lap};
-use portolan_studio::engine::{Clock, Limits, Logs, PlaneLog, Session, Wire};
+use portolan_studio::engine::{Clock, Limits, Logs, Session, Source2d, Wire};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -31,13 +31,13 @@ const QUESTIONS: &[&str] = &[
     r#"{"id":20,"view":"gallery","ask":{"op":"run","workload":"distance","probes":100}}"#,
     r#"{"id":21,"view":"gallery","ask":{"op":"answers","at":[2.2,4.5]}}"#,
     r#"{"id":22,"view":"gallery","ask":{"op":"trees"}}"#,
-    r#"{"id":23,"view":"space","ask":{"op":"open"}}"#,
-    r#"{"id":24,"view":"space","ask":{"op":"step","frames":1}}"#,
-    r#"{"id":25,"view":"space","ask":{"op":"color","by":"error"}}"#,
-    r#"{"id":26,"view":"space","ask":{"op":"slice","slice":{"field":"tsdf","axis":2,"at":1.0}}}"#,
-    r#"{"id":27,"view":"space","ask":{"op":"pick","origin":[1,1,1],"direction":[1,0,0],"slice":{"field":"occupancy","axis":0,"at":2.0}}}"#,
-    r#"{"id":28,"view":"space","ask":{"op":"voxel","cell":[10,10,10]}}"#,
-    r#"{"id":29,"view":"space","ask":{"op":"history"}}"#,
+    r#"{"id":23,"view":"3d","ask":{"op":"open"}}"#,
+    r#"{"id":24,"view":"3d","ask":{"op":"step","frames":1}}"#,
+    r#"{"id":25,"view":"3d","ask":{"op":"color","by":"error"}}"#,
+    r#"{"id":26,"view":"3d","ask":{"op":"slice","slice":{"field":"tsdf","axis":2,"at":1.0}}}"#,
+    r#"{"id":27,"view":"3d","ask":{"op":"pick","origin":[1,1,1],"direction":[1,0,0],"slice":{"field":"occupancy","axis":0,"at":2.0}}}"#,
+    r#"{"id":28,"view":"3d","ask":{"op":"voxel","cell":[10,10,10]}}"#,
+    r#"{"id":29,"view":"3d","ask":{"op":"history"}}"#,
 ];
 
 /// Values that numbers, words and lists are replaced with.
@@ -143,8 +143,8 @@ fn takes_long(message: &str) -> bool {
 
 fn logs() -> [Arc<Logs>; 2] {
     let scans = lap(&apartment().world, &LapConfig { scans: 5, ..LapConfig::default() });
-    let recorded = PlaneLog::Recorded { name: "five scans".into(), scans };
-    [Arc::new(Logs::default()), Arc::new(Logs { plane: recorded, ..Logs::default() })]
+    let recorded = Source2d::Recorded { name: "five scans".into(), scans };
+    [Arc::new(Logs::default()), Arc::new(Logs { source_2d: recorded, ..Logs::default() })]
 }
 
 /// An answer is whole: its number, `ok` or `error`, and arrays inside of the message.

@@ -10,7 +10,7 @@ use super::fields::{Fields, Sample, length};
 use crate::engine::Refusal;
 
 /// The answer for the page: numbers of both fields, and the row of `query`.
-pub(super) fn tell(
+pub(super) fn answer(
     tsdf: &Tsdf2,
     fields: &Fields,
     p: [f64; 2],

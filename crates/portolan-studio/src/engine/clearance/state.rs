@@ -18,11 +18,11 @@ const BYTES_PER_CELL: usize = 48;
 pub(in crate::engine) struct Clearance {
     limits: Limits,
     clock: Clock,
-    made: Option<Made>,
+    made: Option<MapFields>,
 }
 
 /// What was made of a map.
-struct Made {
+struct MapFields {
     /// Of the map.
     revision: u64,
     fields: Fields,
@@ -47,7 +47,7 @@ impl Clearance {
             Ask::Rings { field, spacing } => rings::rings(fields, field, spacing),
             Ask::Arrows { field, bounds, spacing } => arrows::arrows(fields, field, bounds, spacing),
             Ask::Probe { at, unknown } => {
-                Reply::of(probe::tell(fusion.tsdf()?, fields, at, unknown.space())?)
+                Reply::of(probe::answer(fusion.tsdf()?, fields, at, unknown.space())?)
             }
             Ask::Path { points, clearance, unknown } => {
                 check(&fields.euclidean, points, clearance, unknown.space())
@@ -59,13 +59,13 @@ impl Clearance {
     }
 
     /// The fields of the map as it is now.
-    fn follow(&mut self, fusion: &mut Fusion) -> Result<&Made, Refusal> {
+    fn follow(&mut self, fusion: &mut Fusion) -> Result<&MapFields, Refusal> {
         let clock = self.clock.clone();
         fusion.tsdf()?;
         let revision = fusion.revision();
         let made = match self.made.take().filter(|m| m.revision == revision) {
             Some(made) => made,
-            None => Made::of(fusion.tsdf()?, revision, &self.limits, &clock)?,
+            None => MapFields::of(fusion.tsdf()?, revision, &self.limits, &clock)?,
         };
         Ok(self.made.insert(made))
     }
@@ -80,7 +80,7 @@ impl Clearance {
     }
 }
 
-impl Made {
+impl MapFields {
     fn of(tsdf: &Tsdf2, revision: u64, limits: &Limits, clock: &Clock) -> Result<Self, Refusal> {
         let wanted = BYTES_PER_CELL.saturating_mul(tsdf.grid().len());
         if wanted > limits.memory {
@@ -102,7 +102,7 @@ impl Made {
         let grid = frame::grid(self.fields.grid());
         let way = way(fusion);
         let body = json!({
-            "name": fusion.lap().name(),
+            "name": fusion.scans().name(),
             "at": at,
             "grid": grid,
             "truncation": config.truncation,
@@ -112,7 +112,7 @@ impl Made {
             "meter": self.meter,
             "start": way.get(way.len() / 2),
             "way": way,
-            "truth": fusion.lap().world(at).map(frame::truth),
+            "truth": fusion.scans().world(at).map(frame::truth),
         });
         Ok(Reply::of(body)?
             .with("truncated", self.fields.samples(Which::Truncated).to_vec())
@@ -127,7 +127,7 @@ const WAY_POINTS: usize = 900;
 
 /// Where the sensor was, once around: a path that was free.
 fn way(fusion: &Fusion) -> Vec<[f64; 2]> {
-    let scans = fusion.lap().first(fusion.at().min(fusion.lap().lap_length()));
+    let scans = fusion.scans().first(fusion.at().min(fusion.scans().lap_length()));
     let step = scans.len().div_ceil(WAY_POINTS).max(1);
     let last = scans.len().saturating_sub(1);
     let some = scans.iter().enumerate().filter(|(i, _)| i % step == 0 || *i == last);

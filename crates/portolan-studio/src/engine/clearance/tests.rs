@@ -18,7 +18,7 @@ use super::meter::meter;
 use super::{Clearance as View, path, probe};
 use crate::engine::fusion::Fusion;
 use crate::engine::protocol::Values;
-use crate::engine::{Clock, Limits, Logs, PlaneLog, Refusal, Reply};
+use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Source2d};
 
 /// A view and the map that it looks at.
 struct Studio {
@@ -27,8 +27,8 @@ struct Studio {
 }
 
 impl Studio {
-    fn of(plane: PlaneLog) -> Self {
-        let (logs, clock) = (Arc::new(Logs { plane, ..Logs::default() }), Clock::new(|| 0.0));
+    fn of(source_2d: Source2d) -> Self {
+        let (logs, clock) = (Arc::new(Logs { source_2d, ..Logs::default() }), Clock::new(|| 0.0));
         Self {
             fusion: Fusion::new(&logs, Limits::default(), &clock),
             view: View::new(Limits::default(), &clock),
@@ -51,7 +51,7 @@ impl Studio {
 }
 
 fn apartment() -> Studio {
-    Studio::of(PlaneLog::Apartment)
+    Studio::of(Source2d::Apartment)
 }
 
 /// One look around a plain of 15 m with one wall at its end, or with none: what is near is known, what is further than 509
@@ -64,7 +64,7 @@ fn plain(wall: bool) -> Studio {
     };
     let (bearings, beams): (Vec<_>, Vec<_>) = (0..720).map(beam).unzip();
     let scan = Scan::from_fan(&bearings, beams);
-    Studio::of(PlaneLog::Recorded {
+    Studio::of(Source2d::Recorded {
         name: "plain".into(),
         scans: vec![(Pose::<2>::new(0.0, 0.0, 0.0), scan)],
     })

@@ -6,7 +6,7 @@ use portolan::map::Tsdf2;
 use portolan_chapter::ghost::{GhostGroup, GhostWatch};
 use serde_json::{Value, json};
 
-use super::lap::Move;
+use super::scans::Move;
 
 /// A moved chair that the map remembers.
 pub(super) struct Ghost {
@@ -33,7 +33,7 @@ impl Ghost {
     }
 
     /// Measured and predicted, after `at` scans.
-    pub(super) fn tell(&self, tsdf: &Tsdf2, at: usize, lap: usize) -> Value {
+    pub(super) fn to_json(&self, tsdf: &Tsdf2, at: usize, lap: usize) -> Value {
         let laps = (at - self.since.min(at)) as f64 / lap.max(1) as f64;
         let [measured, unclamped, tapered] = self.watch.groups(tsdf.rule(), laps);
         json!({

@@ -60,7 +60,7 @@ pub(in crate::engine) fn grid(grid: &Grid<2>) -> Value {
 
 /// Faces of walls and things, and where the chair stands.
 pub(in crate::engine) fn truth(world: &World) -> Value {
-    let chair = super::lap::chair(world);
+    let chair = super::scans::chair(world);
     let faces: Vec<_> = world.boundary().iter().map(|s| [s.a, s.b]).collect();
     json!({ "faces": faces, "chair": { "min": chair.min, "max": chair.max } })
 }

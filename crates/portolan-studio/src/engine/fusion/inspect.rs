@@ -5,20 +5,20 @@ use portolan::map::Tsdf2;
 use portolan_sim::World;
 use serde_json::{Value, json};
 
-use super::lap::Move;
+use super::scans::Move;
 
 /// A cell and everything that scans did to it.
 pub(super) struct Inspected {
     cell: [i32; 2],
     /// The scan that did it, and what it did.
     events: Vec<(usize, FusionEvent)>,
-    /// Events that the page has been told.
-    told: std::cell::Cell<usize>,
+    /// Events that the page has been sent.
+    sent: std::cell::Cell<usize>,
 }
 
 impl Inspected {
     pub(super) fn new(cell: [i32; 2]) -> Self {
-        Self { cell, events: Vec::new(), told: 0.into() }
+        Self { cell, events: Vec::new(), sent: 0.into() }
     }
 
     pub(super) fn cell(&self) -> [i32; 2] {
@@ -27,7 +27,7 @@ impl Inspected {
 
     pub(super) fn forget_events(&mut self) {
         self.events.clear();
-        self.told.set(0);
+        self.sent.set(0);
     }
 
     pub(super) fn observe(&mut self, scan: usize, events: &[([i32; 2], FusionEvent)]) {
@@ -35,18 +35,18 @@ impl Inspected {
         self.events.extend(of_cell.map(|e| (scan, e.1)));
     }
 
-    /// What has happened since the page was told; the page forgets what it has of event `from` and those after it.
+    /// What has happened since the page was sent; the page forgets what it has of event `from` and those after it.
     pub(super) fn news(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
-        self.tell(self.told.get().min(self.events.len()), tsdf, moved)
+        self.to_json(self.sent.get().min(self.events.len()), tsdf, moved)
     }
 
     /// All of it.
     pub(super) fn all(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
-        self.tell(0, tsdf, moved)
+        self.to_json(0, tsdf, moved)
     }
 
-    fn tell(&self, from: usize, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
-        self.told.set(self.events.len());
+    fn to_json(&self, from: usize, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
+        self.sent.set(self.events.len());
         let state = tsdf.grid().index(self.cell).and_then(|i| tsdf.store().at(i));
         json!({
             "cell": self.cell,

@@ -4,8 +4,8 @@ mod ask;
 mod chair;
 pub(super) mod frame;
 mod inspect;
-mod lap;
-mod seen;
+mod page_copy;
+mod scans;
 mod settings;
 mod state;
 #[cfg(test)]

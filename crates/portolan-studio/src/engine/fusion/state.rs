@@ -12,15 +12,15 @@ use super::ask::{Ask, ExportFile};
 use super::chair::Ghost;
 use super::frame;
 use super::inspect::Inspected;
-use super::lap::Lap;
-use super::seen::Seen;
+use super::page_copy::PageCopy;
+use super::scans::Scans;
 use super::settings::Settings;
 use crate::engine::exports;
-use crate::engine::{Clock, Limits, Logs, PlaneLog, Refusal, Reply};
+use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Source2d};
 
 /// Scans that one question may fuse: more would keep the page waiting for its picture.
 const MOST_STEPS: usize = 256;
-/// Cells around everything that was seen, besides the truncation.
+/// Cells around everything that was page, besides the truncation.
 const MARGIN_CELLS: f64 = 4.0;
 /// Bytes of a cell: the map, the page's copy, what is derived from them for a picture or a file.
 const BYTES_PER_CELL: f64 = 64.0;
@@ -30,33 +30,33 @@ pub(in crate::engine) struct Fusion {
     limits: Limits,
     clock: Clock,
     settings: Settings,
-    lap: Lap,
-    made: Option<Made>,
+    scans: Scans,
+    fused: Option<Fused>,
     inspected: Option<Inspected>,
     revision: u64,
 }
 
 /// What there is once it was asked for.
-struct Made {
+struct Fused {
     at: usize,
     tsdf: Tsdf2,
-    seen: Seen,
+    page: PageCopy,
     ghost: Option<Ghost>,
     stats: ScanStats,
 }
 
 impl Fusion {
     pub(in crate::engine) fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
-        let settings = match logs.plane {
-            PlaneLog::Apartment => Settings::default(),
-            PlaneLog::Recorded { .. } => Settings::of_log(),
+        let settings = match logs.source_2d {
+            Source2d::Apartment => Settings::default(),
+            Source2d::Recorded { .. } => Settings::of_log(),
         };
         Self {
             limits,
             clock: clock.clone(),
-            lap: Lap::new(logs, settings.noise),
+            scans: Scans::new(logs, settings.noise),
             settings,
-            made: None,
+            fused: None,
             inspected: None,
             revision: 0,
         }
@@ -66,8 +66,8 @@ impl Fusion {
     pub(in crate::engine) fn ask(&mut self, ask: Ask) -> Result<Reply, Refusal> {
         match ask {
             Ask::Open {} => {
-                let made = self.made()?;
-                made.seen = Seen::nothing(made.tsdf.grid().shape);
+                let fused = self.fused()?;
+                fused.page = PageCopy::nothing(fused.tsdf.grid().shape);
                 self.frame(0.0, true)
             }
             Ask::Step { scans } => {
@@ -78,11 +78,11 @@ impl Fusion {
             Ask::Set { settings } => self.set(settings),
             Ask::MoveChair { to } => {
                 let at = self.at();
-                self.lap.move_chair(at, to)?;
-                self.made()?;
-                if let Some(made) = &mut self.made {
-                    made.start_ghost(&self.lap);
-                    made.watch(self.inspected.as_ref());
+                self.scans.move_chair(at, to)?;
+                self.fused()?;
+                if let Some(fused) = &mut self.fused {
+                    fused.start_ghost(&self.scans);
+                    fused.watch(self.inspected.as_ref());
                 }
                 self.revision += 1;
                 self.frame(0.0, true)
@@ -94,12 +94,12 @@ impl Fusion {
 
     /// Scans that are fused.
     pub(in crate::engine) fn at(&self) -> usize {
-        self.made.as_ref().map_or(0, |m| m.at)
+        self.fused.as_ref().map_or(0, |m| m.at)
     }
 
-    /// The map as it is; made if there was none.
+    /// The map as it is; fused if there was none.
     pub(in crate::engine) fn tsdf(&mut self) -> Result<&Tsdf2, Refusal> {
-        Ok(&self.made()?.tsdf)
+        Ok(&self.fused()?.tsdf)
     }
 
     /// Another number whenever the map is another.
@@ -108,8 +108,8 @@ impl Fusion {
     }
 
     /// The scans, and what there is in truth.
-    pub(in crate::engine) fn lap(&self) -> &Lap {
-        &self.lap
+    pub(in crate::engine) fn scans(&self) -> &Scans {
+        &self.scans
     }
 
     /// How scans are fused.
@@ -120,20 +120,20 @@ impl Fusion {
     /// Fuses all of a log, or one lap, where nothing was fused yet: for views that show what is finished.
     pub(in crate::engine) fn finish_if_new(&mut self) -> Result<(), Refusal> {
         if self.at() == 0 {
-            self.drive_to(self.lap.lap_length())?;
+            self.drive_to(self.scans.lap_length())?;
         }
         Ok(())
     }
 
-    fn made(&mut self) -> Result<&mut Made, Refusal> {
-        if self.made.is_none() {
-            self.made = Some(self.empty()?);
+    fn fused(&mut self) -> Result<&mut Fused, Refusal> {
+        if self.fused.is_none() {
+            self.fused = Some(self.empty()?);
         }
-        self.made.as_mut().ok_or_else(|| Refusal::new("there is no map"))
+        self.fused.as_mut().ok_or_else(|| Refusal::new("there is no map"))
     }
 
     /// A map of nothing.
-    fn empty(&self) -> Result<Made, Refusal> {
+    fn empty(&self) -> Result<Fused, Refusal> {
         let config = self.settings.config()?;
         let grid = self.grid(config.resolution, config.truncation)?;
         let cells: f64 = grid.shape.iter().map(|&n| n as f64).product();
@@ -145,21 +145,21 @@ impl Fusion {
                 self.limits.memory >> 20
             )));
         }
-        let tsdf = Tsdf2::covering(&grid, config).map_err(Refusal::new)?;
-        let seen = Seen::nothing(grid.shape);
-        Ok(Made { at: 0, tsdf, seen, ghost: None, stats: ScanStats::default() })
+        let tsdf = Tsdf2::new(config.with_grid(&grid)).map_err(Refusal::new)?;
+        let page = PageCopy::nothing(grid.shape);
+        Ok(Fused { at: 0, tsdf, page, ghost: None, stats: ScanStats::default() })
     }
 
     /// The Apartment's box, or what the log saw, free ends of beams included.
     fn grid(&self, resolution: f64, truncation: f64) -> Result<Grid<2>, Refusal> {
-        if let Some(world) = self.lap.world(0) {
+        if let Some(world) = self.scans.world(0) {
             let [w, h] = world.aabb().extent();
             // The small number keeps a rounded-up quotient from making one more column.
             let cells = |metres: f64| (metres / resolution - 1e-9).ceil().max(1.0) as usize;
             return Ok(Grid::new(world.aabb().min, resolution, [cells(w), cells(h)]));
         }
         let mut bounds = Aabb::EMPTY;
-        for (pose, scan) in self.lap.first(self.lap.most()) {
+        for (pose, scan) in self.scans.first(self.scans.most()) {
             bounds.include(pose.translation);
             for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
                 bounds.include(along(pose.translation, pose.rotate(beam.direction), beam.free_range()));
@@ -179,30 +179,30 @@ impl Fusion {
 
     /// Fuses on, or from the beginning, until `to` scans are fused.
     fn drive_to(&mut self, to: usize) -> Result<(), Refusal> {
-        let to = to.min(self.lap.most());
+        let to = to.min(self.scans.most());
         if to < self.at() {
-            self.made = None;
+            self.fused = None;
         }
-        if self.made.is_none() {
+        if self.fused.is_none() {
             if let Some(inspected) = &mut self.inspected {
                 inspected.forget_events();
             }
-            self.made = Some(self.empty()?);
+            self.fused = Some(self.empty()?);
         }
-        let Some(made) = &mut self.made else { return Ok(()) };
-        if to != made.at {
+        let Some(fused) = &mut self.fused else { return Ok(()) };
+        if to != fused.at {
             self.revision += 1;
         }
-        if made.at == 0 {
-            made.start_ghost(&self.lap);
-            made.watch(self.inspected.as_ref());
+        if fused.at == 0 {
+            fused.start_ghost(&self.scans);
+            fused.watch(self.inspected.as_ref());
         }
-        while made.at < to {
-            made.fuse_one(&mut self.lap, self.inspected.as_mut())?;
-            made.at += 1;
-            if self.lap.move_before(made.at).is_some() {
-                made.start_ghost(&self.lap);
-                made.watch(self.inspected.as_ref());
+        while fused.at < to {
+            fused.fuse_one(&mut self.scans, self.settings.carve, self.inspected.as_mut());
+            fused.at += 1;
+            if self.scans.move_before(fused.at).is_some() {
+                fused.start_ghost(&self.scans);
+                fused.watch(self.inspected.as_ref());
             }
         }
         Ok(())
@@ -212,16 +212,16 @@ impl Fusion {
         settings.config()?;
         let at = self.at();
         let before = std::mem::replace(&mut self.settings, settings);
-        // What cannot be made leaves what there is.
+        // What cannot be fused leaves what there is.
         if let Err(refusal) = self.empty() {
             self.settings = before;
             return Err(refusal);
         }
-        self.lap.set_noise(self.settings.noise);
+        self.scans.set_noise(self.settings.noise);
         if before.resolution != self.settings.resolution {
             self.inspected = None;
         }
-        self.made = None;
+        self.fused = None;
         self.revision += 1;
         let clock = self.clock.clone();
         let (done, seconds) = clock.time(|| self.drive_to(at));
@@ -231,37 +231,37 @@ impl Fusion {
 
     /// What the page must know to draw; with `all` also what seldom changes.
     fn frame(&mut self, seconds: f64, all: bool) -> Result<Reply, Refusal> {
-        self.made()?;
-        let Some(made) = &mut self.made else { return Err(Refusal::new("there is no map")) };
-        let delta = made.seen.update(&made.tsdf);
+        self.fused()?;
+        let Some(fused) = &mut self.fused else { return Err(Refusal::new("there is no map")) };
+        let delta = fused.page.update(&fused.tsdf);
         let mut body = json!({
-            "at": made.at,
+            "at": fused.at,
             "fresh": delta.fresh,
-            "lap": self.lap.lap_length(),
-            "most": self.lap.most(),
+            "lap": self.scans.lap_length(),
+            "most": self.scans.most(),
             "revision": self.revision,
             "seconds": seconds,
-            "observed": made.tsdf.observed_cells(0.0),
-            "beams": frame::counts(&made.stats),
-            "bytes": made.tsdf.memory_bytes(),
-            "half_life": self.settings.config()?.w_max.is_finite().then(|| made.tsdf.rule().half_life(1.0)),
-            "ghost": made.ghost.as_ref().map(|g| g.tell(&made.tsdf, made.at, self.lap.lap_length())),
-            "inspected": self.inspected.as_ref().map(|i| i.news(&made.tsdf, self.lap.last_move(made.at))),
+            "observed": fused.tsdf.observed_cells(0.0),
+            "beams": frame::counts(&fused.stats),
+            "bytes": fused.tsdf.memory_bytes(),
+            "half_life": self.settings.config()?.w_max.is_finite().then(|| fused.tsdf.rule().half_life(1.0)),
+            "ghost": fused.ghost.as_ref().map(|g| g.to_json(&fused.tsdf, fused.at, self.scans.lap_length())),
+            "inspected": self.inspected.as_ref().map(|i| i.news(&fused.tsdf, self.scans.last_move(fused.at))),
         });
-        let last = made.at.checked_sub(1).map(|i| &self.lap.first(i + 1)[i]);
+        let last = fused.at.checked_sub(1).map(|i| &self.scans.first(i + 1)[i]);
         body["pose"] = json!(last.map(|(pose, _)| frame::pose(pose)));
         if all {
             body["all"] = json!({
-                "name": self.lap.name(),
+                "name": self.scans.name(),
                 "settings": self.settings,
-                "grid": frame::grid(made.tsdf.grid()),
-                "way": self.lap.way(),
-                "truth": self.lap.world(made.at).map(frame::truth),
-                "moves": self.lap.moves(),
-                "block": super::seen::EDGE,
+                "grid": frame::grid(fused.tsdf.grid()),
+                "way": self.scans.way(),
+                "truth": self.scans.world(fused.at).map(frame::truth),
+                "moves": self.scans.moves(),
+                "block": super::page_copy::EDGE,
             });
         }
-        let contour = frame::contour(&made.tsdf);
+        let contour = frame::contour(&fused.tsdf);
         let mut reply = Reply::of(body)?
             .with("blocks", delta.blocks)
             .with("distance", delta.distance)
@@ -276,10 +276,10 @@ impl Fusion {
     }
 
     fn watch(&mut self, cell: Option<[i32; 2]>) -> Result<Reply, Refusal> {
-        self.made()?;
+        self.fused()?;
         let Some(cell) = cell else {
             self.inspected = None;
-            self.made()?.watch(None);
+            self.fused()?.watch(None);
             return Reply::of(json!(null));
         };
         let at = self.at();
@@ -291,46 +291,46 @@ impl Fusion {
         let mut inspected = Inspected::new(cell);
         again.watch(Some(&inspected));
         while again.at < at {
-            again.fuse_one(&mut self.lap, Some(&mut inspected))?;
+            again.fuse_one(&mut self.scans, self.settings.carve, Some(&mut inspected));
             again.at += 1;
         }
         let mut body = json!(null);
-        if let Some(made) = &mut self.made {
-            made.watch(Some(&inspected));
-            body = inspected.all(&made.tsdf, self.lap.last_move(at));
+        if let Some(fused) = &mut self.fused {
+            fused.watch(Some(&inspected));
+            body = inspected.all(&fused.tsdf, self.scans.last_move(at));
         }
         self.inspected = Some(inspected);
         Reply::of(body)
     }
 
     fn export(&mut self, file: ExportFile) -> Result<Reply, Refusal> {
-        self.made()?;
-        let Some(made) = &self.made else { return Err(Refusal::new("there is no map")) };
+        self.fused()?;
+        let Some(fused) = &self.fused else { return Err(Refusal::new("there is no map")) };
         match file {
-            ExportFile::Esdf => exports::esdf(&made.tsdf),
-            ExportFile::Contour => exports::contour(&made.tsdf),
-            ExportFile::Map => exports::map(&made.tsdf, self.lap.name(), made.at, &json!(self.settings)),
+            ExportFile::Esdf => exports::esdf(&fused.tsdf),
+            ExportFile::Contour => exports::contour(&fused.tsdf),
+            ExportFile::Map => exports::map(&fused.tsdf, self.scans.name(), fused.at, &json!(self.settings)),
         }
     }
 
     pub(in crate::engine) fn memory_bytes(&self) -> usize {
-        let map = self.made.as_ref().map_or(0, |m| m.tsdf.memory_bytes() + m.seen.memory_bytes());
-        map + self.lap.memory_bytes()
+        let map = self.fused.as_ref().map_or(0, |m| m.tsdf.memory_bytes() + m.page.memory_bytes());
+        map + self.scans.memory_bytes()
     }
 
     /// Gives the map up.
     pub(in crate::engine) fn forget(&mut self) {
-        self.made = None;
+        self.fused = None;
         self.inspected = None;
         self.revision += 1;
     }
 }
 
-impl Made {
+impl Fused {
     /// Fuses the scan after those that are fused.
-    fn fuse_one(&mut self, lap: &mut Lap, inspected: Option<&mut Inspected>) -> Result<(), Refusal> {
-        let (pose, scan) = lap.scan(self.at);
-        self.stats = self.tsdf.integrate(pose, scan).map_err(Refusal::new)?;
+    fn fuse_one(&mut self, scans: &mut Scans, carve: bool, inspected: Option<&mut Inspected>) {
+        let (pose, scan) = scans.scan(self.at);
+        self.stats = self.tsdf.integrate(pose, scan, carve);
         if let Some(ghost) = &mut self.ghost {
             ghost.observe(self.tsdf.events());
         }
@@ -341,8 +341,8 @@ impl Made {
     }
 
     /// Follows the chair that was just moved, if one was.
-    fn start_ghost(&mut self, lap: &Lap) {
-        if let Some(moved) = lap.move_before(self.at) {
+    fn start_ghost(&mut self, scans: &Scans) {
+        if let Some(moved) = scans.move_before(self.at) {
             self.ghost = Some(Ghost::new(&self.tsdf, moved));
         }
     }

@@ -9,7 +9,7 @@ use portolan::scan::Scan;
 use portolan_sim::{LapConfig, apartment, lap};
 use serde_json::{Value, json};
 
-use crate::engine::{Clock, Limits, Logs, PlaneLog, Session, Wire};
+use crate::engine::{Clock, Limits, Logs, Session, Source2d, Wire};
 
 fn session(logs: Logs) -> Session {
     Session::new(&Arc::new(logs), Limits::default(), &Clock::new(|| 0.0))
@@ -89,8 +89,8 @@ fn a_cells_history_is_what_the_library_says() {
 }
 
 #[test]
-fn laps_are_the_textbooks() {
-    let mut lap_of = super::lap::Lap::new(&Arc::default(), 0.01);
+fn laps_are_the_chapters() {
+    let mut lap_of = super::scans::Scans::new(&Arc::default(), 0.01);
     let world = apartment().world;
     for k in [0, 1] {
         let expected = lap(&world, &LapConfig { first_index: 200 * k, ..Default::default() });
@@ -192,8 +192,8 @@ fn what_cannot_be_is_refused_and_changes_nothing() {
 #[test]
 fn a_recorded_log_has_no_truth_and_an_end() {
     let scans: Vec<_> = lap(&apartment().world, &LapConfig { scans: 12, ..Default::default() });
-    let recorded = PlaneLog::Recorded { name: "twelve".into(), scans };
-    let mut session = session(Logs { plane: recorded, ..Logs::default() });
+    let recorded = Source2d::Recorded { name: "twelve".into(), scans };
+    let mut session = session(Logs { source_2d: recorded, ..Logs::default() });
     let all = ask(&mut session, json!({ "op": "open" }))["all"].clone();
     assert_eq!((all["name"].as_str(), all["truth"].is_null()), (Some("twelve"), true));
     assert_eq!(ask(&mut session, json!({ "op": "step", "scans": 100 }))["at"], 12);

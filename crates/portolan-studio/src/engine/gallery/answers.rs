@@ -5,11 +5,11 @@ use portolan_chapter::MapRepr;
 use portolan_sim::World;
 use serde_json::{Value, json};
 
-use super::state::Made;
+use super::state::Built;
 
 /// What each answers at a point; `null` where it does not know.
-pub(super) fn at(made: &Made, p: [f64; 2]) -> Value {
-    let m = &made.measured;
+pub(super) fn at(built: &Built, p: [f64; 2]) -> Value {
+    let m = &built.measured;
     let grid = m.tsdf.grid();
     let cell = grid.index_of(p).and_then(|i| m.tsdf.store().at(i));
     let limit = norm(grid.aabb().extent());
@@ -24,6 +24,6 @@ pub(super) fn at(made: &Made, p: [f64; 2]) -> Value {
             "inside": m.contour.is_inside(p),
         },
         "cloud": { "distance": m.cloud.nearest_distance(p) },
-        "truth": made.truth.as_ref().map(|world: &World| world.signed_distance(p)),
+        "truth": built.truth.as_ref().map(|world: &World| world.signed_distance(p)),
     })
 }

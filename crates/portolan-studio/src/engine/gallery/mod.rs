@@ -3,8 +3,8 @@
 mod answers;
 mod ask;
 mod picture;
+mod report;
 mod state;
-mod tell;
 #[cfg(test)]
 mod tests;
 

@@ -7,8 +7,8 @@ use portolan::surface::{Ambiguity, level_set};
 use portolan_chapter::MapRepr;
 use serde_json::json;
 
-use super::state::Made;
-use super::tell;
+use super::report;
+use super::state::Built;
 use crate::engine::fusion::frame::{self, Lines};
 use crate::engine::{Refusal, Reply};
 
@@ -22,34 +22,34 @@ const RING: f64 = 0.25;
 const UNOBSERVED: u8 = 255;
 
 /// All numbers and all pictures.
-pub(super) fn everything(made: &Made) -> Result<Reply, Refusal> {
-    let m = &made.measured;
-    let (rings, spacing) = rings(made);
-    let leaves = leaves(made);
+pub(super) fn everything(built: &Built) -> Result<Reply, Refusal> {
+    let m = &built.measured;
+    let (rings, spacing) = rings(built);
+    let leaves = leaves(built);
     let points = m.cloud.points();
     let every = points.len().div_ceil(MOST_POINTS).max(1);
     let drawn: Vec<f32> = points.iter().step_by(every).flatten().map(|&v| v as f32).collect();
     let body = json!({
-        "revision": made.revision,
-        "of": made.of,
-        "seconds": made.seconds,
-        "costs": tell::costs(made),
-        "truth_and_trees": tell::constants(made),
+        "revision": built.revision,
+        "of": built.of,
+        "seconds": built.seconds,
+        "costs": report::costs(built),
+        "truth_and_trees": report::constants(built),
         "picture": {
             "grid": frame::grid(m.tsdf.grid()),
             "tree": { "origin": m.tree.store().lattice().origin, "resolution": m.tree.store().lattice().resolution },
             "truncation": m.tsdf.config().truncation,
             "ring": spacing,
-            "truth": made.truth.as_ref().map(|w| w.boundary().iter().map(|s| [s.a, s.b]).collect::<Vec<_>>()),
+            "truth": built.truth.as_ref().map(|w| w.boundary().iter().map(|s| [s.a, s.b]).collect::<Vec<_>>()),
             "every": every,
         },
     });
     let contour = Lines::of(&m.contour.polylines());
     Ok(Reply::of(body)?
-        .with("occupancy", occupancy(made))
+        .with("occupancy", occupancy(built))
         .with("leaves", leaves.squares)
         .with("leaf_occupancy", leaves.occupancy)
-        .with("tsdf", tsdf(made))
+        .with("tsdf", tsdf(built))
         .with("esdf", m.distance().samples().to_vec())
         .with("rings", rings.points)
         .with("ring_starts", rings.starts)
@@ -63,8 +63,8 @@ fn byte(probability: Option<f64>) -> u8 {
     probability.map_or(UNOBSERVED, |p| (254.0 * p).round() as u8)
 }
 
-fn occupancy(made: &Made) -> Vec<u8> {
-    let map = &made.measured.occupancy;
+fn occupancy(built: &Built) -> Vec<u8> {
+    let map = &built.measured.occupancy;
     let grid: &Grid<2> = map.store().grid();
     (0..grid.len()).map(|i| byte(map.store().at(i).map(|v| v.probability(map.rule())))).collect()
 }
@@ -76,9 +76,9 @@ struct Leaves {
     occupancy: Vec<u8>,
 }
 
-fn leaves(made: &Made) -> Leaves {
-    let map = &made.measured.tree;
-    let lattice = *map.store().lattice();
+fn leaves(built: &Built) -> Leaves {
+    let map = &built.measured.tree;
+    let lattice = *map.tree().lattice();
     let mut leaves = Leaves { squares: Vec::new(), occupancy: Vec::new() };
     map.store().for_each_leaf(|leaf| {
         leaves.squares.extend([leaf.cell[0] as u32, leaf.cell[1] as u32, 1 << leaf.height]);
@@ -88,14 +88,14 @@ fn leaves(made: &Made) -> Leaves {
 }
 
 /// Signed distances, NaN where nothing was observed.
-fn tsdf(made: &Made) -> Vec<f32> {
-    let map = &made.measured.tsdf;
+fn tsdf(built: &Built) -> Vec<f32> {
+    let map = &built.measured.tsdf;
     (0..map.grid().len()).map(|i| map.store().at(i).map_or(f32::NAN, |cell| cell.distance)).collect()
 }
 
 /// Lines of equal distance in free space, and their spacing (metres).
-fn rings(made: &Made) -> (Lines, f64) {
-    let field = made.measured.distance();
+fn rings(built: &Built) -> (Lines, f64) {
+    let field = built.measured.distance();
     let samples = field.samples();
     let most = samples.iter().filter(|d| !d.is_nan()).fold(0.0f32, |a, &d| a.max(d));
     let spacing = RING * (f64::from(most) / (RING * MOST_RINGS)).ceil().max(1.0);

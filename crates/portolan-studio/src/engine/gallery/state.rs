@@ -1,4 +1,4 @@
-//! The representations, and when they are made anew.
+//! The representations, and when they are built anew.
 
 use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
@@ -10,7 +10,7 @@ use portolan_sim::{Truth, World};
 use serde_json::{Value, json};
 
 use super::ask::Ask;
-use super::{answers, picture, tell};
+use super::{answers, picture, report};
 use crate::engine::fusion::Fusion;
 use crate::engine::{Clock, Limits, Refusal, Reply};
 
@@ -20,7 +20,7 @@ const FIRST_PROBES: usize = 10_000;
 const PROBES: std::ops::RangeInclusive<usize> = 100..=300_000;
 /// Bytes of a cell in all maps together, with what deriving and sending them takes on top.
 const BYTES_PER_CELL: f64 = 160.0;
-/// Bytes of a beam in the cloud and its tree, while they are made.
+/// Bytes of a beam in the cloud and its tree, while they are built.
 const BYTES_PER_BEAM: f64 = 120.0;
 /// Edges of the leaves that trees are fused with to follow the formula (metres).
 const LEAVES: [f64; 6] = [0.10, 0.075, 0.05, 0.0375, 0.025, 0.0175];
@@ -33,11 +33,11 @@ const MOST_SCANS: usize = 1000;
 pub(in crate::engine) struct Gallery {
     limits: Limits,
     clock: Clock,
-    made: Option<Made>,
+    built: Option<Built>,
 }
 
 /// What was built and measured, and of what.
-pub(super) struct Made {
+pub(super) struct Built {
     /// Of the map of fusion.
     pub(super) revision: u64,
     pub(super) settings: GallerySettings,
@@ -52,7 +52,7 @@ pub(super) struct Made {
 
 impl Gallery {
     pub(in crate::engine) fn new(limits: Limits, clock: &Clock) -> Self {
-        Self { limits, clock: clock.clone(), made: None }
+        Self { limits, clock: clock.clone(), built: None }
     }
 
     /// Answers.
@@ -60,10 +60,10 @@ impl Gallery {
         let clock = self.clock.clone();
         match ask {
             Ask::Open { have } => {
-                let made = self.made(fusion)?;
-                match have == Some(made.revision) {
-                    true => Reply::of(json!({ "revision": made.revision, "costs": tell::costs(made) })),
-                    false => picture::everything(made),
+                let built = self.built(fusion)?;
+                match have == Some(built.revision) {
+                    true => Reply::of(json!({ "revision": built.revision, "costs": report::costs(built) })),
+                    false => picture::everything(built),
                 }
             }
             Ask::Run { workload, probes } => {
@@ -73,15 +73,15 @@ impl Gallery {
                         "probes must be from {low} to {high}, and are {probes}"
                     )));
                 }
-                let made = self.made(fusion)?;
-                let measure = || made.measured.measure(workload.into(), probes, &mut || clock.now());
+                let built = self.built(fusion)?;
+                let measure = || built.measured.measure(workload.into(), probes, &mut || clock.now());
                 let ((), seconds) = clock.time(measure);
                 Reply::of(
-                    json!({ "revision": made.revision, "seconds": seconds, "costs": tell::costs(made) }),
+                    json!({ "revision": built.revision, "seconds": seconds, "costs": report::costs(built) }),
                 )
             }
             Ask::Answers { at } => match at.iter().all(|v| v.is_finite()) {
-                true => Reply::of(answers::at(self.made(fusion)?, at)),
+                true => Reply::of(answers::at(self.built(fusion)?, at)),
                 false => Err(Refusal::new("a place has two finite coordinates")),
             },
             Ask::Trees {} => self.trees(fusion),
@@ -89,19 +89,19 @@ impl Gallery {
     }
 
     /// What there is of the map of fusion as it is now.
-    fn made(&mut self, fusion: &mut Fusion) -> Result<&mut Made, Refusal> {
+    fn built(&mut self, fusion: &mut Fusion) -> Result<&mut Built, Refusal> {
         fusion.finish_if_new()?;
-        if self.made.as_ref().is_none_or(|made| made.revision != fusion.revision()) {
-            self.made = None;
-            self.made = Some(self.make(fusion)?);
+        if self.built.as_ref().is_none_or(|built| built.revision != fusion.revision()) {
+            self.built = None;
+            self.built = Some(self.make(fusion)?);
         }
-        self.made.as_mut().ok_or_else(|| Refusal::new("there is no gallery"))
+        self.built.as_mut().ok_or_else(|| Refusal::new("there is no gallery"))
     }
 
-    fn make(&self, fusion: &mut Fusion) -> Result<Made, Refusal> {
+    fn make(&self, fusion: &mut Fusion) -> Result<Built, Refusal> {
         let tsdf = fusion.tsdf()?;
         let (grid, esdf, contour) = (*tsdf.grid(), EsdfSettings::of(tsdf), ContourSettings::of(tsdf));
-        let lap = fusion.lap();
+        let lap = fusion.scans();
         let log = lap.first(fusion.at());
         let beams: usize = log.iter().map(|(_, scan)| scan.len()).sum();
         self.check_memory(grid.shape, beams, fusion)?;
@@ -127,10 +127,10 @@ impl Gallery {
             "probes": FIRST_PROBES, "moved": lap.last_move(fusion.at()).is_some(),
         });
         let truth = truth.cloned();
-        Ok(Made { revision: fusion.revision(), settings, measured, of, seconds, truth, trees: None })
+        Ok(Built { revision: fusion.revision(), settings, measured, of, seconds, truth, trees: None })
     }
 
-    /// Refuses what would take more than the tab may have, before any of it is made.
+    /// Refuses what would take more than the tab may have, before any of it is built.
     fn check_memory(&self, shape: [usize; 2], beams: usize, fusion: &Fusion) -> Result<(), Refusal> {
         let cells: f64 = shape.iter().map(|&n| n as f64).product();
         let needed = BYTES_PER_CELL * cells + BYTES_PER_BEAM * beams as f64;
@@ -148,29 +148,29 @@ impl Gallery {
     /// Trees of other leaves; once for a map, since nothing of them is a matter of time.
     fn trees(&mut self, fusion: &mut Fusion) -> Result<Reply, Refusal> {
         let limit = self.limits.memory.saturating_sub(fusion.memory_bytes()) as f64;
-        let made = self.made(fusion)?;
-        let log = fusion.lap().first(fusion.at());
+        let built = self.built(fusion)?;
+        let log = fusion.scans().first(fusion.at());
         let every = log.len().div_ceil(MOST_SCANS).max(1);
-        if made.trees.is_none() {
-            let bounds = made.settings.grid.aabb();
+        if built.trees.is_none() {
+            let bounds = built.settings.grid.aabb();
             let cells = |r: f64| bounds.extent().iter().map(|metres| (metres / r).ceil()).product::<f64>();
             let fit: Vec<f64> =
                 LEAVES.into_iter().filter(|&r| BYTES_PER_LEAF_CELL * cells(r) <= limit).collect();
             let few: Vec<_> = log.iter().step_by(every).cloned().collect();
-            let surface = tell::surface_length(made);
-            let trees = tree_crossovers_at(&few, made.settings.model, &bounds, surface, &fit);
-            made.trees = Some(trees.map_err(Refusal::new)?);
+            let surface = report::surface_length(built);
+            let trees = tree_crossovers_at(&few, built.settings.model, &bounds, surface, &fit);
+            built.trees = Some(trees.map_err(Refusal::new)?);
         }
-        let pairs: Vec<_> = made.trees.iter().flatten().map(tell::tree_pair).collect();
-        Reply::of(json!({ "revision": made.revision, "every": every, "sizes": pairs }))
+        let pairs: Vec<_> = built.trees.iter().flatten().map(report::tree_pair).collect();
+        Reply::of(json!({ "revision": built.revision, "every": every, "sizes": pairs }))
     }
 
     pub(in crate::engine) fn memory_bytes(&self) -> usize {
-        self.made.as_ref().map_or(0, |made| made.measured.memory_bytes())
+        self.built.as_ref().map_or(0, |built| built.measured.memory_bytes())
     }
 
     /// Gives everything up.
     pub(in crate::engine) fn forget(&mut self) {
-        self.made = None;
+        self.built = None;
     }
 }

@@ -13,7 +13,7 @@ use portolan_chapter::gallery::{Gallery, GallerySettings, LEVEL, run};
 use portolan_sim::{LapConfig, Truth, apartment, lap};
 use serde_json::{Value, json};
 
-use crate::engine::{Clock, Limits, Logs, PlaneLog, Session, Wire};
+use crate::engine::{Clock, Limits, Logs, Session, Source2d, Wire};
 
 /// Scans that are fused, of the lap's 200.
 const SCANS: usize = 40;
@@ -203,9 +203,12 @@ fn what_cannot_be_is_refused_in_words() {
     }
     let beams = [Beam { direction: [1.0, 0.0], range: 3.0, kind: BeamKind::MaxRange }];
     let scans = vec![(Pose::<2>::IDENTITY, Scan::from_beams(beams))];
-    let plane = PlaneLog::Recorded { name: "nothing".into(), scans };
-    let mut empty =
-        Session::new(&Arc::new(Logs { plane, ..Default::default() }), Limits::default(), &Clock::new(|| 0.0));
+    let plane = Source2d::Recorded { name: "nothing".into(), scans };
+    let mut empty = Session::new(
+        &Arc::new(Logs { source_2d: plane, ..Default::default() }),
+        Limits::default(),
+        &Clock::new(|| 0.0),
+    );
     assert!(refusal(&mut empty, json!({ "op": "open", "have": null })).contains("hit anything"));
 }
 

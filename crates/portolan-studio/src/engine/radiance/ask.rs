@@ -3,7 +3,7 @@
 use portolan_chapter::radiance::{Channels, Optimizer, Settings};
 use serde::{Deserialize, Serialize};
 
-/// A question. All are answered with the fit as it is then (`tell.rs`).
+/// A question. All are answered with the fit as it is then (`answer.rs`).
 #[derive(Debug, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case", deny_unknown_fields)]
 pub(in crate::engine) enum Ask {
@@ -30,7 +30,7 @@ pub(in crate::engine) enum Ask {
         /// How many, 1 to 2000.
         steps: usize,
     },
-    /// Looks at a ray, whose light is told from now on, and at a bin, whose gradient is.
+    /// Looks at a ray, whose light is sent from now on, and at a bin, whose gradient is.
     Look {
         /// The rays to learn from, then those held out, from 0.
         ray: Option<usize>,

@@ -9,8 +9,8 @@ const MOST: usize = 1024;
 pub(super) struct Curve {
     points: Vec<Point>,
     stride: u64,
-    /// Points that the page has been told.
-    told: usize,
+    /// Points that the page has been sent.
+    sent: usize,
 }
 
 /// The fit at a step; `None` where one way of fitting ends and the next begins.
@@ -23,7 +23,7 @@ struct Point {
 
 impl Curve {
     pub(super) fn new() -> Self {
-        Self { points: Vec::new(), stride: 1, told: 0 }
+        Self { points: Vec::new(), stride: 1, sent: 0 }
     }
 
     /// Whether the state at a step is one of those that are kept.
@@ -38,7 +38,7 @@ impl Curve {
             self.stride *= 2;
             let stride = self.stride;
             self.points.retain(|p| p.stays || p.step.is_multiple_of(stride));
-            self.told = 0;
+            self.sent = 0;
         }
     }
 
@@ -49,15 +49,15 @@ impl Curve {
     }
 
     /// The page knows nothing of it.
-    pub(super) fn untold(&mut self) {
-        self.told = 0;
+    pub(super) fn resend(&mut self) {
+        self.sent = 0;
     }
 
     /// The number of points that the page knows already, and the values of the others, eight each: step, objective,
     /// then depth, reflectance and second moment of the training rays and of the held-out ones.
     pub(super) fn news(&mut self) -> (usize, Vec<f32>) {
-        let from = self.told;
-        self.told = self.points.len();
+        let from = self.sent;
+        self.sent = self.points.len();
         let values = self.points[from..].iter().flat_map(|p| {
             let of = |f: fn(&Progress) -> f64| p.progress.as_ref().map_or(f64::NAN, f);
             [
@@ -126,7 +126,7 @@ mod tests {
         let (from, news) = curve.news();
         page.truncate(8 * from);
         page.extend(news);
-        curve.untold();
+        curve.resend();
         let (from, all) = curve.news();
         assert_eq!((from, all.len()), (0, 8 * curve.points.len()));
         assert_eq!(all, page);

@@ -1,10 +1,10 @@
 //! The renderer on a line: a field of eighty bins, fitted through what ten rays render, step by step.
 
+mod answer;
 mod ask;
 mod curve;
 mod run;
 mod state;
-mod tell;
 #[cfg(test)]
 mod tests;
 

@@ -2,9 +2,9 @@
 
 use portolan_chapter::radiance::{PARKED, Scene};
 
+use super::answer;
 use super::ask::{Ask, ChannelsChoice, OptimizerChoice};
 use super::run::Run;
-use super::tell;
 use crate::engine::{Clock, Refusal, Reply};
 
 /// Steps that one question may make: more would keep the page waiting for its picture.
@@ -17,12 +17,12 @@ pub(in crate::engine) struct Radiance {
     clock: Clock,
     scene: Scene,
     run: Option<Run>,
-    pub(super) look: Look,
+    pub(super) look: Selection,
 }
 
 /// A ray and a bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Look {
+pub(super) struct Selection {
     /// The rays to learn from, then those held out.
     pub(super) ray: Option<usize>,
     pub(super) bin: Option<usize>,
@@ -30,7 +30,7 @@ pub(super) struct Look {
 
 impl Radiance {
     pub(in crate::engine) fn new(clock: &Clock) -> Self {
-        Self { clock: clock.clone(), scene: Scene::corridor(), run: None, look: Look::default() }
+        Self { clock: clock.clone(), scene: Scene::corridor(), run: None, look: Selection::default() }
     }
 
     /// Answers.
@@ -71,7 +71,7 @@ impl Radiance {
                 if let Some(bin) = bin.filter(|bin| *bin >= bins) {
                     return Err(Refusal::new(format!("there is no bin {bin}; they are 0 to {}", bins - 1)));
                 }
-                self.look = Look { ray, bin };
+                self.look = Selection { ray, bin };
                 self.frame((0, 0.0), false)
             }
         }
@@ -90,8 +90,8 @@ impl Radiance {
         let look = self.look;
         self.run()?;
         let Some(run) = &mut self.run else { return Err(Refusal::new("there is no run")) };
-        let all = all.then(|| tell::scene(&self.scene, run));
-        tell::frame(&self.scene, run, look, made, all)
+        let all = all.then(|| answer::scene(&self.scene, run));
+        answer::frame(&self.scene, run, look, made, all)
     }
 
     pub(in crate::engine) fn memory_bytes(&self) -> usize {

@@ -72,27 +72,27 @@ fn the_page_sees_what_the_library_computes() {
 
     ask(&mut session, &start(AMBIGUOUS.seed, "spread"));
     ask(&mut session, &json!({ "op": "look", "ray": 8, "bin": 30 }));
-    let told = ask(&mut session, &json!({ "op": "step", "steps": 120 }));
-    let body = &told.body;
+    let sent = ask(&mut session, &json!({ "op": "step", "steps": 120 }));
+    let body = &sent.body;
     let experiment = Experiment { steps: 120, ..Experiment::default() };
     let outcome = experiment.run(AMBIGUOUS.seed, Channels::DepthReflectanceSpread).unwrap();
     let (line, last) = (outcome.fit.line(), outcome.last());
     let f32s = |v: &[f64]| v.iter().map(|x| *x as f32).collect::<Vec<_>>();
-    assert_eq!(told.array("density"), f32s(&line.density));
-    assert_eq!(told.array("reflectance"), f32s(&line.reflectance));
-    assert_eq!(told.array("gradient"), f32s(&outcome.fit.clone().gradient()[..80]));
+    assert_eq!(sent.array("density"), f32s(&line.density));
+    assert_eq!(sent.array("reflectance"), f32s(&line.reflectance));
+    assert_eq!(sent.array("gradient"), f32s(&outcome.fit.clone().gradient()[..80]));
     assert!(close(&body["objective"], last.objective));
     assert!(close(&body["training"]["depth"], last.training.depth));
     assert!(close(&body["held_out"]["depth"], last.held_out.depth));
     assert!(close(&body["misplaced"], outcome.misplaced(&experiment.scene, 0.3)));
     // Ray 8 is the second of those held out.
     let ray = outcome.held_out[1].ray;
-    assert_eq!(told.array("light"), f32s(&transmittance(line, &ray)));
-    assert_eq!(told.array("light").len(), told.array("light_at").len());
-    let all: f32 = told.array("ends").iter().sum::<f32>() + told.array("light").last().unwrap();
+    assert_eq!(sent.array("light"), f32s(&transmittance(line, &ray)));
+    assert_eq!(sent.array("light").len(), sent.array("light_at").len());
+    let all: f32 = sent.array("ends").iter().sum::<f32>() + sent.array("light").last().unwrap();
     assert!((all - 1.0).abs() < 1e-5, "all light ends somewhere, {all}");
     assert!(close(&body["rays"][8]["depth"], outcome.fit.render(&ray).depth));
-    assert_eq!(told.array("curve").len(), 8 * 120);
+    assert_eq!(sent.array("curve").len(), 8 * 120);
 }
 
 /// For every bin, step and set of channels: the terms that the page shows are factors of their pull, the pulls add up,
@@ -110,10 +110,10 @@ fn terms_add_up_to_the_gradient() {
         }
         for bin in 0..80 {
             let body = ask(&mut session, &json!({ "op": "look", "bin": bin })).body;
-            let told = &body["bin"];
+            let sent = &body["bin"];
             let number = |v: &Value| v.as_f64().unwrap();
             let (mut sum, mut gross) = (0.0, 0.0);
-            for t in told["terms"].as_array().unwrap() {
+            for t in sent["terms"].as_array().unwrap() {
                 for (i, channel) in ["depth", "reflectance", "second_moment"].into_iter().enumerate() {
                     let measured = i == 0 || channels == "spread" || (i == 1 && channels == "reflectance");
                     let term = &t[channel];
@@ -125,12 +125,12 @@ fn terms_add_up_to_the_gradient() {
                 }
             }
             let [pulls, chain, prior, gradient] =
-                ["pulls", "chain", "prior", "gradient"].map(|k| number(&told[k]));
+                ["pulls", "chain", "prior", "gradient"].map(|k| number(&sent[k]));
             // Pulls may cancel: their sum is as precise as the largest of them.
             assert!((sum - pulls).abs() <= 1e-12 * gross, "bin {bin}: {sum} {pulls}");
             let tolerance = 1e-12 * (gross * chain + prior.abs());
-            assert!((pulls * chain + prior - gradient).abs() <= tolerance, "bin {bin}: {told}");
-            assert!((number(&told["sum"]) - gradient).abs() <= tolerance, "bin {bin}: {told}");
+            assert!((pulls * chain + prior - gradient).abs() <= tolerance, "bin {bin}: {sent}");
+            assert!((number(&sent["sum"]) - gradient).abs() <= tolerance, "bin {bin}: {sent}");
         }
     }
 }
@@ -232,10 +232,10 @@ proptest! {
         let optimizer = ["descent", "adam"][way / 3];
         ask(&mut session, &json!({ "op": "start", "seed": seed, "channels": channels, "optimizer": optimizer }));
         ask(&mut session, &json!({ "op": "look", "bin": bin, "ray": bin % 10 }));
-        let told = ask(&mut session, &json!({ "op": "step", "steps": steps }));
-    let body = &told.body;
+        let sent = ask(&mut session, &json!({ "op": "step", "steps": steps }));
+    let body = &sent.body;
         prop_assert_eq!(body["step"].as_u64(), Some(steps as u64));
-        prop_assert!(told.array("opacity").iter().all(|a| (0.0..=1.0).contains(a)));
+        prop_assert!(sent.array("opacity").iter().all(|a| (0.0..=1.0).contains(a)));
     }
 }
 
@@ -244,11 +244,11 @@ proptest! {
 fn seeds_are_those_of_the_library() {
     let mut session = session();
     for named in NAMED_SEEDS {
-        let told = ask(&mut session, &start(named.seed, "depth"));
+        let sent = ask(&mut session, &start(named.seed, "depth"));
         let scene = Scene::corridor();
         let (training, _) = scene.measure(&Settings::default().noise, named.seed);
         let fit = Fit::new(scene.random_start(named.seed), &training, Settings::default()).unwrap();
         let expected: Vec<f32> = fit.line().density.iter().map(|d| *d as f32).collect();
-        assert_eq!(told.array("density"), expected, "{}", named.name);
+        assert_eq!(sent.array("density"), expected, "{}", named.name);
     }
 }

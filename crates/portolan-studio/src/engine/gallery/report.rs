@@ -1,0 +1,107 @@
+//! The numbers: metres, seconds, bytes; `null` where a representation cannot answer.
+
+use portolan_chapter::gallery::{Cost, MeasuredField, Row, TreeCrossover, Winner};
+use portolan_sim::ErrorSummary;
+use serde_json::{Value, json};
+
+use super::state::Built;
+
+/// Names by which rows are known, as they begin, and the panels that show them: the first of a panel is the one drawn.
+const PANELS: [(&str, &str); 6] = [
+    ("occupancy grid", "grid"),
+    ("quadtree", "tree"),
+    ("TSDF", "tsdf"),
+    ("ESDF", "esdf"),
+    ("extracted contour", "contour"),
+    ("point cloud", "cloud"),
+];
+
+/// What was timed, and who wins.
+pub(super) fn costs(built: &Built) -> Value {
+    let m = &built.measured;
+    let cloud = &m.cloud_crossover;
+    let esdf = m.rows.iter().find(|r| panel(r) == Some("esdf")).and_then(|r| r.distance);
+    json!({
+        "rows": m.rows.iter().map(row).collect::<Vec<_>>(),
+        "winners": m.winners.iter().map(|w| winner(w, &m.rows)).collect::<Vec<_>>(),
+        "never_win": m.never_win,
+        "cloud": { "points": cloud.points, "measured": cloud.measured, "esdf_seconds": esdf.map(|c| c.seconds) },
+    })
+}
+
+/// What is no matter of time.
+pub(super) fn constants(built: &Built) -> Value {
+    let m = &built.measured;
+    let [w, h] = built.settings.grid.aabb().extent();
+    json!({
+        "area": w * h,
+        "surface": surface_length(built),
+        "surface_known": built.settings.surface_length.is_some(),
+        "trees": m.trees.iter().map(tree).collect::<Vec<_>>(),
+        "fields": m.fields.iter().map(field).collect::<Vec<_>>(),
+        "tsdf_gradient": m.tsdf_gradient,
+    })
+}
+
+/// Of what the crossover's formula is told (metres).
+pub(super) fn surface_length(built: &Built) -> f64 {
+    built.settings.surface_length.unwrap_or_else(|| built.measured.contour.length())
+}
+
+fn panel(row: &Row) -> Option<&'static str> {
+    PANELS.iter().find(|(name, _)| row.name.starts_with(name)).map(|(_, panel)| *panel)
+}
+
+fn row(row: &Row) -> Value {
+    json!({
+        "name": row.name, "panel": panel(row), "memory_bytes": row.memory_bytes, "derived": row.derived,
+        "update": cost(row.update), "occupancy": cost(row.occupancy), "distance": cost(row.distance),
+        "surface": cost(row.surface), "occupancy_wrong": row.occupancy_wrong,
+        "distance_error": error(row.distance_error), "surface_error": error(row.surface_error), "note": row.note,
+    })
+}
+
+fn cost(cost: Option<Cost>) -> Option<Value> {
+    cost.map(|c| json!({ "seconds": c.seconds, "by": c.by }))
+}
+
+fn error(error: Option<ErrorSummary>) -> Option<Value> {
+    error.map(|e| {
+        json!({
+            "count": e.count, "median": e.median, "p95": e.p95, "p99": e.p99, "bias": e.bias,
+            "worst_over": e.worst_over, "worst_under": e.worst_under,
+        })
+    })
+}
+
+/// The winner, those level with it, and how many times dearer each row is: `null` where it cannot answer, or where the
+/// winner's answer costs nothing.
+fn winner(winner: &Winner, rows: &[Row]) -> Value {
+    let seconds = |row: &Row| winner.workload.cost(row).map(|c| c.seconds);
+    let best = rows.get(winner.row).and_then(seconds).filter(|&s| s > 0.0);
+    let times: Vec<_> = rows.iter().map(|row| Some(seconds(row)? / best?)).collect();
+    json!({
+        "workload": winner.workload.name(), "row": winner.row, "level": winner.level, "ahead": winner.ahead,
+        "times": times,
+    })
+}
+
+fn tree(t: &TreeCrossover) -> Value {
+    json!({
+        "name": t.name, "node_bytes": t.node_bytes, "resolution": t.resolution,
+        "predicted_resolution": t.predicted_resolution, "predicted_ratio": t.predicted_ratio,
+        "measured_ratio": t.measured_ratio,
+    })
+}
+
+/// The textbook's node and ours over leaves of one size.
+pub(super) fn tree_pair(pair: &[TreeCrossover; 2]) -> Value {
+    json!(pair.each_ref().map(tree))
+}
+
+fn field(f: &MeasuredField) -> Value {
+    json!({
+        "name": f.name(), "seconds": f.seconds, "gradient": f.gradient,
+        "against_contour": error(f.against_contour), "against_truth": error(f.against_truth),
+    })
+}

@@ -1,0 +1,214 @@
+//! The maps of space, and what follows them.
+
+use std::sync::Arc;
+
+use portolan::field::{Esdf, EsdfSettings};
+use portolan::geom::vector::sub;
+use portolan::geom::{BlockKey, Pose};
+use portolan::map::{MapError, Occupancy, Tsdf3};
+use portolan::scan::{Frame, ScanStats};
+use portolan::surface::{IncrementalMesh, MeshSettings};
+
+use super::history::Watched;
+use super::mesh_buffers::MeshBuffers;
+use super::settings::{Settings, esdf_settings, mesh_settings};
+use super::source::Source;
+use crate::engine::{Clock, Refusal};
+
+/// Points of the last frame that are shown.
+const POINTS: usize = 6000;
+/// A lattice begins at the world's zero, unless the log is further from it (cells); as in `map`.
+const FAR_CELLS: f64 = 1e6;
+
+/// Seconds that the last answer's frames took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seconds {
+    /// Reading, or simulating.
+    pub(super) frames: f64,
+    /// Fusing distances and colours.
+    pub(super) tsdf: f64,
+    /// Fusing occupancy.
+    pub(super) occupancy: f64,
+    /// Meshing what has changed.
+    pub(super) mesh: f64,
+}
+
+/// Maps, mesh, and the page's copy of it.
+pub(super) struct Maps {
+    /// Frames that are fused.
+    pub(super) at: usize,
+    pub(super) tsdf: Tsdf3,
+    pub(super) occupancy: Option<Occupancy>,
+    pub(super) esdf: Option<Esdf<3>>,
+    /// The map's epoch when the Euclidean field was made.
+    measured: u64,
+    pub(super) mesh: IncrementalMesh,
+    pub(super) buffers: MeshBuffers,
+    pub(super) watched: Option<Watched>,
+    /// The page counts places from its lower corner.
+    pub(super) first: BlockKey<3>,
+    /// The same in the world (metres).
+    pub(super) origin: [f64; 3],
+    /// Of the frame that was fused last.
+    pub(super) stats: ScanStats,
+    pub(super) last: Option<(Pose<3>, Arc<Frame>)>,
+    pub(super) seconds: Seconds,
+    /// Frames that were left out, and why the first was.
+    pub(super) left_out: (usize, Option<String>),
+    /// Why nothing more is fused.
+    pub(super) full: Option<String>,
+}
+
+impl Maps {
+    /// Maps of nothing, or the map that stands for frames.
+    pub(super) fn new(source: &Source, settings: &Settings) -> Result<Self, Refusal> {
+        let start = source.pose(0).map_or([0.0; 3], |pose| pose.translation);
+        let (tsdf, occupancy) = match source.map() {
+            Some(map) => (map.clone(), None),
+            None => {
+                let r = settings.resolution;
+                let anchor = start.map(|v| if (v / r).abs() < FAR_CELLS { 0.0 } else { (v / r).round() * r });
+                let config = settings.config(anchor, source.has_color())?;
+                let tsdf = Tsdf3::new(config).map_err(Refusal::new)?;
+                let occupancy = settings.occupancy.then(|| settings.empty_occupancy(*tsdf.lattice()));
+                (tsdf, occupancy.transpose()?)
+            }
+        };
+        let near = match source.map() {
+            Some(map) => map.store().bricks_by_age().next().map_or(BlockKey([0; 3]), |(key, _)| key),
+            None => BlockKey::of_cell(tsdf.lattice().cell_of(start).unwrap_or([0; 3])),
+        };
+        Ok(Self {
+            at: 0,
+            origin: tsdf.lattice().corner(near.first_cell()),
+            first: near,
+            mesh: IncrementalMesh::new(mesh_settings(&tsdf)),
+            buffers: MeshBuffers::nothing(source.up()),
+            tsdf,
+            occupancy,
+            esdf: None,
+            measured: 0,
+            watched: None,
+            stats: ScanStats::default(),
+            last: None,
+            seconds: Seconds::default(),
+            left_out: (0, None),
+            full: None,
+        })
+    }
+
+    /// Fuses the frame after those that are fused; the maps may take `memory` bytes.
+    pub(super) fn fuse_one(&mut self, source: &mut Source, memory: usize, clock: &Clock) {
+        let (read, seconds) = clock.time(|| source.frame(self.at));
+        self.seconds.frames += seconds;
+        let fused = read.map_err(|refusal| refusal.to_string()).and_then(|(pose, frame)| {
+            self.integrate(&pose, &frame, memory, clock).map_err(|error| {
+                if matches!(error, MapError::Full(_)) {
+                    self.full = Some(format!("{error}; choose larger cells"));
+                }
+                error.to_string()
+            })?;
+            self.last = Some((pose, frame));
+            Ok(())
+        });
+        if self.full.is_some() {
+            return;
+        }
+        if let Err(why) = fused {
+            self.left_out.0 += 1;
+            self.left_out.1.get_or_insert(why);
+        }
+        self.at += 1;
+    }
+
+    fn integrate(
+        &mut self,
+        pose: &Pose<3>,
+        frame: &Frame,
+        memory: usize,
+        clock: &Clock,
+    ) -> Result<(), MapError> {
+        let others = self.occupancy.as_ref().map_or(0, Occupancy::<3>::memory_bytes);
+        self.tsdf.set_limit(memory.saturating_sub(others));
+        let (stats, seconds) = clock.time(|| self.tsdf.integrate(pose, frame));
+        self.seconds.tsdf += seconds;
+        self.stats = stats?;
+        if let Some(watched) = &mut self.watched {
+            watched.observe(self.at, self.tsdf.events());
+        }
+        if let Some(map) = &mut self.occupancy {
+            map.set_limit(memory.saturating_sub(self.tsdf.memory_bytes()));
+            let (fused, seconds) = clock.time(|| map.integrate(pose, frame));
+            self.seconds.occupancy += seconds;
+            fused?;
+        }
+        Ok(())
+    }
+
+    /// Meshes again what has changed.
+    pub(super) fn follow(&mut self, clock: &Clock) -> Result<(), Refusal> {
+        let colors = self.tsdf.colors().filter(|store| !store.is_empty());
+        let (changed, seconds) = clock.time(|| self.mesh.update(self.tsdf.store(), colors));
+        self.seconds.mesh += seconds;
+        if changed.is_empty() {
+            return Ok(());
+        }
+        self.buffers.change(&changed, &self.mesh)
+    }
+
+    /// The Euclidean field of the map as it is now. Gives the seconds that it took.
+    ///
+    /// # Errors
+    /// Where it would need more than `memory` bytes beside what is held.
+    pub(super) fn measure(&mut self, memory: usize, clock: &Clock) -> Result<f64, Refusal> {
+        // The field, and as much again while it is made.
+        let needed = 2 * self.tsdf.store().len() * 512 * size_of::<f32>();
+        if self.esdf.is_none() && needed > memory {
+            return Err(Refusal::new(format!(
+                "the Euclidean field needs {} MiB more than this tab may have; choose larger cells",
+                (needed - memory).div_ceil(1 << 20)
+            )));
+        }
+        let store = self.tsdf.store();
+        let ((), seconds) = clock.time(|| match &mut self.esdf {
+            Some(esdf) => {
+                esdf.update(store);
+            }
+            None => self.esdf = Some(Esdf::of(&self.tsdf, &EsdfSettings::default())),
+        });
+        self.measured = store.epoch();
+        Ok(seconds)
+    }
+
+    /// The Euclidean field, where it is that of the map as it is now.
+    pub(super) fn esdf_now(&self) -> Option<&Esdf<3>> {
+        self.esdf.as_ref().filter(|_| self.measured == self.tsdf.store().epoch())
+    }
+
+    /// Watches a cell, and what was found of it so far.
+    pub(super) fn watch(&mut self, watched: Option<Watched>) {
+        self.tsdf.watch(watched.iter().map(|w| w.cell));
+        self.watched = watched;
+    }
+
+    /// Some points of the last frame (metres from the origin).
+    pub(super) fn points(&self) -> Vec<f32> {
+        let Some((pose, frame)) = &self.last else { return Vec::new() };
+        let place = |p: [f64; 3]| sub(pose.transform_point(p), self.origin).map(|v| v as f32);
+        let step = frame.hits().div_ceil(POINTS).max(1);
+        match &**frame {
+            Frame::Image(image) => image.points().step_by(step).flat_map(|(_, p)| place(p)).collect(),
+            Frame::Points(scan) => {
+                scan.points.iter().step_by(step).flat_map(|p| place(p.map(f64::from))).collect()
+            }
+        }
+    }
+
+    pub(super) fn memory_bytes(&self) -> usize {
+        self.tsdf.memory_bytes()
+            + self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes)
+            + self.esdf.as_ref().map_or(0, Esdf::memory_bytes)
+            + self.mesh.memory_bytes()
+            + self.buffers.memory_bytes()
+    }
+}
