@@ -4,6 +4,7 @@
 
 mod arguments;
 mod commands;
+mod dimension;
 mod error;
 mod esdf;
 mod experiment;
@@ -11,13 +12,11 @@ mod json;
 mod log;
 mod mapping;
 mod output;
-mod picture;
 mod pictures;
 mod progress;
 mod report;
 mod saved;
 mod source;
-mod space;
 mod stale;
 
 use std::process::ExitCode;

@@ -93,16 +93,16 @@ impl Drift {
         world: &World,
         settings: &Settings,
     ) -> anyhow::Result<()> {
-        let r = settings.resolution;
+        let r = settings.resolution();
         // A multiple of cells around the box of the maps: the lattices coincide.
         let grid = Grid::covering(world.aabb().grown(ROOM), r);
         let Some(grid) = grid else { return Ok(()) };
         let config =
-            TsdfConfig { truncation: settings.truncation, w_max: settings.w_max, ..Default::default() };
+            TsdfConfig { truncation: settings.truncation(), w_max: settings.w_max(), ..Default::default() };
         for (k, set) in PoseSet::ALL.into_iter().enumerate() {
             let mut tsdf = Tsdf::<2>::new(config.with_grid(&grid))?;
             for (pose, (_, scan)) in self.poses(set).iter().zip(log) {
-                tsdf.integrate(pose, scan, settings.carve);
+                tsdf.integrate(pose, scan, settings.shape.carve);
             }
             let contour = marching_squares(&tsdf, &ContourSettings::default());
             let errors = contour.vertices.iter().map(|&v| world.signed_distance(v));
