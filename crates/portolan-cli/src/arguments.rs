@@ -3,6 +3,10 @@
 use portolan::cell::TsdfRule;
 use portolan::geom::Aabb;
 use portolan::scan::Body;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::error::bad_call;
 
 fn number(text: &str) -> Result<f64, String> {
     text.trim().parse::<f64>().map_err(|_| "not a number".to_owned())
@@ -49,21 +53,51 @@ pub(crate) fn half_life(text: &str) -> Result<f64, String> {
 }
 
 /// How soon distances forget, in either of two units.
-#[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 pub(crate) struct ForgettingArgs {
-    /// Clamp of the weight of a cell, inf to never forget; default 64
+    /// Largest weight of a cell; inf: old observations are never forgotten [default: 64]
     #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
+    #[serde(serialize_with = "finite", deserialize_with = "infinite", default = "never")]
     w_max: Option<f32>,
-    /// The same as the number of observations after which half of a stale distance is left
+    /// --w-max as a half-life: the number of observations after which half of an outdated distance is left
     #[arg(long, value_name = "N", value_parser = half_life, allow_negative_numbers = true, conflicts_with = "w_max")]
+    #[serde(skip)]
     half_life: Option<f64>,
 }
 
 impl ForgettingArgs {
-    /// The clamp, where one was asked for.
-    pub(crate) fn w_max(&self) -> Option<f32> {
-        self.w_max.or(self.half_life.map(|n| TsdfRule::w_max_for_half_life(n, 1.0) as f32))
+    /// With this largest weight.
+    pub(crate) fn of(w_max: f32) -> Self {
+        Self { w_max: Some(w_max), half_life: None }
     }
+
+    /// The largest weight, where one was asked for. A half-life goes first: where there are both, the weight is that of a
+    /// saved map.
+    pub(crate) fn w_max(&self) -> Option<f32> {
+        self.half_life.map(|n| TsdfRule::w_max_for_half_life(n, 1.0) as f32).or(self.w_max)
+    }
+}
+
+/// The weight of a saved map that never forgets.
+fn never() -> Option<f32> {
+    Some(f32::INFINITY)
+}
+
+fn infinite<'de, D: Deserializer<'de>>(input: D) -> Result<Option<f32>, D::Error> {
+    Ok(Option::<f32>::deserialize(input)?.or_else(never))
+}
+
+/// `null` for what is not finite or was not given.
+pub(crate) fn finite<T: Copy + Into<f64>, S: Serializer>(
+    value: &Option<T>,
+    out: S,
+) -> Result<S::Ok, S::Error> {
+    value.map(Into::into).filter(|v: &f64| v.is_finite()).serialize(out)
+}
+
+/// 0 for what was not given.
+pub(crate) fn or_zero<S: Serializer>(value: &Option<f64>, out: S) -> Result<S::Ok, S::Error> {
+    value.unwrap_or(0.0).serialize(out)
 }
 
 /// A weight of zero or more.
@@ -74,13 +108,50 @@ pub(crate) fn weight_or_zero(text: &str) -> Result<f32, String> {
     }
 }
 
-/// A box of the plane or of space.
+/// A box of either dimension.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Bounds {
     /// x, y
-    Plane(Aabb<2>),
+    Two(Aabb<2>),
     /// x, y, z
-    Space(Aabb<3>),
+    Three(Aabb<3>),
+}
+
+impl Bounds {
+    /// The box in 2-D.
+    ///
+    /// # Errors
+    /// A box in 3-D; `what` is the log or the map.
+    pub(crate) fn in_2d(self, what: &str) -> anyhow::Result<Aabb<2>> {
+        match self {
+            Self::Two(bounds) => Ok(bounds),
+            Self::Three(_) => {
+                Err(bad_call(format!("{what} is 2-D: --bounds needs four numbers, x0,y0,x1,y1")))
+            }
+        }
+    }
+
+    /// The box in 3-D.
+    ///
+    /// # Errors
+    /// A box in 2-D; `what` is the log or the map.
+    pub(crate) fn in_3d(self, what: &str) -> anyhow::Result<Aabb<3>> {
+        match self {
+            Self::Three(bounds) => Ok(bounds),
+            Self::Two(_) => {
+                Err(bad_call(format!("{what} is 3-D: --bounds needs six numbers, x0,y0,z0,x1,y1,z1")))
+            }
+        }
+    }
+}
+
+impl Serialize for Bounds {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Two(b) => [b.min, b.max].concat().serialize(out),
+            Self::Three(b) => [b.min, b.max].concat().serialize(out),
+        }
+    }
 }
 
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
@@ -96,8 +167,8 @@ fn corners<const D: usize>(min: [f64; D], max: [f64; D]) -> Result<Aabb<D>, Stri
 /// `x0,y0,x1,y1` or `x0,y0,z0,x1,y1,z1` in metres.
 pub(crate) fn bounds(text: &str) -> Result<Bounds, String> {
     match numbers(text)?[..] {
-        [x0, y0, x1, y1] => corners([x0, y0], [x1, y1]).map(Bounds::Plane),
-        [x0, y0, z0, x1, y1, z1] => corners([x0, y0, z0], [x1, y1, z1]).map(Bounds::Space),
+        [x0, y0, x1, y1] => corners([x0, y0], [x1, y1]).map(Bounds::Two),
+        [x0, y0, z0, x1, y1, z1] => corners([x0, y0, z0], [x1, y1, z1]).map(Bounds::Three),
         _ => Err("must be four or six numbers: x0,y0,x1,y1 or x0,y0,z0,x1,y1,z1 in metres".to_owned()),
     }
 }
@@ -122,18 +193,39 @@ pub(crate) fn point3(text: &str) -> Result<[f64; 3], String> {
 /// `x0,y0,z0,x1,y1,z1` in metres.
 pub(crate) fn box3(text: &str) -> Result<Aabb<3>, String> {
     match bounds(text) {
-        Ok(Bounds::Space(b)) => Ok(b),
+        Ok(Bounds::Three(b)) => Ok(b),
         Err(e) => Err(e),
-        Ok(Bounds::Plane(_)) => Err("must be six numbers x0,y0,z0,x1,y1,z1 in metres".to_owned()),
+        Ok(Bounds::Two(_)) => Err("must be six numbers x0,y0,z0,x1,y1,z1 in metres".to_owned()),
     }
 }
 
-/// A box `x0,y0,z0,x1,y1,z1` or a ball `x,y,z,radius` in metres.
+/// A box `x0,y0,z0,x1,y1,z1` or a sphere `x,y,z,radius` in metres.
 pub(crate) fn body(text: &str) -> Result<Body, String> {
-    match numbers(text)?[..] {
+    body_of(&numbers(text)?)
+}
+
+fn body_of(numbers: &[f64]) -> Result<Body, String> {
+    match *numbers {
         [x, y, z, radius] if radius > 0.0 => Ok(Body::Sphere { center: [x, y, z], radius }),
         [x0, y0, z0, x1, y1, z1] => corners([x0, y0, z0], [x1, y1, z1]).map(Body::Box),
-        _ => Err("must be a box x0,y0,z0,x1,y1,z1 or a ball x,y,z,radius in metres".to_owned()),
+        _ => Err("must be a box x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius in metres".to_owned()),
+    }
+}
+
+/// Boxes and spheres as lists of their numbers.
+pub(crate) mod bodies {
+    use super::*;
+
+    pub(crate) fn serialize<S: Serializer>(bodies: &[Body], out: S) -> Result<S::Ok, S::Error> {
+        out.collect_seq(bodies.iter().map(|body| match body {
+            Body::Box(b) => [b.min, b.max].concat(),
+            Body::Sphere { center: [x, y, z], radius } => vec![*x, *y, *z, *radius],
+        }))
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(input: D) -> Result<Vec<Body>, D::Error> {
+        let lists = Vec::<Vec<f64>>::deserialize(input)?;
+        lists.iter().map(|list| body_of(list).map_err(D::Error::custom)).collect()
     }
 }
 
@@ -170,7 +262,7 @@ mod tests {
         assert_eq!(length("0.05"), Ok(0.05));
         assert!(length_or_zero("0").is_ok() && length_or_zero("-0.1").is_err());
         assert!(half_life("10").is_ok() && half_life("0").is_err() && half_life("nan").is_err());
-        let asked = |n: &str| ForgettingArgs { w_max: None, half_life: half_life(n).ok() }.w_max();
+        let asked = |n: &str| ForgettingArgs { half_life: half_life(n).ok(), ..Default::default() }.w_max();
         assert_eq!(asked("1"), Some(1.0));
         assert_eq!(asked("inf"), Some(f32::INFINITY));
         assert!(asked("0.1").is_some_and(|w| w > 0.0));
@@ -179,9 +271,9 @@ mod tests {
 
     #[test]
     fn boxes_and_bytes() {
-        assert_eq!(bounds("-1,-2,3,4.5"), Ok(Bounds::Plane(Aabb::new([-1.0, -2.0], [3.0, 4.5]))));
+        assert_eq!(bounds("-1,-2,3,4.5"), Ok(Bounds::Two(Aabb::new([-1.0, -2.0], [3.0, 4.5]))));
         let space = Aabb::new([-1.0, -2.0, -3.0], [3.0, 4.5, 6.0]);
-        assert_eq!(bounds("-1,-2,-3,3,4.5,6"), Ok(Bounds::Space(space)));
+        assert_eq!(bounds("-1,-2,-3,3,4.5,6"), Ok(Bounds::Three(space)));
         assert_eq!((box3("-1,-2,-3,3,4.5,6"), body("-1,-2,-3,3,4.5,6")), (Ok(space), Ok(Body::Box(space))));
         assert_eq!(body("1,2,3,0.5"), Ok(Body::Sphere { center: [1.0, 2.0, 3.0], radius: 0.5 }));
         assert!(box3("1,2,3,4").is_err() && body("1,2,3,0").is_err() && body("1,2,3").is_err());

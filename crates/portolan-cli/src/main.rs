@@ -4,17 +4,17 @@
 
 mod arguments;
 mod commands;
+mod dimension;
 mod error;
 mod esdf;
 mod json;
 mod log;
 mod mapping;
 mod output;
-mod picture;
+mod pictures;
 mod progress;
 mod saved;
 mod source;
-mod space;
 mod stale;
 
 use std::process::ExitCode;

@@ -33,10 +33,10 @@ impl Progress {
         self.bar.inc(steps);
     }
 
-    /// So many bytes are held now.
-    pub(crate) fn holding(&self, bytes: usize) {
+    /// Shows how many bytes are held now; they are counted only where the bar is shown.
+    pub(crate) fn holding(&self, bytes: impl FnOnce() -> usize) {
         if !self.bar.is_hidden() {
-            self.bar.set_message(format!("{}, {}", self.what, shown_bytes(bytes as f64)));
+            self.bar.set_message(format!("{}, {}", self.what, shown_bytes(bytes() as f64)));
         }
     }
 }

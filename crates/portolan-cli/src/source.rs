@@ -10,14 +10,14 @@ use portolan_io::{
 };
 
 use crate::log::describe;
-use crate::space::available_memory;
+use crate::mapping::available_memory;
 
 /// What a file holds.
 pub(crate) enum Source {
-    /// `map.portolan` of the plane
-    Map(Box<MapFile<2>>),
-    /// `map.portolan` of space
-    SpaceMap(Box<MapFile<3>>),
+    /// A 2-D `map.portolan`
+    Map2(Box<MapFile>),
+    /// A 3-D `map.portolan`
+    Map3(Box<SpaceMapFile>),
     /// `esdf.bin`
     Esdf(EsdfFile),
     /// A map_server map
@@ -28,10 +28,10 @@ pub(crate) enum Source {
     Contour(Vec<Polyline>),
     /// A `.bt` or `.ot`
     Octomap(Box<OctomapTree>),
-    /// A log
-    Log(Box<CarmenLog>),
-    /// A log of scans of space
-    ScanLog(Box<ScanLog>),
+    /// A log of 2-D scans
+    Log2(Box<CarmenLog>),
+    /// A log of 3-D scans
+    Log3(Box<SpaceLog>),
 }
 
 /// Opens a file or a folder.
@@ -47,21 +47,21 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         },
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
         FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
-        FileKind::CarmenLog => Source::Log(Box::new(CarmenLog::read(path)?)),
-        FileKind::ScanLog(_) => Source::ScanLog(Box::new(ScanLog::open(path, &ScanLogOptions::default())?)),
+        FileKind::CarmenLog => Source::Log2(Box::new(CarmenLog::read(path)?)),
+        FileKind::SpaceLog(_) => Source::Log3(Box::new(SpaceLog::open(path, &SpaceLogOptions::default())?)),
         FileKind::Unknown(what) => bail!("{}: not recognised: {what}", path.display()),
-        kind => bail!("{}: is {}, which is not read yet", path.display(), describe(&kind)),
+        kind => bail!("{}: is {}, which cannot be read yet", path.display(), describe(&kind)),
     })
 }
 
-fn of_map(container: &Container) -> anyhow::Result<Source> {
-    Ok(match map_dimension(container)? {
-        2 => Source::Map(Box::new(MapFile::from_container(container, readable())?)),
-        _ => Source::SpaceMap(Box::new(MapFile::from_container(container, readable())?)),
-    })
+fn of_map(file: AnyMapFile) -> Source {
+    match file {
+        AnyMapFile::Plane(file) => Source::Map2(file),
+        AnyMapFile::Space(file) => Source::Map3(file),
+    }
 }
 
-/// What a map may take in memory (bytes): what the machine has free, 4 GiB at least.
+/// Memory for a map (bytes): what the machine has free, 4 GiB at least.
 fn readable() -> u64 {
     available_memory().unwrap_or(0).max(4 << 30)
 }
@@ -72,10 +72,10 @@ fn yaml_beside(path: &Path) -> Option<PathBuf> {
 }
 
 impl Source {
-    /// What the user should know before he trusts it.
+    /// What lowers the trust in it.
     pub(crate) fn warning(&self) -> Option<String> {
         if let Self::Octomap(file) = self {
-            let colors = "it has colours, which are passed over: what is written from it has none";
+            let colors = "its colours are not read, and are missing in what is written from it";
             return file.colors_left_out().then(|| colors.into());
         }
         let Self::Server(map) = self else { return None };
@@ -88,19 +88,19 @@ impl Source {
         })
     }
 
-    /// What it is, in words.
+    /// What it is.
     pub(crate) fn describe(&self) -> &'static str {
         match self {
-            Self::Map(_) => "a portolan map",
-            Self::SpaceMap(_) => "a portolan map of space",
+            Self::Map2(_) => "a 2-D portolan map",
+            Self::Map3(_) => "a 3-D portolan map",
             Self::Esdf(_) => "a distance field (esdf.bin)",
             Self::Server(_) => "a map_server map",
             Self::Image(_) => "a PGM image without its yaml file",
             Self::Contour(_) => "a contour (GeoJSON)",
             Self::Octomap(file) if file.is_binary() => "an OctoMap tree of free and occupied (.bt)",
             Self::Octomap(_) => "an OctoMap tree of log odds (.ot)",
-            Self::Log(_) => "a CARMEN log",
-            Self::ScanLog(log) => log.kind().label(),
+            Self::Log2(_) => "a CARMEN log",
+            Self::Log3(log) => log.kind().label(),
         }
     }
 }

@@ -206,7 +206,7 @@ fn the_wrong_kind_of_file() {
     map(&log, &out, &[]);
     refused(1, &["query", arg(&out), "--points", arg(&points)], &["p.csv: line 2", "number of fields is 1"]);
     std::fs::write(&points, "1,1,1\n").unwrap();
-    refused(1, &["query", arg(&out), "--points", arg(&points)], &["p.csv", "the map is in the plane"]);
+    refused(1, &["query", arg(&out), "--points", arg(&points)], &["p.csv", "the map is 2-D"]);
     refused(
         1,
         &["map", arg(&log), "--resolution", "1", "--out", arg(&log)],

@@ -153,7 +153,7 @@ fn bounds_ranges_and_the_robots_body() {
         fail(2, ["map", arg(&log), "--out", arg(&out), "--resolution", "0.1", "--bounds", "0,0,1,1"]);
     assert!(refused.contains("six numbers"), "{refused}");
     let refused = fail(2, ["map", arg(&log), "--out", arg(&out), "--resolution", "0.1", "--maps", "contour"]);
-    assert!(refused.contains("planar"), "{refused}");
+    assert!(refused.contains("--maps contour is only for 2-D; the log is 3-D"), "{refused}");
 }
 
 #[test]

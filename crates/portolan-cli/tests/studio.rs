@@ -227,10 +227,7 @@ fn what_cannot_be_shown_is_refused_before_anything_is_served() {
     let made = folder.path().join("made");
     map(&log, &made, &[]);
     let is_a_map = refused(&[arg(&made.join("map.portolan"))]);
-    assert!(
-        is_a_map.contains("map.portolan") && is_a_map.contains("a map of the plane; give the log"),
-        "{is_a_map}"
-    );
+    assert!(is_a_map.contains("map.portolan") && is_a_map.contains("a 2-D map; give the log"), "{is_a_map}");
     assert!(refused(&[arg(&made)]).contains("made"));
 }
 
@@ -238,9 +235,11 @@ fn what_cannot_be_shown_is_refused_before_anything_is_served() {
 fn calls_that_contradict_themselves_are_refused() {
     let (_folder, log) = room();
     assert!(fail(2, ["studio", "--every", "2"]).contains("give one"));
-    assert!(fail(2, ["studio", arg(&log), "--intrinsics", "1,1,1,1"]).contains("planar"));
+    assert!(
+        fail(2, ["studio", arg(&log), "--intrinsics", "1,1,1,1"]).contains("only for 3-D; the log is 2-D")
+    );
     let (_folder, log) = camera_log();
-    assert!(fail(2, ["studio", arg(&log), "--no-return", "9"]).contains("planar"));
+    assert!(fail(2, ["studio", arg(&log), "--no-return", "9"]).contains("only for 2-D; the log is 3-D"));
     let nothing = ["studio", arg(&log), "--min-range", "3", "--max-range", "2"];
     assert!(fail(2, nothing).contains("--min-range must be smaller than --max-range"));
     for bad in [["--port", "70000"], ["--host", "example.org"], ["--sessions", "0"], ["--memory", "much"]] {

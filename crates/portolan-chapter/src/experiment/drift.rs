@@ -91,19 +91,23 @@ impl Drift {
         }
     }
 
-    /// Maps the same scans with each set of poses, carving, and measures the contours. Of `config` all is taken but
-    /// the cells.
-    ///
-    /// # Errors
-    /// Where the settings of the map are not possible.
-    pub fn measure_maps(&mut self, log: &Lap, world: &World, config: &TsdfConfig<2>) -> Result<(), MapError> {
+    /// Maps the same scans with each set of poses and measures the contours.
+    pub(crate) fn measure_maps(
+        &mut self,
+        log: &Lap,
+        world: &World,
+        settings: &Settings,
+    ) -> anyhow::Result<()> {
+        let r = settings.resolution();
         // A multiple of cells around the box of the maps: the lattices coincide.
         let grid = Grid::covering(world.aabb().grown(ROOM), config.resolution);
         let Some(grid) = grid else { return Ok(()) };
+        let config =
+            TsdfConfig { truncation: settings.truncation(), w_max: settings.w_max(), ..Default::default() };
         for (k, set) in PoseSet::ALL.into_iter().enumerate() {
             let mut tsdf = Tsdf2::new(config.with_grid(&grid))?;
             for (pose, (_, scan)) in self.poses(set).iter().zip(log) {
-                tsdf.integrate(pose, scan, true);
+                tsdf.integrate(pose, scan, settings.shape.carve);
             }
             let contour = marching_squares(&tsdf, &ContourSettings::default());
             let errors = contour.vertices.iter().map(|&v| world.signed_distance(v));

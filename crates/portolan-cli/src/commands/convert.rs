@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use portolan::cell::{DistancePlanes, LogOdds8, LogOddsValue, OccupancyModel};
-use portolan::field::EsdfGrid;
+use portolan::cell::{DistancePlanes, LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
+use portolan::field::{DenseEsdf, Esdf};
 use portolan::geom::{Grid, Pose};
 use portolan::map::{OccupancyGrid, Tsdf, TsdfConfig};
-use portolan::store::Dense;
-use portolan::surface::{Contour, ContourSettings, marching_squares};
+use portolan::store::{Dense, Tree};
+use portolan::surface::{Contour, ContourSettings, marching_cubes, marching_squares};
 use portolan_io::{
-    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, write_esdf, write_map_server,
+    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, SpaceMapFile, write_esdf,
+    write_map_server, write_octomap_bt, write_octomap_ot,
 };
 use serde_json::json;
 
@@ -19,16 +20,16 @@ use self::costs::CostArgs;
 use self::field::Field;
 use super::query::esdf_of_server;
 use crate::arguments::{Bounds, bounds, length};
+use crate::dimension::ONLY_3D;
 use crate::error::bad_call;
 use crate::esdf::{EsdfArg, status_plane};
-use crate::mapping::{cells_for_map_server, polylines, write_contour};
+use crate::mapping::{cells_for_map_server, mesh_settings, polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
 
 mod arrays;
 mod costs;
 mod field;
-mod space;
 
 pub(crate) use arrays::UnknownArg;
 
@@ -42,13 +43,13 @@ pub(crate) struct Args {
     input: PathBuf,
     /// File to write: .portolan, .yaml (with its .pgm), .bin, .npz, .npy, .geojson, .svg, .bt, .ot, .ply, .glb or .obj
     out: PathBuf,
-    /// Distance fields of maps: how they are made [default: as the map was made, else accurate]
+    /// Method of the distance field [default: as the map was made, else accurate]
     #[arg(long, value_enum)]
     esdf: Option<EsdfArg>,
-    /// Distance fields of maps of space: up to here (metres) [default: as the map was made]
-    #[arg(long, value_name = "M", value_parser = length)]
+    /// Largest distance of the distance field (metres) [default: as the map was made]
+    #[arg(long, value_name = "M", value_parser = length, help_heading = ONLY_3D)]
     max_distance: Option<f64>,
-    /// This box of a distance field only: x0,y0,x1,y1, in space x0,y0,z0,x1,y1,z1 (metres)
+    /// Write only this box of the distance field: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (metres)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     bounds: Option<Bounds>,
     #[command(flatten)]
@@ -83,7 +84,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             Some(field) => write_field_as(&field, target, args)?,
             None => false,
         },
-        Source::Map(file) => convert_map(file, target, args)?,
+        Source::Map2(file) => convert_map2(file, target, args)?,
+        Source::Map3(file) => convert_map3(file, target, args)?,
         Source::Server(map) => convert_server(map, target, args)?,
         Source::Esdf(EsdfFile::Two(field)) => {
             if target == Target::Esdf {
@@ -95,7 +97,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Source::Esdf(EsdfFile::Three(field)) if target == Target::Esdf => write_whole(field, args)?,
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
         Source::Octomap(file) => convert_octomap(file, target, args)?,
-        Source::SpaceMap(file) => space::convert(file, target, args)?,
         _ => false,
     };
     if !done {
@@ -128,22 +129,22 @@ fn target(out: &Path) -> Option<Target> {
     }
 }
 
-/// Says what the input could be turned into.
+/// The refusal, with what the input could become.
 fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
     let possible = match source {
-        Source::Map(_) => {
+        Source::Map2(_) => {
             ".yaml, .bin (esdf), .npz, .npy, .geojson, .svg or .portolan, as far as its maps go"
         }
         Source::Server(_) => ".bin (esdf), .npz, .npy, .geojson, .svg, .portolan or .yaml",
         Source::Esdf(EsdfFile::Two(_)) => ".yaml, .npz, .npy, .geojson, .svg or .bin",
-        Source::Esdf(EsdfFile::Three(_)) => ".bin, .npz, .npy, or with --z .yaml: it is in space",
+        Source::Esdf(EsdfFile::Three(_)) => ".bin, .npz, .npy, or .yaml with --z",
         Source::Contour(_) => ".geojson or .svg",
-        Source::Image(_) => "nothing without its yaml file",
+        Source::Image(_) => "a map only together with its yaml file",
         Source::Octomap(_) => ".bt or .ot",
-        Source::SpaceMap(_) => {
-            ".ply, .glb, .obj, .bt, .ot, .bin (esdf), .npz, .npy, with --z .yaml, or .portolan, as far as its maps go"
+        Source::Map3(_) => {
+            ".ply, .glb, .obj, .bt, .ot, .bin (esdf), .npz, .npy, .yaml with --z, or .portolan, as far as its maps go"
         }
-        Source::Log(_) | Source::ScanLog(_) => "nothing here: `portolan map` makes maps of logs",
+        Source::Log2(_) | Source::Log3(_) => "a map, by `portolan map`",
     };
     let (input, out) = (args.input.display(), args.out.display());
     anyhow::anyhow!("{input}: {} cannot become {out}; it can become {possible}", source.describe())
@@ -158,7 +159,7 @@ fn yaml(out: &Path) -> PathBuf {
     }
 }
 
-fn convert_map(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
+fn convert_map2(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<bool> {
     match (target, &file.tsdf) {
         (Target::Portolan, _) => file.write(&args.out)?,
         (Target::MapServer, _) => {
@@ -171,6 +172,29 @@ fn convert_map(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Result
         (Target::Contour, None) => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
             return convert_esdf(&esdf_of_cells(grid, &cells), target, args);
+        }
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// `false`: the map lacks what the format needs, or the format is for 2-D.
+fn convert_map3(file: &SpaceMapFile, target: Target, args: &Args) -> anyhow::Result<bool> {
+    match (target, &file.occupancy, &file.tsdf) {
+        (Target::Portolan, ..) => file.write(&args.out)?,
+        (Target::OctomapBt | Target::OctomapOt, Some(map), _) => {
+            let Some(tree) = Tree::from_bricks(&map.store) else {
+                bail!("{}: the map is too large for one tree", args.input.display());
+            };
+            if target == Target::OctomapBt {
+                write_octomap_bt(&args.out, &tree)?;
+            } else {
+                write_octomap_ot(&args.out, &tree, LogOddsRule::<i8>::new(&map.model)?.quantum)?;
+            }
+        }
+        (Target::Mesh, _, Some(map)) => {
+            let colors = file.colors.as_ref().map(|c| &c.store);
+            return write_mesh(&args.out, &marching_cubes(&map.store, colors, &mesh_settings(map.weights)));
         }
         _ => return Ok(false),
     }
@@ -252,17 +276,10 @@ fn write_field_as(field: &Field, target: Target, args: &Args) -> anyhow::Result<
     Ok(true)
 }
 
-/// The same file: statuses only where it has them.
-fn write_whole<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Result<bool> {
-    let status = field.has_status().then(|| field.status_bytes());
-    write_esdf(&args.out, field.grid(), field.samples(), status.as_deref())?;
-    Ok(true)
-}
-
-fn write_dense<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Result<()> {
-    // In space the status has always been written.
-    let status = if D == 3 { Some(field.status_bytes()) } else { status_plane(field) };
-    Ok(write_esdf(&args.out, field.grid(), field.samples(), status.as_deref())?)
+fn write_dense<const D: usize>(field: &DenseEsdf<D>, args: &Args) -> anyhow::Result<()> {
+    // In 3-D the status has always been written.
+    let status = if D == 3 { Some(&field.status[..]) } else { status_plane(field) };
+    Ok(write_esdf(&args.out, &field.grid, &field.distances, status)?)
 }
 
 impl Args {
@@ -281,10 +298,10 @@ impl Args {
     fn check(&self, target: Target, source: &Source) -> anyhow::Result<()> {
         let out = self.out.display();
         if self.arrays.asked() && target != Target::Arrays {
-            return Err(bad_call(format!("options of arrays are for .npz and .npy, not for {out}")));
+            return Err(bad_call(format!("options of arrays are only for .npz and .npy, not for {out}")));
         }
         if self.costs.asked() && target != Target::MapServer {
-            return Err(bad_call(format!("options of costmaps are for .yaml, not for {out}")));
+            return Err(bad_call(format!("options of costmaps are only for .yaml, not for {out}")));
         }
         if !self.takes_field(target, source) {
             let given = [
@@ -295,7 +312,7 @@ impl Args {
             ];
             if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
                 return Err(bad_call(format!(
-                    "{option} is for distance fields; {out} is not made of one here"
+                    "{option} is only for distance fields; {out} is made without one"
                 )));
             }
         }

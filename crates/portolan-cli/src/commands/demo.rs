@@ -9,23 +9,21 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{BeamSweep, TsdfConfig};
-use portolan::scan::{RangeLimits, Scan, ScanStats};
-use portolan::sweep::WeightModel;
-use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
-use portolan_chapter::pictures::{self, Scene};
-use portolan_chapter::report::{self, Facts};
-use portolan_io::{MapFile, write_atomic};
+use portolan::scan::{Scan, ScanStats};
+use portolan_io::{AnyMapFile, MapFile, write_atomic};
 use portolan_sim::{LapConfig, Lidar, SEED};
 
 use self::found::Found;
 use super::gallery;
 use crate::arguments::ForgettingArgs;
-use crate::esdf::EsdfArg;
-use crate::json;
-use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, fuse};
+use crate::dimension::Dimension;
+use crate::experiment::{Drift, Forgetting, PoseSet};
+use crate::log::RangeArgs;
+use crate::mapping::{Artifacts, Derived, FusionReport, Maps, Maps2, Settings, fuse_2d};
 use crate::output::Output;
 use crate::progress::Progress;
+use crate::report::{self, Facts};
+use crate::{json, saved};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan demo --out out")]
@@ -102,8 +100,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let grid = gallery::apartment_grid(RESOLUTION);
     let (mut file, fusion, bytes) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
     describe(&mut file, &settings, &config, &fusion.stats);
-    let derived = run.timed("derive", || Derived::of(&file, &settings));
-    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings)))?;
+    let derived = run.timed("derive", || Derived::of(&file, &settings, usize::MAX));
+    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &settings))?;
     let gallery =
         run.timed("gallery", || gallery::measure(&scans, &grid, &settings, PROBES, Some(&world)))?;
 
@@ -119,9 +117,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
                 run.timed("gallery_files", || gallery::write_files(&args.out, &scene, &table, &title))?;
             run.files.extend(files);
             let title = format!("The Apartment · cells of 5 cm · {} scans", scans.len());
-            let artefacts = Artefacts { file: &file, derived: &derived, title };
-            let (files, _) = run.timed("map_files", || artefacts.write(&args.out))?;
-            run.files.extend(files);
+            let artifacts = Artifacts { file: &file, derived: &derived, dense: None, camera: false, title };
+            let written = run.timed("map_files", || {
+                saved::write(&file, &args.out.join("map.portolan"))?;
+                artifacts.write(&args.out)
+            })?;
+            run.files.extend(written.files);
             let files = run.timed("drift_files", || write_drift(&args.out, &drift, &scene))?;
             run.files.extend(files);
             Ok(())
@@ -223,22 +224,17 @@ fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), made)
 }
 
+/// Free space weighs as much as a surface, as in the chapter (`map` gives it less).
 fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
-    Settings {
-        resolution: RESOLUTION,
-        truncation: TRUNCATION,
-        w_max: w_max.unwrap_or(64.0),
-        weights: WeightModel::default(),
-        sweep: BeamSweep::default(),
-        carve: true,
-        carve_weight: 1.0,
-        limits: RangeLimits { max: lidar.max_range, ..Default::default() },
-        every: None,
-        hold_out: None,
-        bounds: None,
-        maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
-        esdf: EsdfArg::default(),
+    let mut settings = Settings::default();
+    settings.shape.resolution = RESOLUTION;
+    settings.shape.truncation = Some(TRUNCATION);
+    settings.shape.carve_weight = 1.0;
+    settings.shape.range = RangeArgs { max_range: Some(lidar.max_range), ..RangeArgs::default() };
+    if let Some(w_max) = w_max {
+        settings.shape.forgetting = ForgettingArgs::of(w_max);
     }
+    settings.resolved(Dimension::Two)
 }
 
 /// What the contours of the three sets of poses are made with.
@@ -257,23 +253,22 @@ fn fused(
     grid: &Grid<2>,
     scans: &[(Pose<2>, Scan<2>)],
     output: Output,
-) -> anyhow::Result<(MapFile<2>, FusionReport, BTreeMap<&'static str, usize>)> {
-    let mut maps = settings.empty_maps(grid)?;
-    let progress = Progress::new(scans.len() * maps.count(), "fusing", output);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let fusion = fuse(&mut maps, scans, settings.carve, threads, &progress);
+) -> anyhow::Result<(AnyMapFile, FusionReport, BTreeMap<&'static str, usize>)> {
+    let mut maps = Maps2::new(settings, grid)?;
+    let progress = Progress::new(scans.len(), "fusing", output);
+    let mut file = MapFile::default();
+    let fusion = fuse_2d(&mut maps, scans, &mut file.poses, &progress);
     let bytes = maps.bytes();
-    let Maps { grid, tree, tsdf } = maps;
-    let poses = scans.iter().map(|(pose, _)| *pose).collect();
-    let mut file = MapFile::<2>::default();
-    (file.grid, file.tree, file.tsdf, file.poses) = (grid, tree, tsdf, poses);
-    Ok((file, fusion, bytes))
+    file.poses = scans.iter().map(|(pose, _)| *pose).collect();
+    (file.grid, file.tree, file.tsdf) = (maps.grid, maps.tree, maps.tsdf);
+    Ok((AnyMapFile::Plane(Box::new(file)), fusion, bytes))
 }
 
 /// Writes into the file's header what it is made of.
-fn describe(file: &mut MapFile<2>, settings: &Settings, config: &LapConfig, stats: &ScanStats) {
-    file.header.logs.push(format!("simulated Apartment, seed {:#x}", config.seed));
-    file.header.scans = stats.scans;
-    file.header.settings = settings.to_json();
-    file.header.statistics = json::object(json::stats(stats));
+fn describe(file: &mut AnyMapFile, settings: &Settings, config: &LapConfig, stats: &ScanStats) {
+    let header = saved::header_mut(file);
+    header.logs.push(format!("simulated Apartment, seed {:#x}", config.seed));
+    header.scans = stats.scans;
+    header.settings = settings.to_json();
+    header.statistics = json::object(json::stats(stats));
 }

@@ -7,22 +7,20 @@ use std::time::Instant;
 use anyhow::{Context, anyhow};
 use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
-use portolan::geom::{Aabb, Grid, Pose};
-use portolan::map::{BeamSweep, TsdfConfig};
+use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
+use portolan::geom::{Grid, Pose};
+use portolan::map::Tsdf2Config;
 use portolan::scan::Scan;
 use portolan::surface::ContourSettings;
-use portolan::sweep::WeightModel;
-use portolan_chapter::gallery::{Gallery, GallerySettings, document};
-use portolan_chapter::pictures::{Scene, sheet};
 use portolan_io::write_atomic;
 use portolan_sim::{LapConfig, World};
 use serde_json::Value;
 
-use crate::arguments::{bounds, bytes, length};
+use crate::arguments::{Bounds, bounds, bytes, length};
+use crate::dimension::Dimension;
 use crate::error::bad_call;
-use crate::esdf::EsdfArg;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
-use crate::mapping::{MapKind, Settings, check_memory, grid_over, seen, with_outlier};
+use crate::mapping::{Settings, check_memory, grid_over, seen, with_outlier};
 use crate::output::Output;
 
 #[derive(clap::Args)]
@@ -51,7 +49,7 @@ pub(crate) struct Args {
     every: Option<u64>,
     /// Map this box only: x0,y0,x1,y1 (metres)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
-    bounds: Option<Aabb<2>>,
+    bounds: Option<Bounds>,
     /// Memory that may be used, with suffix K, M or G
     #[arg(long, value_name = "BYTES", value_parser = bytes, default_value = "4G")]
     memory: u64,
@@ -82,7 +80,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         let grid = apartment_grid(args.resolution);
         (Some(world), scans, grid, "the simulated Apartment".to_owned())
     } else {
-        let log = log::read(&args.log, &args.source)?;
+        let log = log::read_2d(&args.log, &args.source)?;
         let limits = args.limits.limits(&log);
         let (fused, _) = Selection { every: args.every, hold_out: None }.split(log.len());
         let scans = log::scans(&log, &fused, &limits);
@@ -114,21 +112,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 impl Args {
     /// As `demo` has them: free space weighs as much as a surface, as in the textbook (`map` gives it less).
     fn settings(&self) -> Settings {
-        Settings {
-            resolution: self.resolution,
-            truncation: self.truncation.unwrap_or(3.0 * self.resolution),
-            w_max: 64.0,
-            weights: WeightModel::default(),
-            sweep: BeamSweep::default(),
-            carve: true,
-            carve_weight: 1.0,
-            limits: Default::default(),
-            every: self.every,
-            hold_out: None,
-            bounds: self.bounds,
-            maps: vec![MapKind::Grid, MapKind::Tree, MapKind::Tsdf, MapKind::Esdf, MapKind::Contour],
-            esdf: EsdfArg::default(),
-        }
+        let mut settings = Settings::default();
+        settings.shape.resolution = self.resolution;
+        settings.shape.truncation = Some(self.truncation.unwrap_or(3.0 * self.resolution));
+        settings.shape.carve_weight = 1.0;
+        settings.every = self.every;
+        settings.bounds = self.bounds;
+        settings.resolved(Dimension::Two)
     }
 }
 
@@ -153,7 +143,11 @@ pub(crate) fn measure(
 ) -> anyhow::Result<Gallery> {
     let settings = GallerySettings {
         grid: *grid,
-        tsdf: TsdfConfig { truncation: made_with.truncation, w_max: made_with.w_max, ..Default::default() },
+        tsdf: Tsdf2Config {
+            truncation: made_with.truncation(),
+            w_max: made_with.w_max(),
+            ..Default::default()
+        },
         model: OccupancyModel::default(),
         contour: ContourSettings::default(),
         esdf: EsdfSettings::default(),

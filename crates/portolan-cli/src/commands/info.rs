@@ -2,32 +2,30 @@
 
 use std::path::{Path, PathBuf};
 
-use portolan::Status;
-use portolan::field::EsdfGrid;
-use portolan::geom::{Aabb, Grid};
+use portolan::geom::Aabb;
 use portolan::store::Store;
-use portolan_io::{CarmenLog, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
-use portolan_io::{OctomapTree, Polyline, detect_no_return};
+use portolan_io::{EsdfBin, EsdfFile, FileKind, MapCell, MapServerMap, OctomapTree, Polyline, detect};
 use serde_json::{Value, json};
 
 use crate::arguments::shown_bytes;
 use crate::json;
-use crate::log::{describe, path_length};
+use crate::log::describe;
 use crate::output::Output;
 use crate::source::{Source, open};
 
-mod space;
+mod logs;
+mod maps;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan info intel.log.gz")]
 pub(crate) struct Args {
-    /// A log, a map, a picture of one, or a folder that `map` wrote
+    /// A log, a map, an image of a map, or a folder that `map` wrote
     file: PathBuf,
     #[command(flatten)]
     output: Output,
 }
 
-/// Says what the file is.
+/// Prints what the file is.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let kind = detect(&args.file)?;
     let mut document = match kind {
@@ -76,68 +74,26 @@ fn lines(value: &Value, indent: &str, text: &mut String) {
 
 fn about(source: &Source) -> Value {
     match source {
-        Source::Map(file) => of_map(file),
+        Source::Map2(file) => maps::of_2d(file),
+        Source::Map3(file) => maps::of_3d(file),
         Source::Esdf(EsdfFile::Two(field)) => of_esdf(field),
         Source::Esdf(EsdfFile::Three(field)) => of_esdf(field),
         Source::Server(map) => of_server(map),
         Source::Image(image) => json!({
             "pixels": [image.width, image.height],
             "white": image.max_value,
-            "hint": "resolution and origin are in a yaml file, which is not beside it",
+            "hint": "resolution and origin are in a yaml file, which is missing beside it",
         }),
         Source::Contour(contour) => of_contour(contour),
         Source::Octomap(file) => of_octomap(file),
-        Source::Log(log) => of_log(log),
-        Source::SpaceMap(file) => space::of_map(file),
-        Source::ScanLog(log) => space::of_log(log),
+        Source::Log2(log) => logs::of_2d(log),
+        Source::Log3(log) => logs::of_3d(log),
     }
 }
 
-fn of_map(file: &MapFile<2>) -> Value {
-    let header = &file.header;
-    let mut maps = json!({});
-    if let Some(map) = &file.grid {
-        maps["grid"] = json!({
-            "cell": "log odds, one byte",
-            "extent": json::grid(map.store().grid()),
-            "observed": map.observed_cells(),
-            "bytes": map.memory_bytes(),
-        });
-    }
-    if let Some(map) = &file.tree {
-        maps["tree"] = json!({
-            "cell": "log odds, one byte",
-            "extent": json::aabb(&map.store().grid().aabb()),
-            "depth": map.tree().depth(),
-            "nodes": map.store().nodes(),
-            "bytes": map.memory_bytes(),
-        });
-    }
-    if let Some(map) = &file.tsdf {
-        maps["tsdf"] = json!({
-            "cell": "signed distance and weight, f32",
-            "extent": json::grid(map.grid()),
-            "truncation": map.config().truncation,
-            "w_max": map.config().w_max.is_finite().then_some(map.config().w_max),
-            "observed": map.observed_cells(0.0),
-            "bytes": map.memory_bytes(),
-        });
-    }
-    json!({
-        "logs": header.logs,
-        "scans": header.scans,
-        "hold_out": header.hold_out,
-        "every": header.every,
-        "settings": header.settings,
-        "statistics": header.statistics,
-        "poses": file.poses.len(),
-        "maps": maps,
-    })
-}
-
-fn of_esdf<const D: usize>(field: &EsdfGrid<D>) -> Value {
-    let known = || field.samples().iter().copied().filter(|d| !d.is_nan());
-    let saturated = || (0..field.samples().len()).filter(|&i| field.status(i) == Status::Saturated).count();
+fn of_esdf<const D: usize>(field: &EsdfBin<D>) -> Value {
+    let known = || field.distances.iter().copied().filter(|d| !d.is_nan());
+    let count = |status: u8| field.status.as_ref().map(|s| s.iter().filter(|&&v| v == status).count());
     json!({
         "dimension": D,
         "extent": json::grid::<D>(field.grid()),
@@ -150,9 +106,8 @@ fn of_esdf<const D: usize>(field: &EsdfGrid<D>) -> Value {
 
 fn of_server(map: &MapServerMap) -> Value {
     let count = |cell: MapCell| map.cells.iter().filter(|&&c| c == cell).count();
-    let grid: &Grid<2> = &map.grid;
     json!({
-        "extent": json::grid(grid),
+        "extent": json::grid::<2>(&map.grid),
         "yaw": map.yaw,
         "free": count(MapCell::Free),
         "occupied": count(MapCell::Occupied),
@@ -201,28 +156,5 @@ fn of_octomap(file: &OctomapTree) -> Value {
         "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
         "extent_of_occupied": (!extent_occupied.is_empty()).then(|| json::aabb(&extent_occupied)),
         "bytes_in_memory": tree.memory_bytes(),
-    })
-}
-
-fn of_log(log: &CarmenLog) -> Value {
-    let mut poses = Aabb::EMPTY;
-    let mut beams = Vec::new();
-    for scan in log.raw_scans() {
-        poses.include(scan.world_from_laser.translation);
-        beams.push(scan.readings.len());
-    }
-    let no_return = detect_no_return(log);
-    let silent = |r: &&f64| no_return.is_some_and(|n| **r >= n);
-    let readings: usize = beams.iter().sum();
-    json!({
-        "scans": log.len(),
-        "beams_per_scan": [beams.iter().min(), beams.iter().max()],
-        "readings": readings,
-        "readings_not_finite": log.raw_scans().flat_map(|s| s.readings).filter(|r| !r.is_finite()).count(),
-        "no_return": no_return,
-        "readings_without_echo": log.raw_scans().flat_map(|s| s.readings).filter(silent).count(),
-        "path_length": path_length(log),
-        "extent_of_poses": json::aabb(&poses),
-        "log": json::log_stats(log.stats()),
     })
 }

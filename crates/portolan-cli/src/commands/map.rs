@@ -1,142 +1,133 @@
 //! `map`: fuse a log into maps.
 
-mod common;
-mod plane;
-mod space;
-
+use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::PathBuf;
+use std::time::Instant;
 
+use anyhow::{Context, bail};
 use portolan::geom::Aabb;
-use portolan::scan::Body;
-use portolan::sweep::WeightModel;
+use portolan::scan::ScanStats;
+use portolan_io::{AnyMapFile, detect_no_return, write_atomic};
 
-use crate::arguments::{Bounds, ForgettingArgs, body, bounds, box3, bytes, length, share};
+use crate::arguments::{box3, bytes};
+use crate::dimension::{Dimension, Given, ONLY_3D};
 use crate::error::bad_call;
-use crate::esdf::EsdfArg;
-use crate::log::{LimitArgs, LogArgs};
-use crate::mapping::MapKind;
+use crate::log::{self, Log, LogArgs};
+use crate::mapping::{Artifacts, Derived, Limits, MapKind, Mapper, Settings, Summary, report, title};
 use crate::output::Output;
-
-/// Sweeps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum SweepArg {
-    /// Planar: distances at cell centres, with the range interpolated between beams
-    CellCentre,
-    /// Planar: the textbook's march along beams
-    March,
-    /// In space: projective where a scan has rows and columns, exact rays otherwise
-    Auto,
-    /// In space: every ray exactly
-    Exact,
-    /// In space: cells against the range image
-    Projective,
-}
-
-/// Weights of beams.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum WeightsArg {
-    /// Every beam 1
-    Constant,
-    /// One over the range squared
-    Range,
-    /// Cosine of the incidence angle
-    Incidence,
-    /// Both
-    RangeIncidence,
-}
-
-impl WeightsArg {
-    fn model(self) -> WeightModel {
-        match self {
-            Self::Constant => WeightModel::Constant,
-            Self::Range => WeightModel::InverseSquare,
-            Self::Incidence => WeightModel::CosIncidence,
-            Self::RangeIncidence => WeightModel::InverseSquareCosIncidence,
-        }
-    }
-}
+use crate::progress::Progress;
+use crate::{json, saved};
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  portolan map intel-corrected.log.gz --resolution 0.05 --out intel\n  \
                   portolan map rgbd_redkitchen --resolution 0.02 --out kitchen")]
 pub(crate) struct Args {
-    /// Log of range scans with poses; its kind is recognised
+    /// Log of range scans with poses, 2-D or 3-D; the format is detected
     log: PathBuf,
-    /// Folder for the results; made if it is not there
+    /// Folder for the results; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Edge of a cell (metres); with --append the map's
-    #[arg(long, value_name = "R", value_parser = length, allow_negative_numbers = true)]
-    #[arg(required_unless_present = "append")]
-    resolution: Option<f64>,
-    /// Distances are kept within this of a surface (metres); default three cells
-    #[arg(long, value_name = "T", value_parser = length, allow_negative_numbers = true)]
-    truncation: Option<f64>,
     #[command(flatten)]
-    forgetting: ForgettingArgs,
-    /// How much each beam is trusted; default constant
-    #[arg(long, value_enum)]
-    weights: Option<WeightsArg>,
-    /// How scans become evidence; default cell-centre, in space auto
-    #[arg(long, value_enum)]
-    sweep: Option<SweepArg>,
-    /// Maps to make, separated by commas; esdf, contour and mesh need tsdf, which is then made too
-    /// [default: grid,tree,tsdf,esdf,contour; in space: tree,tsdf,esdf,mesh]
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
-    maps: Option<Vec<MapKind>>,
-    #[command(flatten)]
-    source: LogArgs,
-    #[command(flatten)]
-    limits: LimitArgs,
-    /// Do not fuse the free space in front of surfaces into the distances: faster, but free is then unknown
-    #[arg(long)]
-    no_carve: bool,
-    /// Weight of free space against that of a surface, above 0 and at most 1; with less, thin things survive and
-    /// what has gone fades more slowly; default 0.3 (the chapter's is 1)
-    #[arg(long, value_name = "W", value_parser = share, allow_negative_numbers = true, conflicts_with = "no_carve")]
-    carve_weight: Option<f32>,
-    /// Map this box only: x0,y0,x1,y1, in space x0,y0,z0,x1,y1,z1 (metres)
-    #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
-    bounds: Option<Bounds>,
-    /// Readings inside of this part of the sensor's frame are of the robot itself: a box x0,y0,z0,x1,y1,z1 or a ball
-    /// x,y,z,radius (metres); may be given several times
-    #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true)]
-    self_filter: Vec<Body>,
-    /// How the esdf is made: distances to the extracted surface, from the chapter's seeds, or between cells [default:
-    /// accurate]
-    #[arg(long, value_enum)]
-    esdf: Option<EsdfArg>,
-    /// In space: distances of the esdf are kept up to here (metres); default 1
-    #[arg(long, value_name = "M", value_parser = length)]
-    max_distance: Option<f64>,
-    /// In space: write this box of the esdf into esdf.bin, where the whole would be larger than 256 MiB
-    #[arg(long, value_name = "BOX", value_parser = box3, allow_hyphen_values = true)]
+    settings: Given<Settings>,
+    /// Write only this box of the esdf into esdf.bin, for a field larger than 256 MiB
+    #[arg(long, value_name = "BOX", value_parser = box3, allow_hyphen_values = true, help_heading = ONLY_3D)]
     dense: Option<Aabb<3>>,
-    /// In space: do not fuse colour
-    #[arg(long)]
-    no_color: bool,
-    /// Use every N-th scan of the log only
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
-    every: Option<u64>,
-    /// Leave every N-th scan out of fusion, for `eval --scans`
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..), allow_negative_numbers = true)]
-    hold_out: Option<u64>,
-    /// Go on with the map in DIR; settings not given are the map's, but for --bounds, which are those of this run
+    /// Add the log to the map in DIR. Settings that are not given are those of the map, except --bounds
     #[arg(long)]
     append: bool,
-    /// Threads; default: one per core. The result does not depend on it
+    /// Number of threads [default: one per core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
     threads: Option<u16>,
-    /// Memory that may be used, with suffix K, M or G
+    /// Memory for the maps, with suffix K, M or G
     #[arg(long, value_name = "BYTES", value_parser = bytes, default_value = "4G")]
     memory: u64,
+    #[command(flatten)]
+    source: LogArgs,
     #[command(flatten)]
     output: Output,
 }
 
 /// Fuses the log.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    if args.source.is_space(&args.log)? { space::run(args) } else { plane::run(args) }
+    let dimension = args.source.dimension(&args.log)?;
+    dimension.check::<Args, _>(&args.settings, "the log")?;
+    let mut stages = Stages::start();
+    let threads = start_threads(args.threads)?;
+    let before = args.saved_map(dimension)?;
+    let mut settings = args.settings(dimension, before.as_ref())?;
+    let log = args.open(&mut settings)?;
+    stages.end("read");
+
+    let (fused, held_out) = settings.selection().split(log.len());
+    let (log_name, map_name) = (args.log.display().to_string(), args.map_path().display().to_string());
+    let memory = usize::try_from(args.memory).unwrap_or(usize::MAX);
+    let limits = Limits { memory, log: &log_name, map: &map_name };
+    let mut mapper = Mapper::new(&log, &fused, &settings, before, &limits)?;
+    stages.end("prepare");
+
+    let progress = Progress::new(mapper.scans(), "fusing", args.output);
+    let fusion = mapper.fuse(threads, &progress);
+    drop(progress);
+    stages.end("fuse");
+    if let (0, (_, Some(error))) = (fusion.stats.scans, &fusion.unreadable) {
+        // Not one scan could be used: the first error says more than an empty map.
+        bail!("{error}");
+    }
+    let mut bytes = mapper.bytes();
+    let (mut file, extent) = mapper.finish();
+    describe(&mut file, &settings, &log, &fusion.stats);
+    args.make_folder()?;
+    // Before anything is derived from it: whatever happens then, what was fused is saved.
+    saved::write(&file, &args.map_path())?;
+    stages.end("save");
+
+    let derived = Derived::of(&file, &settings, memory);
+    bytes.extend(derived.bytes());
+    let header = saved::header(&file);
+    let title = title(&header.logs, settings.resolution(), header.scans);
+    let (dense, camera) = (args.dense, log.is_of_camera());
+    let written = Artifacts { file: &file, derived: &derived, dense, camera, title }.write(&args.out)?;
+    let mut seconds = stages.total();
+    seconds.extend(fusion.seconds.iter().chain(&derived.seconds).chain(&written.seconds));
+    let mut files = written.files;
+    files.push("summary.json");
+    let summary = Summary {
+        log: &log,
+        settings: &settings,
+        extent,
+        held_out: held_out.len(),
+        fusion: &fusion,
+        file: &file,
+        derived: &derived,
+        notes: written.notes,
+        bytes,
+        seconds,
+        files,
+    };
+    let document = summary.to_json();
+    write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{document:#}"))?;
+    args.output.print(&document, report(&summary, &args.out.display().to_string()))?;
+    if let Some(full) = &fusion.full {
+        bail!(
+            "{log_name}: {full}; {} of {} scans were fused and saved; start again with more --memory, a coarser \
+             --resolution or --bounds",
+            fusion.stats.scans,
+            fused.len()
+        );
+    }
+    Ok(())
+}
+
+/// Writes into the file's header what it is made of.
+fn describe(file: &mut AnyMapFile, settings: &Settings, log: &Log, stats: &ScanStats) {
+    let header = saved::header_mut(file);
+    header.logs.push(log.name());
+    header.scans += stats.scans;
+    header.every = settings.every;
+    header.hold_out = settings.shape.hold_out;
+    header.settings = settings.to_json();
+    json::add_counts(&mut header.statistics, &json::object(json::stats(stats)));
 }
 
 impl Args {
@@ -144,16 +135,91 @@ impl Args {
         self.out.join("map.portolan")
     }
 
-    /// A file in place of the folder is found out before the work, not after it.
-    fn check_out(&self) -> anyhow::Result<()> {
+    /// The map to go on with. Without one, a folder that cannot be written to is found out before the work.
+    fn saved_map(&self, dimension: Dimension) -> anyhow::Result<Option<AnyMapFile>> {
+        if self.append {
+            return saved::read(&self.map_path(), self.memory, dimension).map(Some);
+        }
         if self.out.exists() && !self.out.is_dir() {
-            anyhow::bail!("{}: is a file, not a folder; name a folder for the results", self.out.display());
+            bail!("{}: is a file, not a folder; name a folder for the results", self.out.display());
         }
         if let (Ok(out), Ok(log)) = (self.out.canonicalize(), self.log.canonicalize())
             && out == log
         {
             return Err(bad_call("--out is the log's own folder; name another one"));
         }
-        Ok(())
+        Ok(None)
+    }
+
+    /// What was given, else what the map to go on with was made with, else the defaults.
+    fn settings(&self, dimension: Dimension, before: Option<&AnyMapFile>) -> anyhow::Result<Settings> {
+        let map = self.map_path().display().to_string();
+        let saved = before.map(|file| &saved::header(file).settings);
+        let base = saved.map(Settings::of_saved).unwrap_or_default();
+        let settings = self.settings.over(base)?.resolved(dimension);
+        settings.check(dimension)?;
+        if let Some(saved) = saved {
+            settings.check_agree(saved, &map)?;
+        }
+        if self.dense.is_some() && !settings.wants(MapKind::Esdf) {
+            return Err(bad_call("--dense is about the esdf, which --maps leaves out"));
+        }
+        Ok(settings)
+    }
+
+    /// Opens the log. From a 2-D log comes the range of readings without echo, where it was not given.
+    fn open(&self, settings: &mut Settings) -> anyhow::Result<Log> {
+        if settings.dimension == Dimension::Two {
+            let log = log::read_2d(&self.log, &self.source)?;
+            let no_return = &mut settings.no_return.no_return;
+            *no_return = no_return.or_else(|| detect_no_return(&log));
+            return Ok(Log::Two(log));
+        }
+        let log = log::read_3d(&self.log, &self.source, settings.shape.color)?;
+        self.source.check_sensor(&log)?;
+        Ok(Log::Three(Box::new(log)))
+    }
+
+    fn make_folder(&self) -> anyhow::Result<()> {
+        std::fs::create_dir_all(&self.out).with_context(|| {
+            format!("{}: cannot create the folder; name one that can be written to", self.out.display())
+        })
+    }
+}
+
+/// Number of threads; those that share out the work are started.
+fn start_threads(threads: Option<u16>) -> anyhow::Result<usize> {
+    let threads = match threads {
+        Some(n) => usize::from(n),
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start threads")?;
+    Ok(threads)
+}
+
+/// Seconds per stage.
+struct Stages {
+    start: Instant,
+    last: Instant,
+    seconds: BTreeMap<&'static str, f64>,
+}
+
+impl Stages {
+    fn start() -> Self {
+        let start = Instant::now();
+        Self { start, last: start, seconds: BTreeMap::new() }
+    }
+
+    /// The stage that ends here.
+    fn end(&mut self, name: &'static str) {
+        let now = Instant::now();
+        self.seconds.insert(name, (now - self.last).as_secs_f64());
+        self.last = now;
+    }
+
+    /// All stages, and everything since the start.
+    fn total(mut self) -> BTreeMap<&'static str, f64> {
+        self.seconds.insert("total", self.start.elapsed().as_secs_f64());
+        self.seconds
     }
 }

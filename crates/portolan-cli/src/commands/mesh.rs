@@ -8,26 +8,28 @@ use portolan_io::MapFile;
 use serde_json::json;
 
 use crate::arguments::weight_or_zero;
+use crate::dimension::{Dimension, Given, ONLY_2D};
 use crate::error::bad_call;
-use crate::mapping::{polylines, write_contour};
+use crate::mapping::{mesh_settings, polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
-use crate::space::{mesh_settings, write_mesh};
 
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  portolan mesh intel contour.svg --min-weight 5\n  portolan mesh kitchen kitchen.glb"
 )]
 pub(crate) struct Args {
+    #[command(flatten)]
+    given: Given<()>,
     /// map.portolan or its folder
     map: PathBuf,
-    /// File to write: .geojson or .svg in the plane, .ply, .glb or .obj in space
+    /// File to write: .geojson or .svg for the contour of a 2-D map; .ply, .glb or .obj for the mesh of a 3-D map
     out: PathBuf,
-    /// Cells of smaller weight count as never observed; default: half of what one ordinary ray weighs
+    /// Cells with a smaller weight count as never observed [default: half the weight of one ordinary ray]
     #[arg(long, value_name = "W", value_parser = weight_or_zero, allow_negative_numbers = true)]
     min_weight: Option<f32>,
-    /// Decide ambiguous squares by the fixed table instead of by the field
-    #[arg(long)]
+    /// Resolve ambiguous squares by a fixed table instead of by the field
+    #[arg(long, help_heading = ONLY_2D)]
     fixed_table: bool,
     #[command(flatten)]
     output: Output,
@@ -36,8 +38,8 @@ pub(crate) struct Args {
 /// Extracts the surface.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     match open(&args.map)? {
-        Source::Map(file) => contour(args, &file),
-        Source::SpaceMap(file) => mesh(args, &file),
+        Source::Map2(file) => contour(args, &file),
+        Source::Map3(file) => mesh(args, &file),
         other => {
             let kind = other.describe();
             bail!(
@@ -52,14 +54,18 @@ fn no_tsdf(args: &Args) -> anyhow::Error {
     anyhow!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display())
 }
 
-fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
+fn wrong_extension(args: &Args, names: &str) -> anyhow::Error {
+    bad_call(format!("{}: give OUT the extension {names}", args.out.display()))
+}
+
+fn contour(args: &Args, file: &MapFile) -> anyhow::Result<()> {
     let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let ambiguity = if args.fixed_table { Ambiguity::FixedTable } else { Ambiguity::Decide };
     let min_weight = args.min_weight.unwrap_or(tsdf.thresholds().surface);
     let contour = marching_squares(tsdf, &ContourSettings { min_weight: Some(min_weight), ambiguity });
     let lines = polylines(&contour);
     if !write_contour(&args.out, &lines)? {
-        return Err(bad_call(format!("{}: give OUT the name .geojson or .svg", args.out.display())));
+        return Err(wrong_extension(args, ".geojson or .svg"));
     }
     let (segments, length) = (contour.segments.len(), contour.length() + 0.0); // the sum of nothing is -0.0
     let document = json!({
@@ -77,16 +83,14 @@ fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     )
 }
 
-fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
-    if args.fixed_table {
-        return Err(bad_call("--fixed-table is for contours; the map is of space"));
-    }
-    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
+fn mesh(args: &Args, file: &SpaceMapFile) -> anyhow::Result<()> {
+    Dimension::Three.check::<Args, _>(&args.given, "the map")?;
+    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let usual = mesh_settings(tsdf.weights);
     let settings = MeshSettings { min_weight: args.min_weight.or(usual.min_weight), ..usual };
     let mesh = marching_cubes(&tsdf.store, file.colors.as_ref().map(|c| &c.store), &settings);
     if !write_mesh(&args.out, &mesh)? {
-        return Err(bad_call(format!("{}: give OUT the name .ply, .glb or .obj", args.out.display())));
+        return Err(wrong_extension(args, ".ply, .glb or .obj"));
     }
     let (triangles, area) = (mesh.triangles.len(), mesh.area());
     let document = json!({

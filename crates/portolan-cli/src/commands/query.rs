@@ -20,32 +20,33 @@ use serde_json::{Value, json};
 use super::convert::UnknownArg;
 use crate::arguments::length;
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, plane_esdf};
+use crate::esdf::{EsdfArg, esdf_2d};
+use crate::mapping::{Settings, esdf_settings};
 use crate::output::Output;
 use crate::source::{Source, open};
-use crate::space::esdf_settings;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echo 1.5,2.0 | portolan query intel --points -")]
-/// Answers at points: x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz]
+/// Answers at points, as CSV: x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz]
 ///
-/// `status` is known, unknown, saturated or outside and is about the distance, which is interpolated. `lower` and `upper`
-/// hold the exact distance to the extracted surface without its sign, whatever `distance` says: certified, for a
-/// map.portolan with signed distances; other files give none. Saturated: nothing is nearer than `lower`; no `upper`.
+/// `status` is known, unknown, saturated or outside; it refers to `distance`, which is interpolated. The exact distance to
+/// the extracted surface, without its sign, is certified to lie between `lower` and `upper`; only a map.portolan with
+/// signed distances has these bounds. Where `status` is saturated, the surface is farther than `lower` and `upper` is
+/// empty.
 pub(crate) struct Args {
     /// A folder that `map` wrote, a map.portolan, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot
     map: PathBuf,
-    /// CSV of x,y or x,y,z in metres; - reads standard input
+    /// CSV of x,y (2-D) or x,y,z (3-D) in metres; - reads standard input
     #[arg(long, value_name = "FILE")]
     points: PathBuf,
-    /// Maps of space: distances are found up to here (metres) [default: as the map was made]
+    /// 3-D maps: largest distance to find (metres) [default: as the map was made]
     #[arg(long, value_name = "M", value_parser = length)]
     max_distance: Option<f64>,
-    /// How the distances of a map.portolan are made; only accurate ones have bounds [default: accurate]
+    /// Method of the distances of a map.portolan; only accurate ones have bounds [default: accurate]
     #[arg(long, value_enum)]
     esdf: Option<EsdfArg>,
-    /// What lower and upper are about: the surface alone (optimistic), or the surface and unknown space, whichever is
-    /// nearer (pessimistic) [default: optimistic, as the distance is]
+    /// Whether lower and upper count unknown space as free (optimistic: distance to the surface, as in `distance`) or as an
+    /// obstacle (pessimistic: distance to the surface or to unknown space, whichever is nearer) [default: optimistic]
     #[arg(long, value_enum)]
     unknown: Option<UnknownArg>,
     #[command(flatten)]
@@ -55,14 +56,17 @@ pub(crate) struct Args {
 /// Answers at all points.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let source = open(&args.map)?;
-    if args.esdf.is_some() && !matches!(source, Source::SpaceMap(_) | Source::Map(_)) {
-        return Err(bad_call(format!("--esdf is for a map.portolan; this is {}", source.describe())));
+    if args.esdf.is_some() && !matches!(source, Source::Map2(_) | Source::Map3(_)) {
+        return Err(bad_call(format!("--esdf is only for a map.portolan; this is {}", source.describe())));
     }
-    if args.unknown.is_some() && !matches!(source, Source::SpaceMap(_) | Source::Map(_)) {
-        return Err(bad_call(format!("--unknown is for a map.portolan; this is {}", source.describe())));
+    if args.unknown.is_some() && !matches!(source, Source::Map2(_) | Source::Map3(_)) {
+        return Err(bad_call(format!("--unknown is only for a map.portolan; this is {}", source.describe())));
     }
-    if args.max_distance.is_some() && !matches!(source, Source::SpaceMap(_)) {
-        return Err(bad_call(format!("--max-distance is for maps of space; this is {}", source.describe())));
+    if args.max_distance.is_some() && !matches!(source, Source::Map3(_)) {
+        return Err(bad_call(format!(
+            "--max-distance is only for a 3-D map.portolan; this is {}",
+            source.describe()
+        )));
     }
     if let Some(warning) = source.warning().filter(|_| !args.output.quiet) {
         // Standard output is for the answers.
@@ -78,10 +82,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         (Fields::Two(field), QueryPoints::Two(points)) => write_answers(&field, &points, args.output),
         (Fields::Three(field), QueryPoints::Three(points)) => write_answers(&field, &points, args.output),
         (Fields::Two(_), _) => {
-            bail!("{}: the points are x,y,z; the map is in the plane: write x,y", shown(args))
+            bail!("{}: the points are x,y,z; the map is 2-D: give x,y", shown(args))
         }
         (Fields::Three(_), _) => {
-            bail!("{}: the points are x,y; the map is in space: write x,y,z", shown(args))
+            bail!("{}: the points are x,y; the map is 3-D: give x,y,z", shown(args))
         }
     }
 }
@@ -121,13 +125,13 @@ fn row_json<const D: usize>(row: &AnswerRow<D>) -> Value {
     })
 }
 
-/// What can be asked, in the plane or in space.
+/// A map of either dimension.
 enum Fields {
     Two(Field<2>),
     Three(Field<3>),
 }
 
-/// Answers to occupancy and distance of one map.
+/// Occupancy and distance of one map.
 struct Field<const D: usize> {
     distance: Option<Distance<D>>,
     clearance: Option<Certified<D>>,
@@ -144,12 +148,16 @@ type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>
 struct Certified<const D: usize> {
     field: Esdf<D>,
     unknown: UnknownSpace,
-    /// Where as much is certified, more is not said (metres).
+    /// Bounds are given up to this distance (metres).
     limit: f64,
 }
 
-/// What a field in bricks answers. Only the accurate method certifies.
-fn sparse<const D: usize>(field: Esdf<D>, limit: f64, args: &Args) -> (Distance<D>, Option<Certified<D>>) {
+/// Distances and, with the accurate method, certified bounds of a field in bricks.
+fn sparse<const D: usize>(
+    field: SparseEsdf<D>,
+    limit: f64,
+    args: &Args,
+) -> (Distance<D>, Option<Certified<D>>) {
     let unknown = args.unknown.map_or(UnknownSpace::Optimistic, UnknownArg::space);
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
     let reach = certified_reach(&field);
@@ -165,11 +173,11 @@ fn dense<const D: usize>(esdf: EsdfGrid<D>) -> Distance<D> {
 impl Fields {
     fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
-            Source::Map(file) => Self::Two(of_map(*file, args)),
-            Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)),
-            Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)),
+            Source::Map2(file) => Self::Two(of_map2(*file, args)),
+            Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
+            Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
             Source::Server(map) => Self::Two(of_server(map)),
-            Source::SpaceMap(file) => Self::Three(of_space_map(*file, args)?),
+            Source::Map3(file) => Self::Three(of_map3(*file, args)?),
             Source::Octomap(file) => Self::Three(of_octomap(*file)),
             other => bail!(
                 "{}: is {}; give a map.portolan or its folder, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot",
@@ -180,12 +188,12 @@ impl Fields {
     }
 }
 
-fn of_map(file: MapFile<2>, args: &Args) -> Field<2> {
+fn of_map2(file: MapFile, args: &Args) -> Field<2> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
         let pessimistic = args.unknown == Some(UnknownArg::Pessimistic);
-        let field = plane_esdf(t, args.esdf.unwrap_or_default(), pessimistic);
+        let field = esdf_2d(t, args.esdf.unwrap_or_default(), pessimistic);
         let (distance, clearance) = sparse(field, f64::INFINITY, args);
-        // A map of the plane is a box: what lies outside does not depend on where something was seen.
+        // A 2-D map is a box: what lies outside does not depend on where something was seen.
         let bounds = t.grid().aabb();
         let in_box: Distance<2> = Box::new(move |p| match distance(p) {
             _ if !bounds.contains(p) => Answer::Outside,
@@ -212,10 +220,10 @@ fn of_map(file: MapFile<2>, args: &Args) -> Field<2> {
     Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY }
 }
 
-fn of_space_map(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
-    let saved = file.header.settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
-    let max_distance = args.max_distance.or(saved).unwrap_or(1.0);
-    let field = file.tsdf_bricks.as_ref().map(|map| {
+fn of_map3(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
+    let max_distance =
+        args.max_distance.unwrap_or_else(|| Settings::of_saved(&file.header.settings).max_distance);
+    let field = file.tsdf.as_ref().map(|map| {
         let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
         how.method = args.esdf.unwrap_or_default().method();
         how.unknown = args.unknown == Some(UnknownArg::Pessimistic);

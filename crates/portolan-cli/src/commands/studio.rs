@@ -13,6 +13,7 @@ use portolan_studio::server::{Server, Settings};
 use serde_json::json;
 
 use crate::arguments::bytes;
+use crate::dimension::{Dimension, Given};
 use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::with_outlier;
@@ -20,7 +21,7 @@ use crate::output::Output;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Open the address that it prints in a browser. Every tab has maps of its own; closing it frees them. \
+    after_help = "Open the printed address in a browser. Every tab has its own maps, which are freed when it is closed. \
                   Ctrl-C stops the studio.
 
 Examples:
@@ -30,22 +31,24 @@ Examples:
   portolan studio out/kitchen"
 )]
 pub(crate) struct Args {
-    /// Log of range scans with poses, planar or of space, or a map of space that `map` has written; its kind is
-    /// recognised. Without one, and in the views that it is not for, simulated scans are shown
+    #[command(flatten)]
+    given: Given<()>,
+    /// Log of range scans with poses, 2-D or 3-D, or a 3-D map written by `map`; the format is detected. Views that it
+    /// does not fit show simulated scans, as all views do without a log
     log: Option<PathBuf>,
-    /// Port to listen at; 0: any that is free
+    /// Port to listen on; 0 takes any free port
     #[arg(long, value_name = "PORT", default_value = "7700")]
     port: u16,
-    /// Address to listen at. Another one than this machine's own lets everybody who reaches it use the studio
+    /// Address to listen on. With any but a loopback address, everyone who can reach this machine can use the studio
     #[arg(long, value_name = "ADDRESS", value_parser = host, default_value = "127.0.0.1")]
     host: IpAddr,
-    /// Tabs at a time; one more is told to wait
+    /// Largest number of tabs at the same time; further tabs wait
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), default_value = "8")]
     sessions: u16,
-    /// Memory that the maps of each tab may use, with suffix K, M or G
+    /// Memory for the maps of each tab, with suffix K, M or G
     #[arg(long, value_name = "BYTES", value_parser = bytes, default_value = "2G")]
     memory: u64,
-    /// Use every N-th scan of the log only
+    /// Use only every N-th scan of the log
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     every: Option<u64>,
     #[command(flatten)]
@@ -87,25 +90,24 @@ impl Args {
         {
             return self.map(path);
         }
-        if self.source.is_space(path)? { self.space(path) } else { self.plane(path) }
+        match self.source.dimension(path)? {
+            Dimension::Two => self.log_2d(path),
+            Dimension::Three => self.log_3d(path),
+        }
     }
 
-    /// A map of space that was made before.
+    /// A 3-D map that was made before.
     fn map(&self, path: &Path) -> anyhow::Result<Logs> {
-        if self.every.is_some() || self.limits.is_given() {
-            return Err(bad_call("--every, --min-range and the like are about a log; this is a map"));
+        if self.every.is_some() || self.given.has_any::<LimitArgs>() {
+            return Err(bad_call("--every, --min-range and the like are options for logs; this is a map"));
         }
         let shown = path.display();
         let file = if path.is_dir() { path.join("map.portolan") } else { path.into() };
-        let container = Container::read(file)?;
-        if map_dimension(&container)? != 3 {
-            bail!(
-                "{shown}: a map of the plane; give the log that it was made of, and the studio makes it again"
-            );
-        }
-        let file = MapFile::<3>::from_container(&container, self.memory)?;
-        let Some(held) = file.tsdf_bricks else {
-            bail!("{shown}: the map holds no distances, and so no surface; make it with --maps tsdf");
+        let AnyMapFile::Space(file) = AnyMapFile::read_within(file, self.memory)? else {
+            bail!("{shown}: a 2-D map; give the log that it was made of, and the studio makes the map again");
+        };
+        let Some(held) = file.tsdf else {
+            bail!("{shown}: the map has no tsdf, and so no surface; make it with --maps tsdf");
         };
         let config = TsdfConfig {
             truncation: held.truncation,
@@ -119,13 +121,9 @@ impl Args {
         Ok(Logs { source_3d, ..Logs::default() })
     }
 
-    fn plane(&self, path: &Path) -> anyhow::Result<Logs> {
-        if self.source.is_about_space() {
-            return Err(bad_call(
-                "--pose-convention, --intrinsics or another option is for scans of space; the log is planar",
-            ));
-        }
-        let log = log::read(path, &self.source)?;
+    fn log_2d(&self, path: &Path) -> anyhow::Result<Logs> {
+        Dimension::Two.check::<Self, _>(&self.given, "the log")?;
+        let log = log::read_2d(path, &self.source)?;
         let (shown, _) = Selection { every: self.every, hold_out: None }.split(log.len());
         let scans = log::scans(&log, &shown, &self.limits.limits(&log));
         if scans.iter().all(|(_, scan)| scan.counts().hit == 0) {
@@ -138,9 +136,10 @@ impl Args {
         Ok(Logs { source_2d: Source2d::Recorded { name: name(path), scans }, ..Logs::default() })
     }
 
-    fn space(&self, path: &Path) -> anyhow::Result<Logs> {
-        let filter = self.limits.filter()?;
-        let log = log::read_space(path, &self.source, true)?;
+    fn log_3d(&self, path: &Path) -> anyhow::Result<Logs> {
+        Dimension::Three.check::<Self, _>(&self.given, "the log")?;
+        let filter = self.limits.range.filter(Vec::new())?;
+        let log = log::read_3d(path, &self.source, true)?;
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
         Ok(Logs {
             source_3d: Source3d::Recorded { log: Box::new(log.every(every)), filter },
@@ -148,16 +147,11 @@ impl Args {
         })
     }
 
-    /// Options about a log that is not there would do nothing, silently.
+    /// Options about a log would do nothing without one, silently.
     fn check_no_log(&self) -> anyhow::Result<()> {
-        let LogArgs { poses, format, .. } = &self.source;
-        let given = self.every.is_some()
-            || poses.is_some()
-            || format.is_some()
-            || self.source.is_about_space()
-            || self.limits.is_given();
-        if given {
-            return Err(bad_call("--every, --poses, --format and the like are about a log; give one"));
+        let given = self.given.has_any::<LogArgs>() || self.given.has_any::<LimitArgs>();
+        if given || self.every.is_some() {
+            return Err(bad_call("--every, --poses, --format and the like are options for logs; give one"));
         }
         Ok(())
     }
@@ -188,9 +182,9 @@ impl Args {
         let (host, port) = (self.host, self.port);
         Server::start(logs, &settings).map_err(|error| match error.kind() {
             io::ErrorKind::AddrInUse => {
-                anyhow!("port {port} of {host} is taken; name another one, or --port 0 for any that is free")
+                anyhow!("port {port} of {host} is in use; give another one, or --port 0 for any free port")
             }
-            _ => anyhow!("cannot listen at port {port} of {host}: {error}; try another --port or --host"),
+            _ => anyhow!("cannot listen on port {port} of {host}: {error}; try another --port or --host"),
         })
     }
 
@@ -200,17 +194,17 @@ impl Args {
         }
         writeln!(
             io::stderr(),
-            "portolan: warning: everybody who reaches {} can use this studio and see its log: it asks for no password",
+            "portolan: warning: everyone who can reach {} can use this studio and see its log: there is no password",
             self.host
         )
     }
 
     /// The address, and which views show what.
     fn announce(&self, server: &Server, logs: &Logs) -> anyhow::Result<()> {
-        let (plane, space) = (shown_in_the_plane(logs), shown_in_space(logs));
+        let (plane, space) = (shown_in_2d(logs), shown_in_3d(logs));
         let url = server.url();
         if self.output.json {
-            // In one line, so that whoever started it knows where the document ends: it goes on serving.
+            // In one line, so that its end is known while the program goes on serving.
             let document = json!({
                 "url": url,
                 "views": { "fusion": plane, "gallery": plane, "clearance": plane, "radiance": LINE, "space": space },
@@ -229,18 +223,18 @@ impl Args {
 /// What the view of the renderer shows, whatever the log.
 const LINE: &str = "the simulated line";
 
-fn shown_in_the_plane(logs: &Logs) -> String {
-    match &logs.source_2d {
-        Source2d::Apartment => "the simulated Apartment".into(),
-        Source2d::Recorded { name, scans } => format!("{name}, {} scans", scans.len()),
+fn shown_in_2d(logs: &Logs) -> String {
+    match &logs.plane {
+        PlaneLog::Apartment => "the simulated Apartment".into(),
+        PlaneLog::Recorded { name, scans } => format!("{name}, {} scans", scans.len()),
     }
 }
 
-fn shown_in_space(logs: &Logs) -> String {
-    match &logs.source_3d {
-        Source3d::Building => "the simulated building".into(),
-        Source3d::Recorded { log, .. } => format!("{}, {} scans", log.name(), log.len()),
-        Source3d::Map { name, .. } => name.clone(),
+fn shown_in_3d(logs: &Logs) -> String {
+    match &logs.space {
+        SpaceSource::Building => "the simulated building".into(),
+        SpaceSource::Recorded { log, .. } => format!("{}, {} scans", log.name(), log.len()),
+        SpaceSource::Map { name, .. } => name.clone(),
     }
 }
 

@@ -1,17 +1,57 @@
 //! How large a map must be, and whether there is memory for it.
 
 use anyhow::{anyhow, bail};
+use portolan::cell::Cell;
 use portolan::geom::vector::{along, distance};
-use portolan::geom::{Aabb, Grid, Pose};
+use portolan::geom::{Aabb, BLOCK_EDGE, Grid, Pose};
 use portolan::scan::Scan;
+use portolan::store::{Bricks, Store};
+use portolan_io::SpaceMapFile;
+use serde_json::Value;
 
+use super::recipe::MARGIN_CELLS;
 use super::{MapKind, Settings};
 use crate::arguments::shown_bytes;
+use crate::json;
 
-/// Cells around everything that was seen, besides the truncation.
-const MARGIN_CELLS: f64 = 4.0;
 /// The largest cell index that is computed with (of 2^53 that an f64 tells apart).
 const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
+
+/// The box that the maps of a run cover.
+pub(crate) enum Extent {
+    /// The grid of dense maps.
+    Two(Grid<2>),
+    /// The box of all bricks.
+    Three(Aabb<3>),
+}
+
+impl Extent {
+    /// Of a map in bricks.
+    pub(super) fn of_bricks(file: &SpaceMapFile) -> Self {
+        let occupancy = file.occupancy.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
+        let tsdf = file.tsdf.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
+        Self::Three(occupancy.union(tsdf))
+    }
+
+    /// For `summary.json`.
+    pub(super) fn to_json(&self) -> Value {
+        match self {
+            Self::Two(grid) => json::grid(grid),
+            Self::Three(bounds) => json::aabb(bounds),
+        }
+    }
+}
+
+/// The box of all bricks of a store (metres).
+pub(crate) fn brick_extent<C: Cell>(store: &Bricks<C, 3>) -> Aabb<3> {
+    let mut extent = Aabb::EMPTY;
+    for (key, _) in store.bricks_by_age() {
+        let first = key.first_cell();
+        extent.include(store.lattice().corner(first));
+        extent.include(store.lattice().corner(first.map(|c| c + BLOCK_EDGE as i32)));
+    }
+    extent
+}
 
 /// Box of everything that the scans saw, free ends of beams and the sensor included.
 pub(crate) fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
@@ -26,16 +66,18 @@ pub(crate) fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
     bounds
 }
 
-/// The grid for what was seen or, where the user said so, for his bounds; joined with the grid of a map that is
-/// to grow.
+/// The grid for what was seen or, where they were given, for the bounds; joined with the grid of a map that is to grow.
 pub(crate) fn grid_over(
     seen: Aabb<2>,
     settings: &Settings,
     before: Option<Grid<2>>,
     log: &str,
 ) -> anyhow::Result<Grid<2>> {
-    let r = settings.resolution;
-    let bounds = settings.bounds.unwrap_or_else(|| seen.grown(settings.truncation + MARGIN_CELLS * r));
+    let r = settings.resolution();
+    let bounds = match settings.bounds {
+        Some(bounds) => bounds.in_2d("the log")?,
+        None => seen.grown(settings.truncation() + MARGIN_CELLS * r),
+    };
     let held = bounds.min.iter().chain(&bounds.max).all(|v| (v / r).abs() < LARGEST_INDEX);
     let grid = if held { Grid::covering(bounds, r) } else { None };
     let Some(grid) = grid else {
@@ -83,7 +125,7 @@ pub(crate) fn check_memory(
     if needed <= limit as f64 {
         return Ok(());
     }
-    let r = settings.resolution;
+    let r = settings.resolution();
     let [w, h] = grid.aabb().extent();
     let coarser = two_digits_up(r * (needed / limit as f64).sqrt());
     bail!(

@@ -1,102 +1,136 @@
-//! Scans into maps, different maps on different threads.
+//! Scans into maps: one loop for both dimensions.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::sync::Mutex;
+use std::borrow::Borrow;
+use std::collections::BTreeMap;
+use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
 use portolan::geom::Pose;
-use portolan::map::{OccupancyGrid, Quadtree, Tsdf};
-use portolan::scan::{Scan, ScanStats};
+use portolan::map::MapError;
+use portolan::scan::{FrameFilter, Scan, ScanStats};
+use portolan_io::IoError;
+use portolan_io::space_log::SpaceLog;
 
+use super::maps::Filtered;
+use super::{Maps, Maps2, Maps3};
 use crate::progress::Progress;
 
-/// The maps that scans are fused into.
-#[derive(Default)]
-pub(crate) struct Maps {
-    pub(crate) grid: Option<OccupancyGrid<2>>,
-    pub(crate) tree: Option<Quadtree>,
-    pub(crate) tsdf: Option<Tsdf2>,
-}
-
-impl Maps {
-    /// Number of maps.
-    pub(crate) fn count(&self) -> usize {
-        usize::from(self.grid.is_some()) + usize::from(self.tree.is_some()) + usize::from(self.tsdf.is_some())
-    }
-
-    /// Bytes of each map, measured.
-    pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
-        let grid = self.grid.iter().map(|m| ("grid", m.memory_bytes()));
-        let tree = self.tree.iter().map(|m| ("tree", m.memory_bytes()));
-        let tsdf = self.tsdf.iter().map(|m| ("tsdf", m.memory_bytes()));
-        grid.chain(tree).chain(tsdf).collect()
-    }
-}
+/// Frames that are read ahead.
+const AHEAD: usize = 3;
 
 /// What fusing did.
 #[derive(Debug, Default)]
 pub(crate) struct FusionReport {
-    /// Of the map that comes first among tsdf, grid, tree: scans and beams are the same for all.
+    /// Of the map that comes last: scans and beams are the same for all.
     pub(crate) stats: ScanStats,
-    /// Seconds of one core per map.
+    /// Seconds per map, and of waiting for scans ("frames").
     pub(crate) seconds: BTreeMap<&'static str, f64>,
     /// Cell observations per map.
     pub(crate) observations: BTreeMap<&'static str, u64>,
+    /// Points that the last map could not use, since they have no row and column of their own in their scan.
+    pub(crate) without_pixel: u64,
+    /// Scans that could not be read or fused, and why the first could not.
+    pub(crate) unreadable: (u64, Option<String>),
+    /// Why fusing ended early: the maps hold what was fused up to there.
+    pub(crate) full: Option<String>,
 }
 
-type Job<'a> = (&'static str, Box<dyn FnMut(&Pose<2>, &Scan<2>) -> ScanStats + Send + 'a>);
+impl FusionReport {
+    /// A map has taken a scan.
+    pub(super) fn add(&mut self, map: &'static str, seconds: f64, stats: &ScanStats) {
+        *self.seconds.entry(map).or_default() += seconds;
+        *self.observations.entry(map).or_default() += stats.cells;
+    }
 
-/// Fuses all scans into all maps in the order of the log. Every map is fused by one thread, so that the result
-/// is the same for any number of them.
-pub(crate) fn fuse(
-    maps: &mut Maps,
+    fn leave_out(&mut self, why: String) {
+        self.unreadable.0 += 1;
+        self.unreadable.1.get_or_insert(why);
+    }
+}
+
+/// A scan of a log: its number, its pose, and its readings, where they could be read.
+type Read<const D: usize, S> = (usize, Pose<D>, Result<S, IoError>);
+
+/// Fuses 2-D scans, in order. The result does not depend on the number of threads.
+pub(crate) fn fuse_2d(
+    maps: &mut Maps2,
     scans: &[(Pose<2>, Scan<2>)],
-    carve: bool,
+    poses: &mut Vec<Pose<2>>,
+    progress: &Progress,
+) -> FusionReport {
+    let scans = scans.iter().enumerate().map(|(i, (pose, scan))| (i, *pose, Ok(scan)));
+    // On a worker thread: from there the maps of a scan are shared out to the others without a detour.
+    rayon::scope(|_| fuse(maps, scans, "", poses, progress))
+}
+
+/// Frames of a 3-D log.
+pub(crate) struct Frames<'a> {
+    pub(crate) log: &'a SpaceLog,
+    pub(crate) indices: &'a [usize],
+    pub(crate) filter: FrameFilter,
+}
+
+impl Frames<'_> {
+    fn read(&self, &i: &usize) -> Read<3, Filtered> {
+        let filtered = self.log.frame(i).map(|frame| {
+            let (frame, counts) = self.filter.apply(frame);
+            Filtered { frame, counts }
+        });
+        (i, *self.log.pose(i), filtered)
+    }
+}
+
+/// Fuses these frames of a log, in order, the next being read while one is fused. The result does not depend on the
+/// number of threads.
+pub(crate) fn fuse_3d(
+    maps: &mut Maps3,
+    frames: &Frames,
+    poses: &mut Vec<Pose<3>>,
     threads: usize,
     progress: &Progress,
 ) -> FusionReport {
-    let mut jobs: VecDeque<Job> = VecDeque::new();
-    // The longest first.
-    if let Some(tree) = &mut maps.tree {
-        jobs.push_back(("tree", Box::new(|pose, scan| tree.integrate(pose, scan))));
+    let name = frames.log.path().display().to_string();
+    let mut read = frames.indices.iter().map(|i| frames.read(i));
+    if threads == 1 {
+        return fuse(maps, read, &name, poses, progress);
     }
-    if let Some(grid) = &mut maps.grid {
-        jobs.push_back(("grid", Box::new(|pose, scan| grid.integrate(pose, scan))));
-    }
-    if let Some(tsdf) = &mut maps.tsdf {
-        jobs.push_back(("tsdf", Box::new(move |pose, scan| tsdf.integrate(pose, scan, carve))));
-    }
-    let workers = threads.clamp(1, jobs.len().max(1));
-    let jobs = Mutex::new(jobs);
-    let done = Mutex::new(Vec::new());
-    let work = || {
-        // A panic in another thread ends the run anyway.
-        while let Some((name, mut integrate)) = jobs.lock().ok().and_then(|mut j| j.pop_front()) {
-            let start = Instant::now();
-            let mut stats = ScanStats::default();
-            for (pose, scan) in scans {
-                stats += integrate(pose, scan);
-                progress.add(1);
-            }
-            if let Ok(mut done) = done.lock() {
-                done.push((name, stats, start.elapsed().as_secs_f64()));
-            }
-        }
-    };
     std::thread::scope(|scope| {
-        for _ in 1..workers {
-            scope.spawn(work);
-        }
-        work();
-    });
+        let (send, receive) = sync_channel::<Read<3, Filtered>>(AHEAD);
+        // Sending fails where fusing has ended early.
+        scope.spawn(move || read.try_for_each(|frame| send.send(frame)));
+        fuse(maps, receive.into_iter(), &name, poses, progress)
+    })
+}
+
+/// The loop. Poses of scans that were fused are added to `poses`.
+fn fuse<const D: usize, M: Maps<D>, S: Borrow<M::Scan>>(
+    maps: &mut M,
+    scans: impl Iterator<Item = Read<D, S>>,
+    log: &str,
+    poses: &mut Vec<Pose<D>>,
+    progress: &Progress,
+) -> FusionReport {
     let mut report = FusionReport::default();
-    let done = done.into_inner().unwrap_or_default();
-    for name in ["tree", "grid", "tsdf"] {
-        for (_, stats, seconds) in done.iter().filter(|d| d.0 == name) {
-            report.stats = *stats;
-            report.seconds.insert(name, *seconds);
-            report.observations.insert(name, stats.cells);
+    let mut waiting = Instant::now();
+    for (i, pose, scan) in scans {
+        *report.seconds.entry("frames").or_default() += waiting.elapsed().as_secs_f64();
+        match scan.map(|scan| maps.integrate(&pose, scan.borrow(), &mut report)) {
+            Ok(Ok(stats)) => {
+                if stats.scans > 0 {
+                    poses.push(pose);
+                }
+                report.stats += stats;
+            }
+            Ok(Err(full @ MapError::Full(_))) => {
+                report.full = Some(full.to_string());
+                break;
+            }
+            Ok(Err(error)) => report.leave_out(format!("{log}: scan {i}: {error}")),
+            Err(error) => report.leave_out(error.to_string()),
         }
+        progress.add(1);
+        progress.holding(|| maps.bytes().values().sum());
+        waiting = Instant::now();
     }
     report
 }

@@ -6,10 +6,10 @@ use portolan::geom::Grid;
 use portolan::map::{OccupancyGrid, Quadtree, Tsdf};
 use portolan::store::{Tree, TreeRecords};
 
-use super::Maps;
+use super::Maps2;
 
 /// The same cells in `grid`, which holds the maps' own.
-pub(crate) fn grown(maps: Maps, grid: &Grid<2>) -> anyhow::Result<Maps> {
+pub(crate) fn grown(maps: Maps2, grid: &Grid<2>) -> anyhow::Result<Maps2> {
     let lost = || anyhow!("the saved map does not fit the lattice of the new grid; write to another folder");
     let grow_grid = |map: OccupancyGrid<2>| {
         let store = map.store().regridded(*grid).ok_or_else(lost)?;
@@ -19,10 +19,11 @@ pub(crate) fn grown(maps: Maps, grid: &Grid<2>) -> anyhow::Result<Maps> {
         let store = map.store().regridded(*grid).ok_or_else(lost)?;
         anyhow::Ok(Tsdf::from_store(store, *map.config())?)
     };
-    Ok(Maps {
+    Ok(Maps2 {
         grid: maps.grid.map(grow_grid).transpose()?,
         tree: maps.tree.map(|tree| grown_tree(tree, grid)).transpose()?,
         tsdf: maps.tsdf.map(grow_tsdf).transpose()?,
+        ..maps
     })
 }
 

@@ -1,147 +1,299 @@
-//! What the maps of a run are made with.
+//! The settings of `map`: options of the command line, fields of saved maps and of `summary.json`, all from one list.
 
-use portolan::cell::{OccupancyModel, TsdfRule};
-use portolan::geom::{Aabb, Grid};
-use portolan::map::{BeamSweep, OccupancyGrid, Quadtree, Tsdf, TsdfConfig};
-use portolan::scan::RangeLimits;
+use anyhow::bail;
+use clap::ValueEnum;
+use portolan::cell::TsdfRule;
+use portolan::scan::Body;
 use portolan::sweep::WeightModel;
-use portolan_io::{MapFile, sweep_word, weights_word};
+use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
-use super::Maps;
+use super::choices::{MapKind, SweepArg, WeightsArg, word};
+use super::recipe::{self, CARVE_WEIGHT};
+use crate::arguments::{Bounds, ForgettingArgs, bodies, body, bounds, length, share};
+use crate::dimension::{Dimension, ONLY_3D, option};
 use crate::esdf::EsdfArg;
 use crate::json::object;
-use crate::saved::check_agree;
+use crate::log::{LimitArgs, NoReturnArgs, RangeArgs, Selection};
 
-/// Maps that can be made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub(crate) enum MapKind {
-    /// Occupancy grid
-    Grid,
-    /// Occupancy quadtree, in space octree
-    #[value(alias = "octree")]
-    Tree,
-    /// Truncated signed distance field
-    Tsdf,
-    /// Euclidean signed distance field, derived from the tsdf
-    Esdf,
-    /// Contour, derived from the tsdf of a planar log
-    Contour,
-    /// Mesh, derived from the tsdf of a log of space
-    Mesh,
+/// What shapes the cells: a map can only be gone on with under the same values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
+#[serde(default)]
+pub(crate) struct Shape {
+    /// Edge of a cell (metres) [default with --append: that of the map]
+    #[arg(long, value_name = "R", value_parser = length, allow_negative_numbers = true)]
+    #[arg(required = false, required_unless_present = "append")]
+    pub(crate) resolution: f64,
+    /// Truncation distance: signed distances are stored up to here on either side of a surface (metres) [default: three
+    /// cells]
+    #[arg(long, value_name = "T", value_parser = length, allow_negative_numbers = true)]
+    pub(crate) truncation: Option<f64>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub(crate) forgetting: ForgettingArgs,
+    /// Weight of each beam [default: constant]
+    #[arg(long, value_enum, required = false)]
+    pub(crate) weights: WeightsArg,
+    /// How scans become evidence [default: cell-centre in 2-D, auto in 3-D]
+    #[arg(long, value_enum)]
+    pub(crate) sweep: Option<SweepArg>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub(crate) range: RangeArgs,
+    /// Do not fuse the free space in front of surfaces into the signed distances: faster, but free space stays unknown
+    #[arg(long = "no-carve", num_args = 0, default_missing_value = "false", required = false)]
+    #[arg(action = clap::ArgAction::Set)]
+    pub(crate) carve: bool,
+    /// Weight of free space relative to that of a surface, above 0 and at most 1. A lower weight keeps thin objects, but
+    /// objects that have moved away fade more slowly [default: 0.3; the textbook uses 1]
+    #[arg(long, value_name = "W", value_parser = share, allow_negative_numbers = true, conflicts_with = "carve")]
+    #[arg(required = false)]
+    #[serde(serialize_with = "four_digits")]
+    pub(crate) carve_weight: f32,
+    /// Do not fuse colour
+    #[arg(long = "no-color", num_args = 0, default_missing_value = "false", required = false)]
+    #[arg(action = clap::ArgAction::Set, help_heading = ONLY_3D)]
+    pub(crate) color: bool,
+    /// Leave out readings inside this part of the sensor's frame, which belong to the robot itself: a box
+    /// x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius (metres); may be given several times
+    #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true, help_heading = ONLY_3D)]
+    #[serde(with = "bodies")]
+    pub(crate) self_filter: Vec<Body>,
+    /// Leave every N-th scan out of the map, for `eval --scans`
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..), allow_negative_numbers = true)]
+    pub(crate) hold_out: Option<u64>,
 }
 
-/// All that decides what the maps will hold.
-#[derive(Clone, Debug)]
+/// All settings of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
+#[serde(default)]
 pub(crate) struct Settings {
-    pub(crate) resolution: f64,
-    pub(crate) truncation: f64,
-    pub(crate) w_max: f32,
-    pub(crate) weights: WeightModel,
-    pub(crate) sweep: BeamSweep,
-    pub(crate) carve: bool,
-    pub(crate) carve_weight: f32,
-    pub(crate) limits: RangeLimits,
+    #[arg(skip)]
+    #[serde(skip)]
+    pub(crate) dimension: Dimension,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub(crate) shape: Shape,
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub(crate) no_return: NoReturnArgs,
+    /// Use only every N-th scan of the log
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
+    #[serde(serialize_with = "or_one")]
     pub(crate) every: Option<u64>,
-    pub(crate) hold_out: Option<u64>,
-    pub(crate) bounds: Option<Aabb<2>>,
+    /// Map only this box: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (metres)
+    #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
+    #[serde(skip_deserializing)]
+    pub(crate) bounds: Option<Bounds>,
+    /// Maps to make, separated by commas; esdf, contour and mesh are derived from the tsdf, which is then made too
+    /// [default: grid,tree,tsdf,esdf,contour in 2-D; tree,tsdf,esdf,mesh in 3-D]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub(crate) maps: Vec<MapKind>,
+    /// Method of the esdf [default: accurate]
+    #[arg(long, value_enum, required = false)]
     pub(crate) esdf: EsdfArg,
+    /// Largest distance of the esdf (metres) [default: 1]
+    #[arg(long, value_name = "M", value_parser = length, required = false, help_heading = ONLY_3D)]
+    pub(crate) max_distance: f64,
+}
+
+impl Default for Shape {
+    fn default() -> Self {
+        Self {
+            resolution: 0.05,
+            truncation: None,
+            forgetting: ForgettingArgs::default(),
+            weights: WeightsArg::Constant,
+            sweep: None,
+            range: RangeArgs::default(),
+            carve: true,
+            carve_weight: CARVE_WEIGHT,
+            color: true,
+            self_filter: Vec::new(),
+            hold_out: None,
+        }
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            dimension: Dimension::Two,
+            shape: Shape::default(),
+            no_return: NoReturnArgs::default(),
+            every: None,
+            bounds: None,
+            maps: Vec::new(),
+            esdf: EsdfArg::default(),
+            max_distance: recipe::MAX_DISTANCE,
+        }
+    }
 }
 
 impl Settings {
+    /// Those of a saved map. What another writer has put there in another form counts as missing.
+    pub(crate) fn of_saved(saved: &Map<String, Value>) -> Self {
+        let alone =
+            |key: &str, value: &Value| Value::Object(Map::from_iter([(key.to_owned(), value.clone())]));
+        let readable = |(key, value): &(&String, &Value)| Self::deserialize(alone(key, value)).is_ok();
+        let fields = saved.iter().filter(readable).map(|(key, value)| (key.clone(), value.clone()));
+        let saved = Self::deserialize(Value::Object(fields.collect())).unwrap_or_default();
+        if saved.max_distance > 0.0 { saved } else { Self { max_distance: recipe::MAX_DISTANCE, ..saved } }
+    }
+
+    /// With what depends on the dimension and on other settings filled in, where it was left open.
+    pub(crate) fn resolved(mut self, dimension: Dimension) -> Self {
+        use MapKind::{Contour, Esdf, Mesh, Tsdf};
+        self.dimension = dimension;
+        let shape = &mut self.shape;
+        shape.truncation.get_or_insert(recipe::three_cells(shape.resolution));
+        shape.sweep.get_or_insert(SweepArg::usual(dimension));
+        shape.forgetting = ForgettingArgs::of(shape.forgetting.w_max().unwrap_or(recipe::W_MAX));
+        if self.maps.is_empty() {
+            let made = |kind: &&MapKind| kind.only().is_none_or(|only| only == dimension);
+            self.maps = MapKind::value_variants().iter().filter(made).copied().collect();
+        }
+        if self.maps.iter().any(|kind| [Esdf, Contour, Mesh].contains(kind)) {
+            self.maps.push(Tsdf);
+        }
+        self.maps.sort_unstable();
+        self.maps.dedup();
+        self
+    }
+
     /// Whether a map is wanted.
     pub(crate) fn wants(&self, kind: MapKind) -> bool {
         self.maps.contains(&kind)
     }
 
-    /// Empty maps over a grid.
-    pub(crate) fn empty_maps(&self, grid: &Grid<2>) -> anyhow::Result<Maps> {
-        let model = OccupancyModel::default();
-        let config = TsdfConfig {
-            truncation: self.truncation,
-            w_max: self.w_max,
-            sweep: self.sweep,
-            weights: self.weights,
-            carve_weight: self.carve_weight,
-            ..TsdfConfig::default()
-        };
-        let made = |kind| self.wants(kind);
-        Ok(Maps {
-            grid: made(MapKind::Grid).then(|| OccupancyGrid::covering(*grid, model)).transpose()?,
-            tree: made(MapKind::Tree).then(|| Quadtree::covering(grid, model)).transpose()?,
-            tsdf: made(MapKind::Tsdf).then(|| Tsdf::new(config.with_grid(grid))).transpose()?,
-        })
+    /// Refuses sweeps, maps and bounds of the other dimension, and limits between which there is no range.
+    pub(crate) fn check(&self, dimension: Dimension) -> anyhow::Result<()> {
+        if let Some(sweep) = self.shape.sweep.filter(|sweep| sweep.only() != dimension) {
+            return Err(dimension.refused(&format!("--sweep {}", word(&sweep)), "the log"));
+        }
+        if let Some(kind) = self.maps.iter().find(|kind| kind.only().is_some_and(|only| only != dimension)) {
+            return Err(dimension.refused(&format!("--maps {}", kind.word()), "the log"));
+        }
+        match (dimension, self.bounds) {
+            (Dimension::Two, Some(bounds)) => bounds.in_2d("the log").map(|_| ())?,
+            (Dimension::Three, Some(bounds)) => bounds.in_3d("the log").map(|_| ())?,
+            _ => {}
+        }
+        if dimension == Dimension::Three {
+            self.shape.range.filter(Vec::new())?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn resolution(&self) -> f64 {
+        self.shape.resolution
+    }
+
+    pub(crate) fn truncation(&self) -> f64 {
+        self.shape.truncation.unwrap_or(recipe::three_cells(self.shape.resolution))
+    }
+
+    pub(crate) fn w_max(&self) -> f32 {
+        self.shape.forgetting.w_max().unwrap_or(recipe::W_MAX)
+    }
+
+    pub(crate) fn sweep(&self) -> SweepArg {
+        self.shape.sweep.unwrap_or(SweepArg::usual(self.dimension))
+    }
+
+    pub(crate) fn weights(&self) -> WeightModel {
+        self.shape.weights.model()
+    }
+
+    pub(crate) fn limits(&self) -> LimitArgs {
+        LimitArgs { range: self.shape.range, no_return: self.no_return }
+    }
+
+    pub(crate) fn selection(&self) -> Selection {
+        Selection { every: self.every, hold_out: self.shape.hold_out }
     }
 
     /// Observations of weight 1 after which a saturated cell has lost half the error of a stale estimate.
-    pub(crate) fn half_life(&self) -> f64 {
-        TsdfRule { truncation: self.truncation as f32, w_max: self.w_max }.half_life(1.0)
+    fn half_life(&self) -> f64 {
+        TsdfRule { truncation: self.truncation() as f32, w_max: self.w_max() }.half_life(1.0)
     }
 
     /// How the distances forget, for people.
     pub(crate) fn forgetting(&self) -> String {
-        match self.w_max.is_finite() {
+        match self.w_max().is_finite() {
             true => format!(
                 "W_max {}: half of a stale distance is left after {:.2} observations",
-                (100.0 * self.w_max).round() / 100.0,
+                (100.0 * self.w_max()).round() / 100.0,
                 self.half_life()
             ),
             false => "W_max infinite: nothing is forgotten".to_owned(),
         }
     }
 
-    /// The settings as they are written into files.
+    /// The settings as they are written into files: those that the dimension has a use for.
     pub(crate) fn to_json(&self) -> Map<String, Value> {
-        let finite = |v: f64| v.is_finite().then_some(v);
-        object(json!({
-            "resolution": self.resolution,
-            "truncation": self.truncation,
-            "w_max": finite(f64::from(self.w_max)),
-            "half_life": finite(self.half_life()),
-            "weights": weights_word(self.weights),
-            "sweep": sweep_word(self.sweep),
-            "carve": self.carve,
-            "carve_weight": f64::from((self.carve_weight * 1e4).round()) / 1e4,
-            "min_range": self.limits.min,
-            "max_range": finite(self.limits.max),
-            "no_return": finite(self.limits.no_return),
-            "no_return_free": self.limits.no_return_free,
-            "every": self.every.unwrap_or(1),
-            "hold_out": self.hold_out,
-            "bounds": self.bounds.map(|b| [b.min[0], b.min[1], b.max[0], b.max[1]]),
-            "maps": self.maps.iter().map(|&m| map_word(m)).collect::<Vec<_>>(),
-            "esdf": self.esdf.word(),
-        }))
+        let mut fields = object(json!(self));
+        fields.insert("half_life".to_owned(), json!(Some(self.half_life()).filter(|n| n.is_finite())));
+        for foreign in self.dimension.foreign::<Self>() {
+            fields.remove(&foreign);
+        }
+        fields
     }
 
-    /// Refuses to go on with a map that was made with other settings.
-    pub(crate) fn check_agree(&self, file: &MapFile<2>, name: &str) -> anyhow::Result<()> {
-        let (ours, theirs) = (self.to_json(), &file.header.settings);
-        const SHAPING: [&str; 10] = [
-            "resolution",
-            "truncation",
-            "w_max",
-            "weights",
-            "sweep",
-            "carve",
-            "carve_weight",
-            "min_range",
-            "max_range",
-            "hold_out",
-        ];
-        check_agree(&ours, theirs, &SHAPING, name)
+    /// Refuses to go on with a map that was made with other settings, as far as these shape it.
+    pub(crate) fn check_agree(&self, saved: &Map<String, Value>, map: &str) -> anyhow::Result<()> {
+        let ours = self.to_json();
+        let mut shaping: Vec<String> = object(json!(self.shape)).into_iter().map(|(key, _)| key).collect();
+        // Which scans are held out depends on which are looked at.
+        shaping.extend(self.shape.hold_out.map(|_| "every".to_owned()));
+        for key in shaping {
+            let (Some(new), old) = (ours.get(&key), saved.get(&key).unwrap_or(&Value::Null)) else {
+                continue;
+            };
+            if new != old {
+                let other = if key == "w_max" { " or --half-life" } else { "" };
+                bail!(
+                    "{map}: {key} is {old} in the map and {new} in this call; leave out {}{other} to use the map's value, \
+                     or write to another folder",
+                    option::<Self>(&key)
+                );
+            }
+        }
+        Ok(())
     }
 }
 
-/// The word for a map on the command line.
-pub(crate) fn map_word(kind: MapKind) -> &'static str {
-    match kind {
-        MapKind::Grid => "grid",
-        MapKind::Tree => "tree",
-        MapKind::Tsdf => "tsdf",
-        MapKind::Esdf => "esdf",
-        MapKind::Contour => "contour",
-        MapKind::Mesh => "mesh",
+fn four_digits<S: Serializer>(weight: &f32, out: S) -> Result<S::Ok, S::Error> {
+    (f64::from((weight * 1e4).round()) / 1e4).serialize(out)
+}
+
+fn or_one<S: Serializer>(n: &Option<u64>, out: S) -> Result<S::Ok, S::Error> {
+    n.unwrap_or(1).serialize(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn saved_settings_come_back() {
+        for dimension in [Dimension::Two, Dimension::Three] {
+            let mut settings = Settings::default();
+            settings.shape.self_filter = vec![Body::Sphere { center: [0.0, 0.1, -0.2], radius: 0.5 }];
+            settings.shape.forgetting = ForgettingArgs::of(f32::INFINITY);
+            settings.shape.range.max_range = Some(20.0);
+            let settings = settings.resolved(dimension);
+            let saved = settings.to_json();
+            let again = Settings::of_saved(&saved).resolved(dimension);
+            assert_eq!(again.to_json(), saved);
+            assert_eq!(again.w_max(), f32::INFINITY);
+            again.check_agree(&saved, "map").unwrap();
+            assert_eq!(saved.contains_key("no_return"), dimension == Dimension::Two);
+            assert_eq!(saved.contains_key("self_filter"), dimension == Dimension::Three);
+            let mut other = again;
+            other.shape.carve = false;
+            let error = other.check_agree(&saved, "map").unwrap_err().to_string();
+            assert!(error.contains("carve is true in the map") && error.contains("--no-carve"), "{error}");
+        }
     }
 }

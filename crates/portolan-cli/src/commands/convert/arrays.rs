@@ -1,4 +1,4 @@
-//! Fields as numpy arrays in the layout of who takes them.
+//! Fields as numpy arrays, in the layouts of planners.
 
 use std::path::Path;
 
@@ -11,19 +11,19 @@ use super::field::Field;
 use crate::arguments::length;
 use crate::error::bad_call;
 
-/// Who takes the arrays.
+/// Layout of the arrays: whose they are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Layout {
     /// distance, status, origin, resolution, shape: indexed [x, y, z]
     #[default]
     Plain,
-    /// data: a row for every y, a column for every x, a matrix for every z; origin is the centre of cell 0
+    /// GPMP2: data with a row for every y, a column for every x, a matrix for every z; origin is the centre of cell 0
     Gpmp2,
-    /// values for `interpolant`, the first axis fastest, and the knots x, y, z (acados too)
+    /// CasADi and acados: values for `interpolant`, the first axis fastest, and the knots x, y, z
     Casadi,
-    /// feature_tensor, dims, pose, voxel_size of cuRobo from 0.8 on: x slowest, half precision
+    /// cuRobo from 0.8 on: feature_tensor, dims, pose, voxel_size; x slowest, half precision
     Curobo,
-    /// The same up to 0.7, which is positive inside of obstacles
+    /// cuRobo up to 0.7: the same, positive inside obstacles
     Curobo07,
 }
 
@@ -37,7 +37,7 @@ pub(crate) enum Order {
     F,
 }
 
-/// What unknown space is.
+/// What unknown space counts as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum UnknownArg {
     /// Free
@@ -47,7 +47,7 @@ pub(crate) enum UnknownArg {
 }
 
 impl UnknownArg {
-    /// The library's word.
+    /// As the library has it.
     pub(crate) fn space(self) -> UnknownSpace {
         match self {
             Self::Optimistic => UnknownSpace::Optimistic,
@@ -68,17 +68,17 @@ pub(crate) enum Precision {
 #[derive(Clone, Copy, Debug, clap::Args)]
 #[command(next_help_heading = "Arrays (.npz, .npy)")]
 pub(crate) struct ArrayArgs {
-    /// Who takes the arrays
+    /// Layout of the arrays
     #[arg(long, value_enum, default_value_t)]
     layout: Layout,
     /// Order in memory, for --layout plain [default: c]
     #[arg(long, value_enum)]
     order: Option<Order>,
-    /// What unknown cells become: free or an obstacle, without a step at the border. Plain arrays keep NaN without it;
-    /// all others have no word for unknown
+    /// What unknown cells count as, without a step of the distance at their border. Without this option plain arrays hold
+    /// NaN there; the other layouts cannot hold unknown cells
     #[arg(long, value_enum)]
     pub(super) unknown: Option<UnknownArg>,
-    /// No distance beyond this (metres) [default: the largest there is]
+    /// Largest distance to write (metres); larger ones are cut to it [default: the largest of the field]
     #[arg(long, value_name = "M", value_parser = length)]
     far: Option<f64>,
     /// Precision of the distances [default: f32; gpmp2 and casadi f64, curobo f16]
@@ -102,7 +102,7 @@ impl ArrayArgs {
                 _ => self.arrays(field)?,
             },
         };
-        let Some((_, main)) = arrays.first() else { bail!("there is no array") };
+        let Some((_, main)) = arrays.first() else { bail!("the field has no array") };
         if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
             write_npy(out, main)?;
         } else {
@@ -115,7 +115,7 @@ impl ArrayArgs {
     /// The arrays with their names, the main one first.
     fn arrays<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
         if self.order.is_some() && self.layout != Layout::Plain {
-            return Err(bad_call("--order is for --layout plain; the others have theirs"));
+            return Err(bad_call("--order is only for --layout plain; the other layouts fix the order"));
         }
         let mut arrays = match self.layout {
             Layout::Plain => return self.plain(field),
@@ -138,10 +138,10 @@ impl ArrayArgs {
                 arrays
             }
             Layout::Curobo | Layout::Curobo07 => {
-                bail!("cuRobo's grids are in space; the map is in the plane")
+                bail!("cuRobo's grids are 3-D; the map is 2-D")
             }
         };
-        arrays.extend(self.words());
+        arrays.extend(self.labels());
         Ok(arrays)
     }
 
@@ -173,7 +173,7 @@ impl ArrayArgs {
             ("shape", NpyArray::c([D], NpyValues::I64(shape.iter().map(|n| *n as i64).collect()))),
             ("order", NpyArray::text(if self.order == Some(Order::F) { "F" } else { "C" })),
         ];
-        arrays.extend(self.words());
+        arrays.extend(self.labels());
         Ok(arrays)
     }
 
@@ -188,12 +188,12 @@ impl ArrayArgs {
             ("pose", NpyArray::vector(&grid.pose)),
             ("voxel_size", NpyArray::number(grid.voxel_size)),
         ];
-        arrays.extend(self.words());
+        arrays.extend(self.labels());
         arrays
     }
 
-    /// What the arrays are, for who opens them later.
-    fn words(&self) -> [(&'static str, NpyArray); 2] {
+    /// Names of the layout and of what unknown cells became, for whoever opens the file.
+    fn labels(&self) -> [(&'static str, NpyArray); 2] {
         let layout = match self.layout {
             Layout::Plain => "plain",
             Layout::Gpmp2 => "gpmp2",
@@ -209,15 +209,15 @@ impl ArrayArgs {
         [("layout", NpyArray::text(layout)), ("unknown", NpyArray::text(unknown))]
     }
 
-    /// The field without unknown. What unknown is has to be said where there is any.
-    fn filled<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Filled<D>> {
-        let unknown = field.samples().iter().filter(|d| d.is_nan()).count();
+    /// The field without unknown cells: what they count as must be given where the field has some.
+    fn filled<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Filled<D>> {
+        let unknown = field.distances.iter().filter(|d| d.is_nan()).count();
         let space = match self.unknown {
             Some(unknown) => unknown.space(),
             None if unknown == 0 => UnknownSpace::Pessimistic,
             None => {
                 return Err(bad_call(format!(
-                    "{unknown} cells are unknown, which this layout has no word for; say --unknown optimistic (free) or \
+                    "{unknown} cells are unknown, which this layout cannot hold; give --unknown optimistic (free) or \
                      --unknown pessimistic (an obstacle)"
                 )));
             }

@@ -14,7 +14,7 @@ use portolan_io::{MapMode, write_costmap};
 use super::field::Field;
 use crate::arguments::{heights, length_or_zero};
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, dense_plane_esdf};
+use crate::esdf::{EsdfArg, dense_esdf_2d};
 
 /// How costs become pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -23,7 +23,7 @@ pub(crate) enum Mode {
     Raw,
     /// Occupied (lethal and inscribed), free, unknown
     Trinary,
-    /// Shades of grey; no unknown
+    /// Shades of grey, without unknown
     Scale,
 }
 
@@ -31,19 +31,19 @@ pub(crate) enum Mode {
 #[derive(Clone, Copy, Debug, clap::Args)]
 #[command(next_help_heading = "Costmaps of Nav2 (.yaml with its .pgm)")]
 pub(crate) struct CostArgs {
-    /// Inflation radius (metres): costs decay with the distance up to here; makes a costmap
+    /// Inflation radius (metres), up to which costs decay with the distance; writes a costmap
     #[arg(long, value_name = "M", value_parser = length_or_zero)]
     inflate: Option<f64>,
-    /// Inscribed radius of the robot (metres): cost 253 up to here [default: 0]
+    /// Inscribed radius of the robot (metres), up to which the cost is 253 [default: 0]
     #[arg(long, value_name = "M", value_parser = length_or_zero, requires = "inflate")]
     inscribed: Option<f64>,
     /// cost_scaling_factor: how fast costs decay (1/m) [default: 3]
     #[arg(long, value_name = "K", value_parser = length_or_zero, requires = "inflate")]
     scaling: Option<f64>,
-    /// mode of map_server [default: raw with --inflate, else trinary]
+    /// Mode of map_server [default: raw with --inflate, else trinary]
     #[arg(long, value_enum)]
     mode: Option<Mode>,
-    /// Maps of space: obstacles between these heights LOW:HIGH (metres) count, and distances are made in the plane
+    /// 3-D maps: use the obstacles between these heights, LOW:HIGH (metres), and measure distances in 2-D
     #[arg(long, value_name = "LOW:HIGH", value_parser = heights, allow_hyphen_values = true)]
     z: Option<[f64; 2]>,
 }
@@ -54,7 +54,7 @@ impl CostArgs {
         self.inflate.is_some() || self.mode.is_some() || self.z.is_some()
     }
 
-    /// Writes the costs of a field of the plane, or of a layer of one of space.
+    /// Writes the costs of a 2-D field, or of a layer of a 3-D field.
     pub(super) fn write(
         &self,
         field: &Field,
@@ -68,20 +68,20 @@ impl CostArgs {
         };
         let how = how.validate().map_err(|e| bad_call(e.to_string()))?;
         let (grid, costs) = match (field, self.z) {
-            (Field::Two(_), Some(_)) => return Err(bad_call("--z is for maps of space")),
+            (Field::Two(_), Some(_)) => return Err(bad_call("--z is only for 3-D; the map is 2-D")),
             (Field::Three(_), None) => {
-                return Err(bad_call("a costmap is in the plane: say with --z LOW:HIGH which heights count"));
+                return Err(bad_call("a costmap is 2-D: give the heights that count with --z LOW:HIGH"));
             }
             (Field::Two(field), None) => (*field.grid(), how.costs(field.samples())),
             (Field::Three(field), Some(heights)) => {
                 let Some(unknown) = unknown else {
                     return Err(bad_call(
-                        "what is a column of which a part is unknown? say --unknown optimistic (what is known of it) or \
-                         --unknown pessimistic (unknown)",
+                        "some columns are partly unknown: give --unknown optimistic (only their known part counts) or \
+                         --unknown pessimistic (such a column is unknown)",
                     ));
                 };
-                let layer = in_the_plane(field, heights, unknown)?;
-                (*layer.grid(), how.costs(layer.samples()))
+                let layer = layer_in_2d(field, heights, unknown)?;
+                (layer.grid, how.costs(&layer.distances))
             }
         };
         let mode = match self.mode {
@@ -95,9 +95,9 @@ impl CostArgs {
     }
 }
 
-/// Distances in the plane to what stands between two heights.
-fn in_the_plane(
-    field: &EsdfGrid<3>,
+/// Distances in 2-D to the obstacles between two heights.
+fn layer_in_2d(
+    field: &DenseEsdf<3>,
     heights: [f64; 2],
     unknown: UnknownSpace,
 ) -> anyhow::Result<EsdfGrid<2>> {
@@ -109,5 +109,5 @@ fn in_the_plane(
         bail!("the distance field has values that are not finite")
     };
     let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
-    Ok(dense_plane_esdf(&tsdf, EsdfArg::Accurate))
+    Ok(dense_esdf_2d(&tsdf, EsdfArg::Accurate))
 }

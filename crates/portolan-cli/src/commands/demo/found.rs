@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::geom::Grid;
-use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
-use portolan_chapter::gallery::Gallery;
-use portolan_io::MapFile;
+use portolan_io::AnyMapFile;
 use portolan_sim::{LapConfig, World};
 use serde_json::{Value, json};
 
 use super::Run;
-use crate::json;
+use crate::experiment::{Drift, Forgetting, PoseSet};
 use crate::mapping::{Derived, FusionReport, Settings};
+use crate::{json, saved};
 
 /// Everything that a run found out.
 pub(super) struct Found<'a> {
@@ -23,7 +22,7 @@ pub(super) struct Found<'a> {
     pub(super) fusion: FusionReport,
     /// Bytes of each map, measured.
     pub(super) bytes: BTreeMap<&'static str, usize>,
-    pub(super) file: MapFile<2>,
+    pub(super) file: AnyMapFile,
     pub(super) derived: Derived,
     pub(super) gallery: &'a Gallery,
     pub(super) drift: &'a Drift,
@@ -39,10 +38,10 @@ impl Found<'_> {
         bytes.extend(self.derived.bytes());
         let contour = self.derived.contour.as_ref().map(|c| {
             json!({
-                "segments": c.segments.len(),
-                "length": c.length(),
-                "doubled_share": self.derived.doubled.share(),
-                "thin_length": self.derived.thin.thin,
+                "segments": c.contour.segments.len(),
+                "length": c.contour.length(),
+                "doubled_share": c.doubled.share(),
+                "thin_length": c.thin.thin,
             })
         });
         let mut seconds = run.seconds.clone();
@@ -65,7 +64,7 @@ impl Found<'_> {
             "settings": self.settings.to_json(),
             "scans": {
                 "in_log": self.config.scans, "held_out": 0, "fused": self.fusion.stats.scans,
-                "refused_poses": self.fusion.stats.refused_poses, "in_map": self.file.header.scans,
+                "refused_poses": self.fusion.stats.refused_poses, "in_map": saved::header(&self.file).scans,
             },
             "beams": stats["beams"],
             "refused_beams": stats["refused_beams"],
@@ -76,7 +75,7 @@ impl Found<'_> {
             "ghost": self.forgetting.map(Forgetting::to_json),
             "bytes": bytes,
             "seconds": seconds,
-            "logs": self.file.header.logs,
+            "logs": saved::header(&self.file).logs,
             "warnings": self.warnings(),
             "files": run.files,
         })
@@ -89,8 +88,7 @@ impl Found<'_> {
         if outside > 0 && self.drift.chosen == PoseSet::Odometry {
             warnings.push(format!("{outside} hits lie outside of the map: the odometry led them there"));
         }
-        let thin = &self.derived.thin;
-        if thin.thin > 0.0 {
+        if let Some(thin) = self.derived.contour.as_ref().map(|c| &c.thin).filter(|t| t.thin > 0.0) {
             warnings.push(format!(
                 "{:.1} m of contour ({:.1} %) belong to things thinner than twice the truncation, seen from both \
                  sides: their faces may be displaced by up to a few centimetres; a smaller truncation helps",

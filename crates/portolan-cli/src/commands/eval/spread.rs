@@ -1,8 +1,8 @@
-//! Median and friends.
+//! Mean, median and largest.
 
 use serde_json::Value;
 
-/// How numbers are spread; `null` in JSON where there are none.
+/// How numbers are spread; `null` in JSON of an empty list.
 pub(super) struct Spread {
     pub(super) mean: Value,
     pub(super) median: Value,

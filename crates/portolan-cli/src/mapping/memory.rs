@@ -1,11 +1,11 @@
-//! What the process has needed, and what the machine has.
+//! Memory of the process and of the machine.
 
-/// The most memory that this process has held at once (bytes), where the system tells.
+/// The most memory that this process has held at once (bytes), where the system reports it.
 pub(crate) fn peak_memory() -> Option<u64> {
     field("/proc/self/status", "VmHWM:")
 }
 
-/// Memory that can be had without pushing anything out (bytes), where the system tells.
+/// Memory that can be had without pushing anything out (bytes), where the system reports it.
 pub(crate) fn available_memory() -> Option<u64> {
     field("/proc/meminfo", "MemAvailable:")
 }

@@ -6,7 +6,7 @@ use portolan::geom::{Aabb, Grid};
 use portolan_draw::{Anchor, Canvas, Color, Entry, Font, Pen, PixelRect, Swatch, View, color};
 use portolan_io::{MapCell, MapFile};
 
-use crate::mapping::{Derived, cells_for_map_server};
+use super::{Derived, cells_for_map_server};
 
 /// The longer edge of the map on the picture is at most this long (pixels).
 const LARGEST: f64 = 2400.0;
@@ -34,7 +34,7 @@ pub(crate) fn of_map(file: &MapFile<2>, derived: &Derived, title: &str) -> Optio
     let [columns, _] = grid.shape;
     canvas.raster(&view, grid.shape, grid.lattice.origin, r, |[x, y]| colors[y * columns + x]);
     if let Some(contour) = &derived.contour {
-        let segments: Vec<_> = contour.ends().collect();
+        let segments: Vec<_> = contour.contour.ends().collect();
         let pen = Pen::new(color::SURFACE, (0.5 * scale * r).clamp(1.2, 2.5));
         canvas.segments(&view, &segments, pen);
         legend.push(Entry::new(Swatch::Line(Pen::new(color::SURFACE, 2.5)), "contour"));
@@ -134,7 +134,7 @@ fn draw_path(canvas: &mut Canvas, view: &View, file: &MapFile<2>, legend: &mut V
     let at: Vec<_> = file.poses.iter().map(|p| p.translation).collect();
     let mut steps: Vec<f64> = at.windows(2).map(|w| distance(w[0], w[1])).collect();
     steps.sort_unstable_by(f64::total_cmp);
-    // A jump is no way: another log begins, or the poses were corrected.
+    // A jump is not a path: another log begins, or the poses were corrected.
     let jump = 10.0 * steps[steps.len() / 2] + 1.0;
     let mut line = Vec::with_capacity(at.len());
     for (i, &p) in at.iter().enumerate() {

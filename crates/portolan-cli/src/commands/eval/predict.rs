@@ -1,0 +1,210 @@
+//! The ranges of scans, predicted by casting rays through the map.
+
+use std::path::Path;
+
+use anyhow::bail;
+use portolan::map::Tsdf;
+use portolan::store::Store;
+use portolan::surface::{
+    PredictionScore, RangeNoise, RangePredictions, RayCast, RayCastSettings, RayCaster, cast_ray,
+};
+use portolan_io::{MapHeader, TsdfBricks};
+use serde_json::{Value, json};
+
+use super::spread::Spread;
+use super::{Args, Part};
+use crate::error::bad_call;
+use crate::log::{self, LimitArgs, RangeArgs, Selection};
+use crate::mapping::{Settings, free_weight};
+use crate::progress::Progress;
+
+/// Rays are followed up to this range (metres), unless the map was made with less.
+const FARTHEST: f64 = 100.0;
+/// Close before its sensor a scan sees what no other has: unknown space up to here is passed over (metres).
+const BLIND: f64 = 0.5;
+
+/// Which scans of the log are predicted, and how they are read.
+struct Task<'a> {
+    args: &'a Args,
+    log: &'a Path,
+    header: &'a MapHeader,
+    settings: Settings,
+}
+
+impl<'a> Task<'a> {
+    fn new(args: &'a Args, log: &'a Path, header: &'a MapHeader) -> Self {
+        Self { args, log, header, settings: Settings::of_saved(&header.settings) }
+    }
+
+    fn range(&self) -> RangeArgs {
+        let (given, saved) = (self.args.limits.range, self.settings.shape.range);
+        RangeArgs {
+            min_range: given.min_range.or(saved.min_range),
+            max_range: given.max_range.or(saved.max_range),
+        }
+    }
+
+    fn selection(&self) -> Selection {
+        Selection {
+            every: self.args.every.or(self.header.every),
+            hold_out: self.args.hold_out.or(self.header.hold_out),
+        }
+    }
+
+    fn indices(&self, scans: usize) -> anyhow::Result<Vec<usize>> {
+        let selection = self.selection();
+        let (all, held_out) = selection.split(scans);
+        let indices = if selection.hold_out.is_some() { held_out } else { all };
+        if indices.is_empty() {
+            return Err(bad_call(format!(
+                "{}: no scan is left to predict (the log has {scans}); give a smaller --hold-out",
+                self.log.display()
+            )));
+        }
+        Ok(indices)
+    }
+
+    /// The document and the text. `read`: the number of scans that could be read.
+    fn part(
+        &self,
+        predictions: &RangePredictions,
+        scans: usize,
+        noise: &RangeNoise,
+        resolution: f64,
+    ) -> anyhow::Result<Part> {
+        let Some(score) = predictions.score(resolution, noise) else {
+            bail!(
+                "{}: none of {} rays of {scans} scans could be predicted; is this the log of that map?",
+                self.log.display(),
+                predictions.rays()
+            );
+        };
+        let hold_out = self.header.hold_out;
+        let fresh = hold_out.is_some() && self.selection().hold_out == hold_out;
+        let mut value = to_json(predictions, &score);
+        value["log"] = json!(self.log.display().to_string());
+        value["scans"] = json!(scans);
+        value["held_out"] = json!(fresh);
+        value["noise"] =
+            json!({ "sigma": noise.sigma, "outliers": noise.outliers, "max_range": noise.max_range });
+        let text = text(&value);
+        Ok(Part { key: "scans", value, text })
+    }
+}
+
+/// Predicts 2-D scans.
+pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf<2>) -> anyhow::Result<Part> {
+    let task = Task::new(args, path, header);
+    let log = log::read_2d(path, &args.source)?;
+    let limits = LimitArgs { range: task.range(), no_return: args.limits.no_return };
+    let scans = log::scans(&log, &task.indices(log.len())?, &limits.limits(&log));
+    let resolution = tsdf.grid().lattice.resolution;
+    let settings = RayCastSettings {
+        min_weight: portolan::field::EsdfSettings::of(tsdf).min_weight,
+        unknown_tolerance: 2.0 * resolution,
+        ..RayCastSettings::default()
+    };
+    let mut predictions = RangePredictions::default();
+    let progress = Progress::new(scans.len(), "predicting", args.output);
+    for (world_from_sensor, scan) in &scans {
+        progress.add(1);
+        for beam in scan.beams().filter(|b| b.is_hit()) {
+            let direction = world_from_sensor.rotate(beam.direction);
+            match cast_ray(tsdf, world_from_sensor.translation, direction, &settings) {
+                RayCast::Hit(range) => predictions.pairs.push([range, beam.range]),
+                RayCast::Unknown(_) => predictions.unknown.push(beam.range),
+                RayCast::Outside(_) => predictions.outside.push(beam.range),
+                RayCast::Free => predictions.free.push(beam.range),
+            }
+        }
+    }
+    drop(progress);
+    let noise = RangeNoise::of_cells(resolution, settings.max_range);
+    task.part(&predictions, scans.len(), &noise, resolution)
+}
+
+/// Predicts 3-D scans.
+pub(super) fn in_3d(args: &Args, path: &Path, header: &MapHeader, tsdf: &TsdfBricks) -> anyhow::Result<Part> {
+    let task = Task::new(args, path, header);
+    let log = log::read_3d(path, &args.source, false)?;
+    let filter = task.range().filter(task.settings.shape.self_filter.clone())?;
+    let indices = task.indices(log.len())?;
+    let resolution = tsdf.store.lattice().resolution;
+    let settings = RayCastSettings {
+        min_weight: free_weight(tsdf.weights, tsdf.carve_weight),
+        max_range: filter.max_range.min(FARTHEST),
+        // Where free space was not fused, all of it is unknown.
+        unknown_tolerance: if task.settings.shape.carve { 2.0 * resolution } else { f64::INFINITY },
+        blind: BLIND,
+    };
+    let rays = RayCaster::new(&tsdf.store, settings);
+    let mut predictions = RangePredictions::default();
+    let mut unreadable = Vec::new();
+    let progress = Progress::new(indices.len(), "predicting", args.output);
+    for &i in &indices {
+        match log.frame(i) {
+            Ok(frame) => predictions.add(&rays, log.pose(i), &filter.apply(frame).0, args.rays),
+            Err(error) => unreadable.push(error),
+        }
+        progress.add(1);
+    }
+    drop(progress);
+    let first = unreadable.first().map(ToString::to_string);
+    if let (true, Some(error)) = (unreadable.len() == indices.len(), &first) {
+        bail!("{error}");
+    }
+    let noise = RangeNoise::of_cells(resolution, settings.max_range);
+    let mut part = task.part(&predictions, indices.len() - unreadable.len(), &noise, resolution)?;
+    part.value["unreadable"] = json!({ "scans": unreadable.len(), "first": first });
+    Ok(part)
+}
+
+fn to_json(predictions: &RangePredictions, score: &PredictionScore) -> Value {
+    let (rays, predicted) = (predictions.rays() as f64, predictions.pairs.len() as f64);
+    // The share of the predicted is a number of rays by their number: the same number by that of all rays.
+    let of_all = |share: f64| (share * predicted).round() / rays;
+    let signed = predictions.pairs.iter().map(|[predicted, measured]| predicted - measured);
+    json!({
+        "beams": predictions.rays(),
+        "predicted": predictions.pairs.len(),
+        "predicted_share": predicted / rays,
+        "unknown": predictions.unknown.len(),
+        "outside": predictions.outside.len(),
+        "free": predictions.free.len(),
+        "median_error": score.median_error,
+        "p95_error": score.p95_error,
+        "bias": score.bias,
+        "mean_error": Spread::of(signed).mean,
+        "within_one_cell": score.within_one_cell,
+        "within_two_cells": score.within_two_cells,
+        "within_one_cell_of_all": of_all(score.within_one_cell),
+        "within_two_cells_of_all": of_all(score.within_two_cells),
+        "negative_log_likelihood": score.negative_log_likelihood,
+    })
+}
+
+fn text(p: &Value) -> String {
+    let f = |key: &str| p[key].as_f64().unwrap_or(f64::NAN);
+    let mut text = format!(
+        "predicted {} of {} hits of {} scans ({:.1} %)\n\
+         |error|: median {:.1} mm, 95 % {:.1} mm; bias (median) {:+.1} mm\n\
+         within one cell {:.1} %, within two {:.1} % of the predicted ({:.1} % and {:.1} % of all)\n\
+         negative log-likelihood {:.3} nats a ray\n",
+        p["predicted"],
+        p["beams"],
+        p["scans"],
+        100.0 * f("predicted_share"),
+        1000.0 * f("median_error"),
+        1000.0 * f("p95_error"),
+        1000.0 * f("bias"),
+        100.0 * f("within_one_cell"),
+        100.0 * f("within_two_cells"),
+        100.0 * f("within_one_cell_of_all"),
+        100.0 * f("within_two_cells_of_all"),
+        f("negative_log_likelihood"),
+    );
+    if p["held_out"] != true {
+        text += "warning: the map was not made with these scans held out; make it with --hold-out\n";
+    }
+    text
+}

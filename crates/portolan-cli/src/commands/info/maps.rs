@@ -1,0 +1,85 @@
+//! `info` of a map.portolan.
+
+use portolan::cell::{Cell, Planes};
+use portolan::map::MapRepr;
+use portolan::store::{Bricks, Store};
+use portolan_io::{MapFile, MapHeader, SpaceMapFile};
+use serde_json::{Value, json};
+
+use crate::json;
+use crate::mapping::brick_extent;
+
+fn of_header(dimension: usize, header: &MapHeader, poses: usize, maps: Value) -> Value {
+    json!({
+        "dimension": dimension,
+        "logs": header.logs,
+        "scans": header.scans,
+        "hold_out": header.hold_out,
+        "every": header.every,
+        "settings": header.settings,
+        "statistics": header.statistics,
+        "poses": poses,
+        "maps": maps,
+    })
+}
+
+pub(super) fn of_2d(file: &MapFile) -> Value {
+    let mut maps = json!({});
+    if let Some(map) = &file.grid {
+        maps["grid"] = json!({
+            "cell": "log odds, one byte",
+            "extent": json::grid(map.store().grid()),
+            "observed": map.observed_cells(),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    if let Some(map) = &file.tree {
+        maps["tree"] = json!({
+            "cell": "log odds, one byte",
+            "extent": json::aabb(&map.tree().grid().aabb()),
+            "depth": map.tree().depth(),
+            "nodes": map.tree().nodes(),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    if let Some(map) = &file.tsdf {
+        maps["tsdf"] = json!({
+            "cell": "signed distance and weight, f32",
+            "extent": json::grid(map.grid()),
+            "truncation": map.config().truncation,
+            "w_max": map.config().w_max.is_finite().then_some(map.config().w_max),
+            "observed": map.observed_cells(0.0),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    of_header(2, &file.header, file.poses.len(), maps)
+}
+
+pub(super) fn of_3d(file: &SpaceMapFile) -> Value {
+    let mut maps = json!({});
+    if let Some(map) = &file.occupancy {
+        maps["tree"] = of_bricks("log odds, one byte", &map.store);
+    }
+    if let Some(map) = &file.tsdf {
+        maps["tsdf"] = of_bricks("signed distance and weight, f32", &map.store);
+        maps["tsdf"]["truncation"] = json!(map.truncation);
+        maps["tsdf"]["w_max"] = json!(map.w_max.is_finite().then_some(map.w_max));
+    }
+    if let Some(map) = &file.colors {
+        maps["colors"] = of_bricks("red, green, blue, weight, 16 bits each", &map.store);
+    }
+    of_header(3, &file.header, file.poses.len(), maps)
+}
+
+fn of_bricks<C: Cell>(cell: &str, store: &Bricks<C, 3>) -> Value {
+    let observed = |brick: &C::Brick| (0..brick.len()).filter(|&i| brick.get(i).is_some()).count();
+    let extent = brick_extent(store);
+    json!({
+        "cell": cell,
+        "resolution": store.lattice().resolution,
+        "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
+        "bricks": store.len(),
+        "observed": store.bricks_by_age().map(|(_, brick)| observed(brick)).sum::<usize>(),
+        "bytes": store.memory_bytes(),
+    })
+}

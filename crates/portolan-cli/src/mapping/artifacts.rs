@@ -1,0 +1,155 @@
+//! The files that a mapping run leaves behind.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use portolan::cell::LogOddsRule;
+use portolan::geom::Aabb;
+use portolan_io::{
+    AnyMapFile, IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server,
+    write_octomap_bt, write_octomap_ot, write_svg,
+};
+
+use super::files::{dense_esdf, polylines, write_mesh};
+use super::{Derived, DistanceField, cells_for_map_server, picture, preview};
+use crate::stale::remove_stale;
+
+/// Everything that is written.
+pub(crate) struct Artifacts<'a> {
+    pub(crate) file: &'a AnyMapFile,
+    pub(crate) derived: &'a Derived,
+    /// The box of a 3-D distance field that goes into `esdf.bin`; `None`: all of it.
+    pub(crate) dense: Option<Aabb<3>>,
+    /// Whether the sensor is a camera, which looks along z.
+    pub(crate) camera: bool,
+    /// Title of the picture.
+    pub(crate) title: String,
+}
+
+/// What writing did.
+#[derive(Default)]
+pub(crate) struct Written {
+    pub(crate) files: Vec<&'static str>,
+    pub(crate) seconds: BTreeMap<&'static str, f64>,
+    /// What was not written, and why.
+    pub(crate) notes: Vec<String>,
+}
+
+impl Artifacts<'_> {
+    /// Writes all files but `map.portolan`, which was saved before anything was derived from it, and `summary.json`. What
+    /// an earlier run left in the folder and this one does not make is removed: it would belong to another map.
+    pub(crate) fn write(&self, folder: &Path) -> anyhow::Result<Written> {
+        let mut written = Written { notes: self.derived.notes.clone(), ..Written::default() };
+        let start = Instant::now();
+        self.write_surface(folder, &mut written)?;
+        self.write_octree(folder, &mut written)?;
+        self.write_esdf(folder, &mut written)?;
+        self.write_map_server(folder, &mut written)?;
+        written.files.push("map.portolan");
+        written.seconds.insert("write", start.elapsed().as_secs_f64());
+        self.write_picture(folder, &mut written)?;
+        remove_stale(folder, &written.files)?;
+        Ok(written)
+    }
+
+    fn write_surface(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        if let Some(mesh) = &self.derived.mesh {
+            write_mesh(&folder.join("mesh.ply"), mesh)?;
+            written.files.push("mesh.ply");
+        }
+        if let Some(contour) = &self.derived.contour {
+            let lines = polylines(&contour.contour);
+            write_geojson(folder.join("contour.geojson"), &lines)?;
+            write_svg(folder.join("contour.svg"), &lines, &SvgStyle::default())?;
+            written.files.extend(["contour.geojson", "contour.svg"]);
+        }
+        Ok(())
+    }
+
+    fn write_octree(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        let AnyMapFile::Space(file) = self.file else { return Ok(()) };
+        let (Some(tree), Some(map)) = (&self.derived.octree, &file.occupancy) else { return Ok(()) };
+        let rule = LogOddsRule::<i8>::new(&map.model)?;
+        let bt = write_octomap_bt(folder.join("octree.bt"), tree);
+        let ot = write_octomap_ot(folder.join("octree.ot"), tree, rule.quantum);
+        for (name, result) in [("octree.bt", bt), ("octree.ot", ot)] {
+            match result {
+                Ok(()) => written.files.push(name),
+                // The format's own limits: the map is whole without it.
+                Err(error @ IoError::Unwritable { .. }) => written.notes.push(error.to_string()),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(())
+    }
+
+    fn write_esdf(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        let path = folder.join("esdf.bin");
+        match &self.derived.esdf {
+            None => return Ok(()),
+            Some(DistanceField::Two(esdf, status)) => {
+                write_esdf(path, esdf.grid(), esdf.samples(), status.as_deref())?;
+            }
+            Some(DistanceField::Three(esdf)) => match dense_esdf(esdf, self.dense.as_ref()) {
+                Ok(dense) => write_esdf(path, &dense.grid, &dense.distances, Some(&dense.status))?,
+                Err(why) => {
+                    written.notes.push(format!("esdf.bin was not written: {why}"));
+                    return Ok(());
+                }
+            },
+        }
+        written.files.push("esdf.bin");
+        Ok(())
+    }
+
+    fn write_map_server(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        let AnyMapFile::Plane(file) = self.file else { return Ok(()) };
+        if let Some((grid, cells)) = cells_for_map_server(file) {
+            write_map_server(folder.join("map.yaml"), &grid, &cells)?;
+            written.files.extend(["map.pgm", "map.yaml"]);
+        }
+        Ok(())
+    }
+
+    /// `map.png` of a 2-D map, `preview.png` of a mesh.
+    fn write_picture(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        let start = Instant::now();
+        let (stage, name, png) = match self.file {
+            AnyMapFile::Plane(file) => {
+                ("picture", "map.png", picture::of_map(file, self.derived, &self.title))
+            }
+            AnyMapFile::Space(file) => {
+                let mesh = self.derived.mesh.as_ref();
+                let png = mesh.and_then(|mesh| preview::of_mesh(mesh, &file.poses, self.camera, &self.title));
+                ("preview", "preview.png", png)
+            }
+        };
+        if let Some(png) = png {
+            write_atomic(folder.join(name), |w| w.write_all(&png))?;
+            written.files.push(name);
+        }
+        written.seconds.insert(stage, start.elapsed().as_secs_f64());
+        Ok(())
+    }
+}
+
+/// Title of the picture of a map: its logs, its cells, its scans.
+pub(crate) fn title(logs: &[String], resolution: f64, scans: u64) -> String {
+    let names: Vec<_> = logs.iter().map(|name| stem(name)).collect();
+    // Without the rounding error of the product: 0.07 m are 7 cm.
+    let in_cm = (resolution * 1e8).round() / 1e6;
+    let cells = if resolution < 1.0 { format!("{in_cm} cm") } else { format!("{resolution} m") };
+    format!("{} · cells of {cells} · {scans} scans", names.join(" + "))
+}
+
+/// A file name without folders, packing and kind.
+fn stem(path: &str) -> String {
+    let name = Path::new(path).file_name().unwrap_or_default().to_string_lossy();
+    let mut name: &str = &name;
+    for end in [".gz", ".bz2", ".log", ".clf", ".gfs"] {
+        name = name.strip_suffix(end).unwrap_or(name);
+    }
+    name.to_owned()
+}

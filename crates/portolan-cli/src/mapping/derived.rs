@@ -1,0 +1,150 @@
+//! What is derived from the maps when all scans are fused.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use portolan::cell::LogOdds8;
+use portolan::field::{Esdf, SparseEsdf};
+use portolan::map::{DerivedField, Tsdf};
+use portolan::store::{Store, Tree};
+use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, ThinWalls};
+use portolan::surface::{doubled_length, marching_cubes, marching_squares, thin_walls};
+use portolan_io::{AnyMapFile, MapFile, SpaceMapFile, TsdfBricks};
+
+use super::recipe::{esdf_settings, mesh_settings};
+use super::{MapKind, Settings};
+use crate::arguments::shown_bytes;
+use crate::esdf::{dense_esdf_2d, status_plane};
+
+/// Contours nearer to each other than this and facing the same way are one wall seen twice (metres).
+const DOUBLED_REACH: f64 = 0.15;
+
+/// Surfaces, distance field and octree, as far as they are wanted and there is a map to derive them from.
+#[derive(Default)]
+pub(crate) struct Derived {
+    pub(crate) contour: Option<ContourChecked>,
+    pub(crate) mesh: Option<Mesh>,
+    pub(crate) octree: Option<Tree<LogOdds8, 3>>,
+    pub(crate) esdf: Option<DistanceField>,
+    pub(crate) seconds: BTreeMap<&'static str, f64>,
+    /// What was not made, and why.
+    pub(crate) notes: Vec<String>,
+}
+
+/// A contour and what it shows of the poses and walls.
+pub(crate) struct ContourChecked {
+    pub(crate) contour: Contour,
+    pub(crate) doubled: DoubledLength,
+    pub(crate) thin: ThinWalls,
+}
+
+/// The distance field of a map.
+pub(crate) enum DistanceField {
+    /// 2-D, with the status of its cells where the reach of the method ends within the map.
+    Two(Esdf<2>, Option<Vec<u8>>),
+    /// 3-D.
+    Three(SparseEsdf<3>),
+}
+
+impl Derived {
+    /// `memory`: what maps and fields may take together (bytes).
+    pub(crate) fn of(file: &AnyMapFile, settings: &Settings, memory: usize) -> Self {
+        match file {
+            AnyMapFile::Plane(file) => Self::of_2d(file, settings),
+            AnyMapFile::Space(file) => Self::of_3d(file, settings, memory),
+        }
+    }
+
+    pub(crate) fn of_2d(file: &MapFile, settings: &Settings) -> Self {
+        let mut derived = Self::default();
+        let Some(tsdf) = &file.tsdf else { return derived };
+        if settings.wants(MapKind::Contour) {
+            let contour = derived.timed("contour", |_| marching_squares(tsdf, &ContourSettings::of(tsdf)));
+            derived.contour = Some(derived.timed("contour_checks", |_| ContourChecked::of(contour, tsdf)));
+        }
+        if settings.wants(MapKind::Esdf) {
+            derived.esdf = derived.timed("esdf", |_| {
+                let dense = dense_esdf_2d(tsdf, settings.esdf);
+                let status = status_plane(&dense).map(<[u8]>::to_vec);
+                let samples = Esdf::from_samples(dense.grid, dense.distances).ok();
+                samples.map(|esdf| DistanceField::Two(esdf, status))
+            });
+        }
+        derived
+    }
+
+    fn of_3d(file: &SpaceMapFile, settings: &Settings, memory: usize) -> Self {
+        let mut derived = Self::default();
+        if let Some(map) = &file.occupancy {
+            derived.octree = derived.timed("octree", |_| Tree::from_bricks(&map.store));
+            if derived.octree.is_none() {
+                derived.notes.push("the octree was not made: the map spans more than 2^28 cells".to_owned());
+            }
+        }
+        let Some(tsdf) = &file.tsdf else { return derived };
+        if settings.wants(MapKind::Mesh) {
+            let colors = file.colors.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
+            let how = mesh_settings(tsdf.weights);
+            derived.mesh = Some(derived.timed("mesh", |_| marching_cubes(&tsdf.store, colors, &how)));
+        }
+        if settings.wants(MapKind::Esdf) {
+            let held =
+                tsdf.store.memory_bytes() + file.occupancy.as_ref().map_or(0, |o| o.store.memory_bytes());
+            derived.esdf = derived.timed("esdf", |derived| derived.esdf_3d(tsdf, settings, memory, held));
+        }
+        derived
+    }
+
+    /// The field, where the memory beside what is held allows it; else a note.
+    fn esdf_3d(
+        &mut self,
+        tsdf: &TsdfBricks,
+        settings: &Settings,
+        memory: usize,
+        held: usize,
+    ) -> Option<DistanceField> {
+        // The field, and as much again while it is made.
+        let needed = 2 * tsdf.store.len() * 512 * size_of::<f32>();
+        if held.saturating_add(needed) > memory {
+            let needed = shown_bytes(needed as f64);
+            self.notes.push(format!("the esdf was not made: it needs {needed} more than --memory leaves"));
+            return None;
+        }
+        let mut how = esdf_settings(tsdf.weights, tsdf.carve_weight, settings.max_distance);
+        how.method = settings.esdf.method();
+        Some(DistanceField::Three(SparseEsdf::of(&tsdf.store, &how)))
+    }
+
+    fn timed<T>(&mut self, name: &'static str, work: impl FnOnce(&mut Self) -> T) -> T {
+        let start = Instant::now();
+        let result = work(self);
+        self.seconds.insert(name, start.elapsed().as_secs_f64());
+        result
+    }
+
+    /// Bytes of each derived field, measured.
+    pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
+        let contour = self.contour.iter().map(|c| ("contour", c.contour.memory_bytes()));
+        let mesh = self.mesh.iter().map(|m| ("mesh", m.memory_bytes()));
+        let octree = self.octree.iter().map(|t| ("octree", t.memory_bytes()));
+        let esdf = self.esdf.iter().map(|e| ("esdf", e.memory_bytes()));
+        contour.chain(mesh).chain(octree).chain(esdf).collect()
+    }
+}
+
+impl ContourChecked {
+    fn of(contour: Contour, tsdf: &Tsdf<2>) -> Self {
+        let doubled = doubled_length(&contour, DOUBLED_REACH);
+        let thin = thin_walls(tsdf, &contour);
+        Self { contour, doubled, thin }
+    }
+}
+
+impl DistanceField {
+    fn memory_bytes(&self) -> usize {
+        match self {
+            Self::Two(esdf, _) => esdf.memory_bytes(),
+            Self::Three(esdf) => esdf.memory_bytes(),
+        }
+    }
+}

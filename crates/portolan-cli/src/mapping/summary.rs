@@ -1,0 +1,234 @@
+//! The summary of a mapping run: `summary.json`, and the text for people.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use portolan_io::AnyMapFile;
+use serde_json::{Value, json};
+
+use super::extent::Extent;
+use super::memory::peak_memory;
+use super::{Derived, FusionReport, Settings};
+use crate::arguments::shown_bytes;
+use crate::dimension::Dimension;
+use crate::log::Log;
+use crate::{json, saved};
+
+/// Everything that a run found out.
+pub(crate) struct Summary<'a> {
+    pub(crate) log: &'a Log,
+    pub(crate) settings: &'a Settings,
+    pub(crate) extent: Extent,
+    pub(crate) held_out: usize,
+    pub(crate) fusion: &'a FusionReport,
+    pub(crate) file: &'a AnyMapFile,
+    pub(crate) derived: &'a Derived,
+    /// What was not made or written, and why.
+    pub(crate) notes: Vec<String>,
+    pub(crate) bytes: BTreeMap<&'static str, usize>,
+    pub(crate) seconds: BTreeMap<&'static str, f64>,
+    pub(crate) files: Vec<&'static str>,
+}
+
+impl Summary<'_> {
+    /// What lowers the trust in the map.
+    fn warnings(&self) -> Vec<String> {
+        let mut warnings = self.log.warnings();
+        let stats = &self.fusion.stats;
+        if stats.refused_poses > 0 {
+            warnings.push(format!(
+                "{} scans have a pose that cannot be used (not rigid, or too far from the map)",
+                stats.refused_poses
+            ));
+        }
+        if let (n @ 1.., Some(error)) = &self.fusion.unreadable {
+            warnings.push(format!("{n} scans could not be read (first: {error})"));
+        }
+        if stats.refused.total() > 0 {
+            warnings.push(json::refused_words(&stats.refused));
+        }
+        let lost = self.fusion.without_pixel;
+        if 20 * lost > stats.beams.hit {
+            warnings.push(format!(
+                "{lost} points have no row and column of their own in their scan (a nearer point has it, or they lie \
+                 outside of all) and are not in the distances; --sweep exact uses all points"
+            ));
+        }
+        if stats.hits_outside > 0 {
+            warnings.push(format!("{} hits lie outside of --bounds", stats.hits_outside));
+        }
+        warnings.extend(self.surface_warnings());
+        warnings.extend(self.fusion.full.iter().map(|full| format!("fusing ended early: {full}")));
+        warnings.extend(self.notes.iter().cloned());
+        warnings
+    }
+
+    fn surface_warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let mut empty = self.derived.mesh.as_ref().is_some_and(|mesh| mesh.triangles.is_empty());
+        if let Some(contour) = &self.derived.contour {
+            let (thin, doubled) = (&contour.thin, contour.doubled.share());
+            if thin.thin > 0.0 {
+                warnings.push(format!(
+                    "{:.1} m of contour ({:.1} %) belong to walls thinner than twice the truncation ({:.3} m), seen \
+                     from both sides: their faces may be displaced by up to a few centimetres; a smaller --truncation \
+                     helps",
+                    thin.thin,
+                    100.0 * thin.thin / thin.total,
+                    2.0 * self.settings.truncation()
+                ));
+            }
+            if doubled > 0.03 {
+                warnings.push(format!(
+                    "{:.1} % of the contour is doubled: the poses do not agree with each other",
+                    100.0 * doubled
+                ));
+            }
+            empty = contour.contour.segments.is_empty();
+        }
+        warnings.extend(empty.then(|| "no surface was found".to_owned()));
+        warnings
+    }
+
+    /// `summary.json`.
+    pub(crate) fn to_json(&self) -> Value {
+        let stats = json::stats(&self.fusion.stats);
+        let header = saved::header(self.file);
+        let settings = self.settings.to_json();
+        let mut input = self.log.to_json();
+        if self.settings.dimension == Dimension::Two {
+            input["no_return"] = settings["no_return"].clone();
+        } else {
+            input["unreadable_scans"] = json!(self.fusion.unreadable.0);
+        }
+        let mut document = json!({
+            "program": concat!("portolan ", env!("CARGO_PKG_VERSION")),
+            "input": input,
+            "dimension": if self.settings.dimension == Dimension::Two { 2 } else { 3 },
+            "settings": settings,
+            "scans": {
+                "in_log": self.log.len(),
+                "held_out": self.held_out,
+                "fused": self.fusion.stats.scans,
+                "refused_poses": self.fusion.stats.refused_poses,
+                "in_map": header.scans,
+            },
+            "beams": stats["beams"],
+            "refused_beams": stats["refused_beams"],
+            "observations": self.fusion.observations,
+            "extent": self.extent.to_json(),
+            "bytes": self.bytes,
+            "peak_memory": peak_memory(),
+            "seconds": self.seconds,
+            "scans_per_second": self.scans_per_second(),
+            "logs": header.logs,
+            "warnings": self.warnings(),
+            "files": self.files,
+        });
+        match self.settings.dimension {
+            Dimension::Two => document["contour"] = self.contour_json(),
+            Dimension::Three => {
+                document["mesh"] = self.mesh_json();
+                document["octree"] = json!(
+                    self.derived
+                        .octree
+                        .as_ref()
+                        .map(|t| { json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }) })
+                );
+                document["points_without_pixel"] = json!(self.fusion.without_pixel);
+            }
+        }
+        document
+    }
+
+    fn contour_json(&self) -> Value {
+        let Some(checked) = &self.derived.contour else { return Value::Null };
+        let (contour, thin) = (&checked.contour, &checked.thin);
+        json!({
+            "segments": contour.segments.len(),
+            "length": contour.length() + 0.0, // the sum of nothing is -0.0
+            "doubled_length": checked.doubled.doubled,
+            "doubled_share": checked.doubled.share(),
+            "thin_length": thin.thin,
+            "thinnest": thin.thinnest.is_finite().then_some(thin.thinnest),
+        })
+    }
+
+    fn mesh_json(&self) -> Value {
+        let Some(mesh) = &self.derived.mesh else { return Value::Null };
+        json!({
+            "vertices": mesh.vertices.len(),
+            "triangles": mesh.triangles.len(),
+            "area": mesh.area(),
+            "colors": !mesh.colors.is_empty(),
+        })
+    }
+
+    fn seconds_of(&self, stages: &[&str]) -> f64 {
+        stages.iter().filter_map(|name| self.seconds.get(name)).sum()
+    }
+
+    fn scans_per_second(&self) -> f64 {
+        self.fusion.stats.scans as f64 / self.seconds_of(&["fuse"]).max(1e-9)
+    }
+}
+
+/// The summary for people.
+pub(crate) fn report(summary: &Summary, folder: &str) -> String {
+    let mut text = String::new();
+    let stats = &summary.fusion.stats;
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "{} of {} scans fused ({}), {} held out; {} hits, {} beams without echo",
+        stats.scans,
+        summary.log.len(),
+        summary.log.format(),
+        summary.held_out,
+        stats.beams.hit,
+        stats.beams.no_return
+    );
+    let r = summary.settings.resolution();
+    let _ = match &summary.extent {
+        Extent::Two(grid) => {
+            let ([w, h], [nx, ny]) = (grid.aabb().extent(), grid.shape);
+            writeln!(text, "{w:.1} x {h:.1} m, {nx} x {ny} cells of {r} m")
+        }
+        Extent::Three(bounds) => {
+            let [x, y, z] = bounds.extent();
+            writeln!(text, "{x:.2} x {y:.2} x {z:.2} m in cells of {r} m")
+        }
+    };
+    let _ = writeln!(text, "{}", summary.settings.forgetting());
+    let sizes: Vec<_> =
+        summary.bytes.iter().map(|(name, &n)| format!("{name} {}", shown_bytes(n as f64))).collect();
+    let _ = writeln!(text, "{}", sizes.join(", "));
+    if let Some(checked) = &summary.derived.contour {
+        let doubled = 100.0 * checked.doubled.share();
+        let (n, length) = (checked.contour.segments.len(), checked.contour.length() + 0.0);
+        let _ = writeln!(text, "contour of {n} segments, {length:.1} m, {doubled:.2} % doubled");
+    }
+    if let Some(mesh) = &summary.derived.mesh {
+        let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area());
+    }
+    let per_scan: Vec<_> = ["tree", "grid", "tsdf"]
+        .iter()
+        .filter_map(|name| summary.seconds.get(name).map(|s| (name, s)))
+        .map(|(name, s)| format!("{name} {:.1} ms", 1e3 * s / (stats.scans.max(1) as f64)))
+        .collect();
+    let _ = writeln!(
+        text,
+        "read {:.2} s, fused {:.2} s ({:.1} scans/s; {} a scan), derived {:.2} s, written {:.2} s",
+        summary.seconds_of(&["read"]),
+        summary.seconds_of(&["fuse"]),
+        summary.scans_per_second(),
+        per_scan.join(", "),
+        summary.seconds_of(&["contour", "contour_checks", "octree", "mesh", "esdf"]),
+        summary.seconds_of(&["save", "write", "picture", "preview"])
+    );
+    for warning in summary.warnings() {
+        let _ = writeln!(text, "warning: {warning}");
+    }
+    let _ = writeln!(text, "wrote {} to {folder}", summary.files.join(", "));
+    text
+}
