@@ -1,7 +1,7 @@
 //! The text's thesis as an interface: a map is what it can answer cheaply.
 
 use portolan::geom::Pose;
-use portolan::map::{Cloud, OccupancyGrid, TreeMap, Tsdf};
+use portolan::map::{Cloud, OccupancyGrid, OccupancyTree, Tsdf};
 use portolan::scan::{Scan, ScanStats};
 
 /// Which questions a representation answers at all, within its documented cost.
@@ -57,7 +57,7 @@ impl<const D: usize> MapRepr<D> for OccupancyGrid<D> {
     }
 }
 
-impl<const D: usize> MapRepr<D> for TreeMap<D> {
+impl<const D: usize> MapRepr<D> for OccupancyTree<D> {
     fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
         self.integrate(world_from_sensor, scan)
     }

@@ -31,7 +31,7 @@ impl EsdfArg {
 
 /// The field of a 2-D map, as far as the method reaches (509 cells where it is accurate), with distances to
 /// unknown cells where they are wanted.
-pub(crate) fn esdf_2d(tsdf: &Tsdf<2>, method: EsdfArg, unknown: bool) -> SparseEsdf<2> {
+pub(crate) fn esdf_2d(tsdf: &Tsdf2, method: EsdfArg, unknown: bool) -> SparseEsdf<2> {
     let grid = tsdf.grid();
     let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
     let how = EsdfSettings { max_distance, method: method.method(), unknown, ..EsdfSettings::default() };
@@ -39,7 +39,7 @@ pub(crate) fn esdf_2d(tsdf: &Tsdf<2>, method: EsdfArg, unknown: bool) -> SparseE
 }
 
 /// The cells of the field of a 2-D map.
-pub(crate) fn dense_esdf_2d(tsdf: &Tsdf<2>, method: EsdfArg) -> DenseEsdf<2> {
+pub(crate) fn dense_esdf_2d(tsdf: &Tsdf2, method: EsdfArg) -> DenseEsdf<2> {
     esdf_2d(tsdf, method, false).dense(tsdf.grid())
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::bail;
-use portolan_io::{AnyMapFile, IoError, MapHeader};
+use portolan_io::{Container, map_dimension, IoError, MapHeader};
 
 use crate::dimension::Dimension;
 

@@ -15,9 +15,9 @@ use crate::mapping::available_memory;
 /// What a file holds.
 pub(crate) enum Source {
     /// A 2-D `map.portolan`
-    Map2(Box<MapFile>),
+    Map2(Box<MapFile<2>>),
     /// A 3-D `map.portolan`
-    Map3(Box<SpaceMapFile>),
+    Map3(Box<MapFile<3>>),
     /// `esdf.bin`
     Esdf(EsdfFile),
     /// A map_server map
@@ -31,7 +31,7 @@ pub(crate) enum Source {
     /// A log of 2-D scans
     Log2(Box<CarmenLog>),
     /// A log of 3-D scans
-    Log3(Box<SpaceLog>),
+    Log3(Box<ScanLog>),
 }
 
 /// Opens a file or a folder.
@@ -48,17 +48,17 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
         FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
         FileKind::CarmenLog => Source::Log2(Box::new(CarmenLog::read(path)?)),
-        FileKind::SpaceLog(_) => Source::Log3(Box::new(SpaceLog::open(path, &SpaceLogOptions::default())?)),
+        FileKind::ScanLog(_) => Source::Log3(Box::new(ScanLog::open(path, &ScanLogOptions::default())?)),
         FileKind::Unknown(what) => bail!("{}: not recognised: {what}", path.display()),
         kind => bail!("{}: is {}, which cannot be read yet", path.display(), describe(&kind)),
     })
 }
 
-fn of_map(file: AnyMapFile) -> Source {
-    match file {
-        AnyMapFile::Plane(file) => Source::Map2(file),
-        AnyMapFile::Space(file) => Source::Map3(file),
-    }
+fn of_map(container: &Container) -> anyhow::Result<Source> {
+    Ok(match map_dimension(container)? {
+        2 => Source::Map(Box::new(MapFile::from_container(container, readable())?)),
+        _ => Source::SpaceMap(Box::new(MapFile::from_container(container, readable())?)),
+    })
 }
 
 /// Memory for a map (bytes): what the machine has free, 4 GiB at least.

@@ -8,7 +8,7 @@ use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, Projection, RangeImage};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan_draw::{MeshView, Preview, Sensor, preview};
-use portolan_io::space_log::{SpaceLog, SpaceLogOptions};
+use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_sim::building::{BuildingConfig, BuildingSensor, DepthCamera, building_log};
 use std::path::Path;
 use std::time::Instant;

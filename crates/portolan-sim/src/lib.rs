@@ -4,10 +4,8 @@
 //! |---|---|
 //! | what is there, what does the robot see | [`apartment`], [`lap`], [`scan_at`] |
 //! | where do the wheels say that it is | [`measure_motions`], [`dead_reckon`] |
-//! | where was it really | [`correct`]: scan matching ([`match_scans`]), loop closures, pose graph |
-//! | how far off are poses | [`PoseErrors`]; without truth [`score_relations`] |
+//! | how far off are answers | [`Truth`], [`ErrorSummary`] |
 //! | the same in 3-D: a building, a lidar, a depth camera, truth | [`building`], [`building_log`] |
-//! | how long does a map believe in what is gone, and what does forgetting cost | [`ghost`](fn@ghost), [`static_noise`](fn@static_noise) |
 //!
 //! Every transcendental function comes from `libm` and every random number from one small generator, so that a
 //! seed gives the same bytes on every platform and for any number of threads.
@@ -31,7 +29,6 @@ mod lidar;
 mod odometry;
 mod random;
 mod solid;
-mod static_noise;
 mod world;
 
 pub use accuracy::{ErrorSummary, Truth};
@@ -42,5 +39,4 @@ pub use lidar::{Lidar, scan_at};
 pub use odometry::{OdometryNoise, dead_reckon, heading, measure_motions, planar};
 pub use random::Random;
 pub use solid::{Solid, SolidKind};
-pub use static_noise::{StaticNoise, static_noise};
 pub use world::{BoundarySegment, RayHit, World};

@@ -10,7 +10,7 @@ use portolan::map::{OccupancyGrid, Tsdf, TsdfConfig};
 use portolan::store::{Dense, Tree};
 use portolan::surface::{Contour, ContourSettings, marching_cubes, marching_squares};
 use portolan_io::{
-    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, SpaceMapFile, write_esdf,
+    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, write_esdf,
     write_map_server, write_octomap_bt, write_octomap_ot,
 };
 use serde_json::json;
@@ -159,7 +159,7 @@ fn yaml(out: &Path) -> PathBuf {
     }
 }
 
-fn convert_map2(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<bool> {
+fn convert_map2(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match (target, &file.tsdf) {
         (Target::Portolan, _) => file.write(&args.out)?,
         (Target::MapServer, _) => {
@@ -179,7 +179,7 @@ fn convert_map2(file: &MapFile, target: Target, args: &Args) -> anyhow::Result<b
 }
 
 /// `false`: the map lacks what the format needs, or the format is for 2-D.
-fn convert_map3(file: &SpaceMapFile, target: Target, args: &Args) -> anyhow::Result<bool> {
+fn convert_map3(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match (target, &file.occupancy, &file.tsdf) {
         (Target::Portolan, ..) => file.write(&args.out)?,
         (Target::OctomapBt | Target::OctomapOt, Some(map), _) => {

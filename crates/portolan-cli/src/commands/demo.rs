@@ -10,7 +10,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use portolan::geom::{Grid, Pose};
 use portolan::scan::{Scan, ScanStats};
-use portolan_io::{AnyMapFile, MapFile, write_atomic};
+use portolan_io::{Container, map_dimension, MapFile, write_atomic};
 use portolan_sim::{LapConfig, Lidar, SEED};
 
 use self::found::Found;
@@ -256,7 +256,7 @@ fn fused(
 ) -> anyhow::Result<(AnyMapFile, FusionReport, BTreeMap<&'static str, usize>)> {
     let mut maps = Maps2::new(settings, grid)?;
     let progress = Progress::new(scans.len(), "fusing", output);
-    let mut file = MapFile::default();
+    let mut file = MapFile::<2>::default();
     let fusion = fuse_2d(&mut maps, scans, &mut file.poses, &progress);
     let bytes = maps.bytes();
     file.poses = scans.iter().map(|(pose, _)| *pose).collect();

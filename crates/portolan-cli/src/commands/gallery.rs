@@ -9,7 +9,7 @@ use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::gallery::{Cost, ErrorSummary, Gallery, GallerySettings, Row};
 use portolan::geom::{Grid, Pose};
-use portolan::map::Tsdf2Config;
+use portolan::map::TsdfConfig;
 use portolan::scan::Scan;
 use portolan::surface::ContourSettings;
 use portolan_io::write_atomic;
@@ -143,7 +143,7 @@ pub(crate) fn measure(
 ) -> anyhow::Result<Gallery> {
     let settings = GallerySettings {
         grid: *grid,
-        tsdf: Tsdf2Config {
+        tsdf: TsdfConfig {
             truncation: made_with.truncation(),
             w_max: made_with.w_max(),
             ..Default::default()

@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use portolan::geom::Aabb;
 use portolan::scan::ScanStats;
-use portolan_io::{AnyMapFile, detect_no_return, write_atomic};
+use portolan_io::{Container, map_dimension, detect_no_return, write_atomic};
 
 use crate::arguments::{box3, bytes};
 use crate::dimension::{Dimension, Given, ONLY_3D};

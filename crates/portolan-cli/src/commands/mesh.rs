@@ -58,7 +58,7 @@ fn wrong_extension(args: &Args, names: &str) -> anyhow::Error {
     bad_call(format!("{}: give OUT the extension {names}", args.out.display()))
 }
 
-fn contour(args: &Args, file: &MapFile) -> anyhow::Result<()> {
+fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let ambiguity = if args.fixed_table { Ambiguity::FixedTable } else { Ambiguity::Decide };
     let min_weight = args.min_weight.unwrap_or(tsdf.thresholds().surface);
@@ -83,12 +83,12 @@ fn contour(args: &Args, file: &MapFile) -> anyhow::Result<()> {
     )
 }
 
-fn mesh(args: &Args, file: &SpaceMapFile) -> anyhow::Result<()> {
+fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
     Dimension::Three.check::<Args, _>(&args.given, "the map")?;
-    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
     let usual = mesh_settings(tsdf.weights);
     let settings = MeshSettings { min_weight: args.min_weight.or(usual.min_weight), ..usual };
-    let mesh = marching_cubes(&tsdf.store, file.colors.as_ref().map(|c| &c.store), &settings);
+    let mesh = marching_cubes(&tsdf.store, file.color_bricks.as_ref().map(|c| &c.store), &settings);
     if !write_mesh(&args.out, &mesh)? {
         return Err(wrong_extension(args, ".ply, .glb or .obj"));
     }

@@ -13,7 +13,7 @@ use portolan::store::Store;
 use portolan::sweep::OccupancySweep;
 use portolan_io::{
     AnswerRow, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
-    SpaceMapFile, certified_reach, write_answer, write_answer_header,
+    certified_reach, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
@@ -188,7 +188,7 @@ impl Fields {
     }
 }
 
-fn of_map2(file: MapFile, args: &Args) -> Field<2> {
+fn of_map2(file: MapFile<2>, args: &Args) -> Field<2> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
         let pessimistic = args.unknown == Some(UnknownArg::Pessimistic);
         let field = esdf_2d(t, args.esdf.unwrap_or_default(), pessimistic);
@@ -220,7 +220,7 @@ fn of_map2(file: MapFile, args: &Args) -> Field<2> {
     Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY }
 }
 
-fn of_map3(file: SpaceMapFile, args: &Args) -> anyhow::Result<Field<3>> {
+fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     let max_distance =
         args.max_distance.unwrap_or_else(|| Settings::of_saved(&file.header.settings).max_distance);
     let field = file.tsdf.as_ref().map(|map| {

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use portolan::map::{SparseTsdf, SparseTsdfConfig};
-use portolan_io::{AnyMapFile, FileKind, detect};
+use portolan::map::{Tsdf3, TsdfConfig};
+use portolan_io::{Container, MapFile, map_dimension, FileKind, detect};
 use portolan_studio::engine::{Limits, Logs, Source2d, Source3d, check};
 use portolan_studio::server::{Server, Settings};
 use serde_json::json;
@@ -103,10 +103,12 @@ impl Args {
         }
         let shown = path.display();
         let file = if path.is_dir() { path.join("map.portolan") } else { path.into() };
-        let AnyMapFile::Space(file) = AnyMapFile::read_within(file, self.memory)? else {
+        let container = Container::read(file)?;
+        if map_dimension(&container)? != 3 {
             bail!("{shown}: a 2-D map; give the log that it was made of, and the studio makes the map again");
-        };
-        let Some(held) = file.tsdf else {
+        }
+        let file = MapFile::<3>::from_container(&container, self.memory)?;
+        let Some(held) = file.tsdf_bricks else {
             bail!("{shown}: the map has no tsdf, and so no surface; make it with --maps tsdf");
         };
         let config = TsdfConfig {
@@ -116,7 +118,7 @@ impl Args {
             weights: held.weights,
             ..TsdfConfig::default()
         };
-        let tsdf = SparseTsdf::from_stores(held.store, file.colors.map(|c| c.store), config)?;
+        let tsdf = Tsdf3::from_stores(held.store, file.color_bricks.map(|c| c.store), config)?;
         let source_3d = Source3d::Map { name: name(path), tsdf: Box::new(tsdf) };
         Ok(Logs { source_3d, ..Logs::default() })
     }

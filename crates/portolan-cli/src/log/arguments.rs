@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use portolan::scan::{Body, FrameFilter, RangeLimits};
 use portolan_io::poses3::PoseConvention;
-use portolan_io::space_log::{Intrinsics, SpaceLog, SpaceLogKind, SpaceLogOptions};
+use portolan_io::scan_log::{Intrinsics, ScanLog, ScanLogKind, ScanLogOptions};
 use portolan_io::{CarmenLog, FileKind, detect, detect_no_return};
 use serde::{Deserialize, Serialize};
 
@@ -18,16 +18,16 @@ pub(crate) enum LogFormat {
     /// CARMEN text logs (.log, .clf; plain, gzip, bzip2)
     Carmen,
     /// Logs of 3-D scans
-    Space(SpaceLogKind),
+    Space(ScanLogKind),
 }
 
 /// The kind of a word of `--format`.
 fn log_format(word: &str) -> Result<LogFormat, String> {
-    match SpaceLogKind::from_word(word) {
+    match ScanLogKind::from_word(word) {
         _ if word == "carmen" => Ok(LogFormat::Carmen),
         Some(kind) => Ok(LogFormat::Space(kind)),
         None => {
-            Err(format!("must be one of carmen, {}", SpaceLogKind::ALL.map(SpaceLogKind::word).join(", ")))
+            Err(format!("must be one of carmen, {}", ScanLogKind::ALL.map(ScanLogKind::word).join(", ")))
         }
     }
 }
@@ -75,13 +75,13 @@ impl LogArgs {
         Ok(match self.format {
             Some(LogFormat::Carmen) => Dimension::Two,
             Some(LogFormat::Space(_)) => Dimension::Three,
-            None if matches!(detect(path)?, FileKind::SpaceLog(_)) => Dimension::Three,
+            None if matches!(detect(path)?, FileKind::ScanLog(_)) => Dimension::Three,
             None => Dimension::Two,
         })
     }
 
     /// Refuses options that the sensor of a 3-D log has no use for.
-    pub(crate) fn check_sensor(&self, log: &SpaceLog) -> anyhow::Result<()> {
+    pub(crate) fn check_sensor(&self, log: &ScanLog) -> anyhow::Result<()> {
         let (camera, kind) = (log.camera().is_some(), log.kind().word());
         if !camera && (self.intrinsics.is_some() || self.depth_scale.is_some()) {
             return Err(bad_call(format!(
@@ -95,9 +95,9 @@ impl LogArgs {
     }
 
     /// How a log of 3-D scans is opened.
-    pub(super) fn options(&self, color: bool) -> SpaceLogOptions {
-        let default = SpaceLogOptions::default();
-        SpaceLogOptions {
+    pub(super) fn options(&self, color: bool) -> ScanLogOptions {
+        let default = ScanLogOptions::default();
+        ScanLogOptions {
             format: self.format.and_then(|f| if let LogFormat::Space(kind) = f { Some(kind) } else { None }),
             poses: self.poses.clone(),
             pose_convention: self.pose_convention,

@@ -9,7 +9,7 @@ use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{RangeLimits, Scan};
-use portolan_io::space_log::SpaceLog;
+use portolan_io::scan_log::ScanLog;
 use portolan_io::{CarmenLog, FileKind, detect, read_poses_2d};
 use serde_json::{Value, json};
 
@@ -23,7 +23,7 @@ pub(crate) enum Log {
     /// Scans of a laser.
     Two(CarmenLog),
     /// Depth images or clouds.
-    Three(Box<SpaceLog>),
+    Three(Box<ScanLog>),
 }
 
 impl Log {
@@ -100,7 +100,7 @@ fn warnings_2d(log: &CarmenLog) -> Vec<String> {
     warnings
 }
 
-fn warnings_3d(log: &SpaceLog) -> Vec<String> {
+fn warnings_3d(log: &ScanLog) -> Vec<String> {
     let stats = log.stats();
     let counts = [
         (stats.missing_files, "files of scans that the log names are missing"),
@@ -124,8 +124,8 @@ fn warnings_3d(log: &SpaceLog) -> Vec<String> {
 }
 
 /// Opens a log of 3-D scans.
-pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<SpaceLog> {
-    Ok(SpaceLog::open(path, &args.options(color))?)
+pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<ScanLog> {
+    Ok(ScanLog::open(path, &args.options(color))?)
 }
 
 /// Reads a 2-D log.
@@ -159,7 +159,7 @@ pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> 
 pub(crate) fn describe(kind: &FileKind) -> String {
     match kind {
         FileKind::CarmenLog => "a CARMEN log".into(),
-        FileKind::SpaceLog(kind) => kind.label().into(),
+        FileKind::ScanLog(kind) => kind.label().into(),
         FileKind::Mesh(format) => format.label().into(),
         FileKind::Portolan => "a portolan map".into(),
         FileKind::PortolanFolder => "a folder with a portolan map".into(),

@@ -8,7 +8,7 @@ use std::time::Instant;
 use portolan::cell::LogOddsRule;
 use portolan::geom::Aabb;
 use portolan_io::{
-    AnyMapFile, IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server,
+    Container, map_dimension, IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server,
     write_octomap_bt, write_octomap_ot, write_svg,
 };
 

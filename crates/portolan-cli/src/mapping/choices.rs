@@ -1,6 +1,7 @@
 //! Values of settings that are chosen from a list.
 
-use portolan::map::{OccupancySweep, SweepKind};
+use portolan::map::BeamSweep;
+use portolan::sweep::OccupancySweep;
 use portolan::sweep::WeightModel;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -75,8 +76,8 @@ impl SweepArg {
     }
 
     /// As the library's 2-D maps have it.
-    pub(super) fn in_2d(self) -> SweepKind {
-        if self == Self::March { SweepKind::March } else { SweepKind::CellCentre }
+    pub(super) fn in_2d(self) -> BeamSweep {
+        if self == Self::March { BeamSweep::March } else { BeamSweep::CellCentre }
     }
 
     /// As the library's 3-D occupancy has it.

@@ -9,7 +9,7 @@ use portolan::map::{DerivedField, Tsdf};
 use portolan::store::{Store, Tree};
 use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, ThinWalls};
 use portolan::surface::{doubled_length, marching_cubes, marching_squares, thin_walls};
-use portolan_io::{AnyMapFile, MapFile, SpaceMapFile, TsdfBricks};
+use portolan_io::{Container, map_dimension, MapFile, TsdfBricks};
 
 use super::recipe::{esdf_settings, mesh_settings};
 use super::{MapKind, Settings};
@@ -55,7 +55,7 @@ impl Derived {
         }
     }
 
-    pub(crate) fn of_2d(file: &MapFile, settings: &Settings) -> Self {
+    pub(crate) fn of_2d(file: &MapFile<2>, settings: &Settings) -> Self {
         let mut derived = Self::default();
         let Some(tsdf) = &file.tsdf else { return derived };
         if settings.wants(MapKind::Contour) {
@@ -73,7 +73,7 @@ impl Derived {
         derived
     }
 
-    fn of_3d(file: &SpaceMapFile, settings: &Settings, memory: usize) -> Self {
+    fn of_3d(file: &MapFile<3>, settings: &Settings, memory: usize) -> Self {
         let mut derived = Self::default();
         if let Some(map) = &file.occupancy {
             derived.octree = derived.timed("octree", |_| Tree::from_bricks(&map.store));
@@ -98,7 +98,7 @@ impl Derived {
     /// The field, where the memory beside what is held allows it; else a note.
     fn esdf_3d(
         &mut self,
-        tsdf: &TsdfBricks,
+        tsdf: &TsdfBricks<3>,
         settings: &Settings,
         memory: usize,
         held: usize,
@@ -133,7 +133,7 @@ impl Derived {
 }
 
 impl ContourChecked {
-    fn of(contour: Contour, tsdf: &Tsdf<2>) -> Self {
+    fn of(contour: Contour, tsdf: &Tsdf2) -> Self {
         let doubled = doubled_length(&contour, DOUBLED_REACH);
         let thin = thin_walls(tsdf, &contour);
         Self { contour, doubled, thin }

@@ -6,7 +6,7 @@ use portolan::geom::vector::{along, distance};
 use portolan::geom::{Aabb, BLOCK_EDGE, Grid, Pose};
 use portolan::scan::Scan;
 use portolan::store::{Bricks, Store};
-use portolan_io::SpaceMapFile;
+use portolan_io::MapFile;
 use serde_json::Value;
 
 use super::recipe::MARGIN_CELLS;
@@ -27,7 +27,7 @@ pub(crate) enum Extent {
 
 impl Extent {
     /// Of a map in bricks.
-    pub(super) fn of_bricks(file: &SpaceMapFile) -> Self {
+    pub(super) fn of_bricks(file: &MapFile<3>) -> Self {
         let occupancy = file.occupancy.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
         let tsdf = file.tsdf.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
         Self::Three(occupancy.union(tsdf))

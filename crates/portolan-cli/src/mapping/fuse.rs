@@ -9,7 +9,7 @@ use portolan::geom::Pose;
 use portolan::map::MapError;
 use portolan::scan::{FrameFilter, Scan, ScanStats};
 use portolan_io::IoError;
-use portolan_io::space_log::SpaceLog;
+use portolan_io::scan_log::ScanLog;
 
 use super::maps::Filtered;
 use super::{Maps, Maps2, Maps3};
@@ -65,7 +65,7 @@ pub(crate) fn fuse_2d(
 
 /// Frames of a 3-D log.
 pub(crate) struct Frames<'a> {
-    pub(crate) log: &'a SpaceLog,
+    pub(crate) log: &'a ScanLog,
     pub(crate) indices: &'a [usize],
     pub(crate) filter: FrameFilter,
 }

@@ -29,7 +29,7 @@ pub(crate) fn seen_by_tree(map: &Quadtree) -> Option<Grid<2>> {
 
 /// The cells of a map_server map: from the occupancy grid, else from the signs of the distances, else from the tree.
 /// `None`: the file holds no map, or a tree that spans too much for an array.
-pub(crate) fn cells_for_map_server(file: &MapFile) -> Option<(Grid<2>, Vec<MapCell>)> {
+pub(crate) fn cells_for_map_server(file: &MapFile<2>) -> Option<(Grid<2>, Vec<MapCell>)> {
     let decide = |p: Option<f64>| match p {
         Some(p) if p > OCCUPIED => MapCell::Occupied,
         Some(p) if p < FREE => MapCell::Free,
@@ -58,7 +58,7 @@ pub(crate) fn cells_for_map_server(file: &MapFile) -> Option<(Grid<2>, Vec<MapCe
 }
 
 /// The grid of a saved map.
-pub(super) fn grid_of(file: &MapFile) -> Option<Grid<2>> {
+pub(super) fn grid_of(file: &MapFile<2>) -> Option<Grid<2>> {
     let dense = file.tsdf.as_ref().map(|m| *m.grid());
     dense
         .or_else(|| file.grid.as_ref().map(|m| *m.store().grid()))

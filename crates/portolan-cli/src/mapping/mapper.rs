@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use anyhow::bail;
 use portolan::geom::{Grid, Pose};
-use portolan::map::{SparseOccupancy, SparseTsdf};
+use portolan::map::{Occupancy, Tsdf3};
 use portolan::scan::Scan;
 use portolan::store::Store;
-use portolan_io::space_log::SpaceLog;
-use portolan_io::{AnyMapFile, CarmenLog, ColorBricks, MapFile, OccupancyBricks, SpaceMapFile, TsdfBricks};
+use portolan_io::scan_log::ScanLog;
+use portolan_io::{Container, map_dimension, CarmenLog, ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
 use serde_json::Map;
 
 use super::extent::{Extent, check_memory, grid_over, seen, with_outlier};
@@ -31,8 +31,8 @@ pub(crate) struct Limits<'a> {
 
 /// Scans that are to be fused, and the maps for them.
 pub(crate) enum Mapper<'a> {
-    Two { scans: Vec<(Pose<2>, Scan<2>)>, grid: Grid<2>, maps: Maps2, file: Box<MapFile> },
-    Three { frames: Frames<'a>, maps: Maps3, file: Box<SpaceMapFile> },
+    Two { scans: Vec<(Pose<2>, Scan<2>)>, grid: Grid<2>, maps: Maps2, file: Box<MapFile<2>> },
+    Three { frames: Frames<'a>, maps: Maps3, file: Box<MapFile<3>> },
 }
 
 impl<'a> Mapper<'a> {
@@ -62,7 +62,7 @@ impl<'a> Mapper<'a> {
         log: &CarmenLog,
         indices: &[usize],
         settings: &Settings,
-        before: Option<Box<MapFile>>,
+        before: Option<Box<MapFile<2>>>,
         limits: &Limits,
     ) -> anyhow::Result<Self> {
         let scans = log::scans(log, indices, &settings.limits().limits(log));
@@ -89,10 +89,10 @@ impl<'a> Mapper<'a> {
 
     /// Maps in bricks, which grow with what is seen: frames are read while they are fused.
     fn new_3d(
-        log: &'a SpaceLog,
+        log: &'a ScanLog,
         indices: &'a [usize],
         settings: &Settings,
-        before: Option<Box<SpaceMapFile>>,
+        before: Option<Box<MapFile<3>>>,
         limits: &Limits,
     ) -> anyhow::Result<Self> {
         let bounds = settings.bounds.map(|bounds| bounds.in_3d("the log")).transpose()?;
@@ -166,22 +166,22 @@ fn check_held(settings: &Settings, held: &[(MapKind, bool)], map: &str) -> anyho
 }
 
 /// The maps of a file, to go on with; they are taken out of it.
-fn saved_3d(file: &mut SpaceMapFile, settings: &Settings, limits: &Limits) -> anyhow::Result<Maps3> {
+fn saved_3d(file: &mut MapFile<3>, settings: &Settings, limits: &Limits) -> anyhow::Result<Maps3> {
     let held = [(MapKind::Tree, file.occupancy.is_some()), (MapKind::Tsdf, file.tsdf.is_some())];
     check_held(settings, &held, limits.map)?;
     let occupancy = file
         .occupancy
         .take()
-        .map(|o| SparseOccupancy::from_store(o.store, o.model, settings.sweep().in_3d()));
+        .map(|o| Occupancy::from_store(o.store, o.model, settings.sweep().in_3d()));
     let tsdf = file.tsdf.take().map(|t| {
         let config = recipe::tsdf_3d(settings, t.store.lattice().origin);
-        SparseTsdf::from_stores(t.store, file.colors.take().map(|c| c.store), config)
+        Tsdf3::from_stores(t.store, file.colors.take().map(|c| c.store), config)
     });
     Ok(Maps3 { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()?, memory: limits.memory })
 }
 
 /// Puts the maps into a file.
-fn store_3d(maps: Maps3, file: &mut SpaceMapFile) {
+fn store_3d(maps: Maps3, file: &mut MapFile<3>) {
     file.occupancy = maps.occupancy.map(|map| {
         let model = *map.model();
         OccupancyBricks { store: map.into_store(), model, more: Map::new() }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Grid, Lattice, Pose};
-use portolan::map::{MapError, MapRepr, OccupancyGrid, Quadtree, SparseOccupancy, SparseTsdf, Tsdf};
+use portolan::map::{MapError, MapRepr, OccupancyGrid, Quadtree, Occupancy, Tsdf3, Tsdf};
 use portolan::scan::{BeamCounts, Frame, Scan, ScanStats};
 
 use super::recipe;
@@ -37,7 +37,7 @@ pub(crate) trait Maps<const D: usize> {
 pub(crate) struct Maps2 {
     pub(crate) grid: Option<OccupancyGrid<2>>,
     pub(crate) tree: Option<Quadtree>,
-    pub(crate) tsdf: Option<Tsdf<2>>,
+    pub(crate) tsdf: Option<Tsdf2>,
     /// Whether free space goes into the signed distances.
     pub(crate) carve: bool,
 }
@@ -49,7 +49,7 @@ impl Maps2 {
         let made = |kind| settings.wants(kind);
         let tsdf = || Tsdf::new(recipe::tsdf_2d(settings).with_grid(grid));
         Ok(Self {
-            grid: made(MapKind::Grid).then(|| OccupancyGrid::new(*grid, model)).transpose()?,
+            grid: made(MapKind::Grid).then(|| OccupancyGrid::covering(*grid, model)).transpose()?,
             tree: made(MapKind::Tree).then(|| Quadtree::covering(grid, model)).transpose()?,
             tsdf: made(MapKind::Tsdf).then(tsdf).transpose()?,
             carve: settings.shape.carve,
@@ -98,8 +98,8 @@ impl Maps<2> for Maps2 {
 /// The maps of 3-D scans.
 #[derive(Default)]
 pub(crate) struct Maps3 {
-    pub(crate) occupancy: Option<SparseOccupancy>,
-    pub(crate) tsdf: Option<SparseTsdf>,
+    pub(crate) occupancy: Option<Occupancy>,
+    pub(crate) tsdf: Option<Tsdf3>,
     /// What they may take together (bytes).
     pub(crate) memory: usize,
 }
@@ -114,8 +114,8 @@ impl Maps3 {
     /// Empty maps on a lattice with this origin.
     pub(crate) fn new(settings: &Settings, origin: [f64; 3], memory: usize) -> anyhow::Result<Self> {
         let lattice = Lattice::new(origin, settings.resolution());
-        let occupancy = || SparseOccupancy::new(lattice, OccupancyModel::default(), settings.sweep().in_3d());
-        let tsdf = || SparseTsdf::new(recipe::tsdf_3d(settings, origin));
+        let occupancy = || Occupancy::new(lattice, OccupancyModel::default(), settings.sweep().in_3d());
+        let tsdf = || Tsdf3::new(recipe::tsdf_3d(settings, origin));
         Ok(Self {
             occupancy: settings.wants(MapKind::Tree).then(occupancy).transpose()?,
             tsdf: settings.wants(MapKind::Tsdf).then(tsdf).transpose()?,
@@ -135,14 +135,14 @@ impl Maps<3> for Maps3 {
     ) -> Result<ScanStats, MapError> {
         let mut last = ScanStats::default();
         if let Some(map) = &mut self.occupancy {
-            let others = self.tsdf.as_ref().map_or(0, SparseTsdf::memory_bytes);
+            let others = self.tsdf.as_ref().map_or(0, Tsdf3::memory_bytes);
             map.set_limit(self.memory.saturating_sub(others));
             let (stats, seconds) = timed(|| map.integrate(pose, frame));
             last = stats?;
             report.add("tree", seconds, &last);
         }
         if let Some(map) = &mut self.tsdf {
-            let others = self.occupancy.as_ref().map_or(0, SparseOccupancy::memory_bytes);
+            let others = self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes);
             map.set_limit(self.memory.saturating_sub(others));
             let (stats, seconds) = timed(|| map.integrate(pose, frame));
             last = stats?;

@@ -1,7 +1,7 @@
 //! The recipe: the numbers that make maps fit each other, where the settings leave them open.
 
 use portolan::field::SparseEsdfSettings;
-use portolan::map::{PointSweep, SparseTsdfConfig, TsdfConfig};
+use portolan::map::{PointSweep, TsdfConfig, TsdfConfig};
 use portolan::surface::MeshSettings;
 use portolan::sweep::WeightModel;
 
@@ -39,9 +39,9 @@ pub(super) fn tsdf_2d(settings: &Settings) -> TsdfConfig<2> {
 }
 
 /// The 3-D signed distances, on a lattice with this origin.
-pub(super) fn tsdf_3d(settings: &Settings, origin: [f64; 3]) -> SparseTsdfConfig {
+pub(super) fn tsdf_3d(settings: &Settings, origin: [f64; 3]) -> TsdfConfig {
     let (resolution, truncation) = (settings.resolution(), settings.truncation());
-    SparseTsdfConfig {
+    TsdfConfig {
         resolution,
         origin,
         truncation,
@@ -53,7 +53,7 @@ pub(super) fn tsdf_3d(settings: &Settings, origin: [f64; 3]) -> SparseTsdfConfig
         sweep: if settings.sweep() == SweepArg::Exact { PointSweep::Rays } else { PointSweep::Projective },
         // What is beyond the caller's limit is cut before; the map's own is as far as it reaches.
         max_range: FARTHEST_CELLS * resolution - truncation,
-        ..SparseTsdfConfig::default()
+        ..TsdfConfig::default()
     }
 }
 

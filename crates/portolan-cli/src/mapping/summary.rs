@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use portolan_io::AnyMapFile;
+use portolan_io::Container, map_dimension;
 use serde_json::{Value, json};
 
 use super::extent::Extent;

@@ -1,7 +1,7 @@
 //! Where maps of the engine meet what a file holds of them: cells and settings.
 
 use portolan::cell::{LogOdds8, OccupancyModel, SignedDistance};
-use portolan::map::{MapError, OccupancyGrid, BeamSweep, TreeMap, Tsdf, TsdfConfig};
+use portolan::map::{BeamSweep, DenseTsdf, MapError, OccupancyGrid, OccupancyTree, TsdfConfig};
 use portolan::store::{Bricks, Dense, Tree};
 use portolan::sweep::WeightModel;
 use serde_json::{Map, Value};
@@ -25,9 +25,9 @@ pub(super) fn saved_grid<const D: usize>(
 }
 
 pub(super) fn saved_tree<const D: usize>(
-    map: &TreeMap<D>,
+    map: &OccupancyTree<D>,
 ) -> Saved<'_, Tree<LogOdds8, D>, OccupancySettings> {
-    Saved { store: map.tree(), settings: OccupancySettings { model: *map.model(), more: Map::new() } }
+    Saved { store: map.store(), settings: OccupancySettings { model: *map.model(), more: Map::new() } }
 }
 
 pub(super) fn saved_tsdf<const D: usize>(map: &DenseTsdf<D>) -> Saved<'_, Dense<SignedDistance, D>, TsdfSettings> {
@@ -37,7 +37,7 @@ pub(super) fn saved_tsdf<const D: usize>(map: &DenseTsdf<D>) -> Saved<'_, Dense<
         w_max: Some(config.w_max).filter(|w| w.is_finite()),
         carve_weight: config.carve_weight,
         weights: weights_word(config.weights).into(),
-        more: [(SWEEP.to_owned(), Value::from(sweep_word(config.sweep)))].into_iter().collect(),
+        more: [(SWEEP.to_owned(), Value::from(sweep_word(config.beams)))].into_iter().collect(),
     };
     Saved { store: map.store(), settings }
 }
@@ -71,23 +71,23 @@ pub(super) fn grid_of<const D: usize>(
 pub(super) fn tree_of<const D: usize>(
     store: Tree<LogOdds8, D>,
     model: OccupancyModel,
-) -> Result<TreeMap<D>, MapError> {
-    TreeMap::from_tree(store, model)
+) -> Result<OccupancyTree<D>, MapError> {
+    OccupancyTree::from_store(store, model)
 }
 
 pub(super) fn tsdf_of<const D: usize>(
     store: Dense<SignedDistance, D>,
     settings: &TsdfSettings,
     weights: WeightModel,
-    sweep: BeamSweep,
+    beams: BeamSweep,
 ) -> Result<DenseTsdf<D>, MapError> {
     let config = TsdfConfig {
         truncation: settings.truncation,
         w_max: settings.w_max(),
         carve_weight: settings.carve_weight,
-        sweep,
+        beams,
         weights,
         ..TsdfConfig::default()
     };
-    Tsdf::from_store(store, config)
+    DenseTsdf::from_stores(store, None, config)
 }

@@ -4,7 +4,7 @@ use portolan::cell::{
     Cell, ColorBrick, DistanceBrick, DistancePlanes, LogOdds8, OccupancyModel, Planes, SignedDistance,
 };
 use portolan::geom::{BlockKey, Grid, Lattice, Pose, block_cells};
-use portolan::map::{OccupancyGrid, TreeMap, Tsdf, TsdfConfig};
+use portolan::map::{OccupancyGrid, OccupancyTree, Tsdf, TsdfConfig};
 use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan::sweep::WeightModel;
 use serde_json::{Map, Value, json};
@@ -124,7 +124,7 @@ fn full<const D: usize>(seed: u64) -> MapFile<D> {
             ..Default::default()
         },
         grid: Some(OccupancyGrid::from_store(dense, model).unwrap()),
-        tree: Some(TreeMap::from_tree(Tree::from_bricks(&near).unwrap(), model).unwrap()),
+        tree: Some(OccupancyTree::from_tree(Tree::from_bricks(&near).unwrap(), model).unwrap()),
         tsdf: Some(Tsdf::from_store(Dense::from_planes(grid, planes).unwrap(), config).unwrap()),
         occupancy_bricks: Some(occupancy),
         tsdf_bricks: Some(tsdf),

@@ -108,14 +108,7 @@ pub fn lidar_frame(
         values.push(value as f32);
     }
     if lidar.organized {
-        scan.image = Some(RangeImage {
-            projection: Projection::Spherical(lidar.projection()),
-            columns: lidar.columns,
-            rows: lidar.rings,
-            values,
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        });
+        scan.image = Some(RangeImage::from_ranges(lidar.projection(), lidar.columns, values));
     }
     Frame::Points(scan)
 }

@@ -3,8 +3,7 @@
 //! The scores take closures, so that they fit any map.
 
 use super::world::World3;
-use crate::Random;
-use portolan::gallery::{ErrorSummary, Truth};
+use crate::{ErrorSummary, Random, Truth};
 use portolan::geom::vector::{along, distance, dot, norm, scale, sub};
 use portolan::geom::{Aabb, Pose};
 use portolan::scan::Frame;

@@ -120,7 +120,7 @@ fn a_link_shows_the_same_and_files_can_be_taken_away() {
 }
 
 /// A surface that fills a cube, of four million triangles.
-fn gyroid() -> SparseTsdf {
+fn gyroid() -> Tsdf3 {
     const CELLS: i32 = 184;
     const PERIOD: f64 = 16.0;
     let mut store = Bricks::new(Lattice::new([0.0; 3], 0.05));

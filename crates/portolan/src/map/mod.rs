@@ -41,7 +41,9 @@ pub type Tsdf2 = DenseTsdf<2>;
 pub type Tsdf3 = Tsdf<3>;
 /// An occupancy map over all cells of a grid, one byte each.
 pub type OccupancyGrid<const D: usize> = Occupancy<D, LogOdds8, Dense<LogOdds8, D>>;
+/// An occupancy map in a pruned tree, one byte a cell.
+pub type OccupancyTree<const D: usize> = Occupancy<D, LogOdds8, Tree<LogOdds8, D>>;
 /// A 2-D occupancy map in a pruned tree.
-pub type Quadtree = Occupancy<2, LogOdds8, Tree<LogOdds8, 2>>;
+pub type Quadtree = OccupancyTree<2>;
 /// A 3-D occupancy map in a pruned tree.
-pub type Octree = Occupancy<3, LogOdds8, Tree<LogOdds8, 3>>;
+pub type Octree = OccupancyTree<3>;

@@ -24,7 +24,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
     /// lattice's cell 0, so that nodes lie as in the trees of OctoMap. `None` where a brick is beyond 2^27 cells from
     /// there. The tree's cell 0 is the lattice's cell `-2^(depth - 1)` along each axis. O(cells).
     pub fn from_bricks(bricks: &Bricks<V, D>) -> Option<Self> {
-        // Bits of the brick index that is furthest away.
+        // Bits of the brick index that is farthest away.
         let bits = |key: i32| i32::BITS - key.max(!key).leading_zeros();
         let largest = bricks.bricks_by_age().flat_map(|(key, _)| key.0.map(bits)).max().unwrap_or(0);
         let depth = largest + BLOCK_HEIGHT + 1;

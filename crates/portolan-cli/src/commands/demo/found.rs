@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::geom::Grid;
-use portolan_io::AnyMapFile;
+use portolan_io::Container, map_dimension;
 use portolan_sim::{LapConfig, World};
 use serde_json::{Value, json};
 

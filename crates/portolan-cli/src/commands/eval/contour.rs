@@ -12,7 +12,7 @@ use super::nearest::SegmentIndex;
 use super::spread::Spread;
 use super::{Args, Part, no_tsdf, predict};
 
-pub(super) fn evaluate(args: &Args, file: &MapFile) -> anyhow::Result<Vec<Part>> {
+pub(super) fn evaluate(args: &Args, file: &MapFile<2>) -> anyhow::Result<Vec<Part>> {
     let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let contour = marching_squares(tsdf, &ContourSettings::of(tsdf));
     let doubled = doubled_length(&contour, 0.15);

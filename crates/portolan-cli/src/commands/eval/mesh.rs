@@ -8,13 +8,13 @@ use portolan::surface::{
     CompareSettings, Mesh, MeshSettings, Reference, SurfaceComparison, SurfaceDistances, compare_surfaces,
     marching_cubes,
 };
-use portolan_io::{PlyMesh, PointCloudFile, SpaceMapFile, TsdfBricks, open, read_ply_mesh, read_points};
+use portolan_io::{PlyMesh, PointCloudFile, MapFile, TsdfBricks, open, read_ply_mesh, read_points};
 use serde_json::{Value, json};
 
 use super::{Args, Part, no_tsdf, predict};
 use crate::mapping::mesh_settings;
 
-pub(super) fn evaluate(args: &Args, file: &SpaceMapFile) -> anyhow::Result<Vec<Part>> {
+pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Part>> {
     let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let settings = MeshSettings { normals: false, colors: false, ..mesh_settings(tsdf.weights) };
     let mesh = marching_cubes(&tsdf.store, None, &settings);
@@ -37,7 +37,7 @@ pub(super) fn evaluate(args: &Args, file: &SpaceMapFile) -> anyhow::Result<Vec<P
 fn compare(
     args: &Args,
     mesh: &Mesh,
-    tsdf: &TsdfBricks,
+    tsdf: &TsdfBricks<3>,
     min_weight: f32,
     path: &Path,
 ) -> anyhow::Result<Part> {

@@ -93,7 +93,7 @@ impl<'a> Task<'a> {
 }
 
 /// Predicts 2-D scans.
-pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf<2>) -> anyhow::Result<Part> {
+pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf2) -> anyhow::Result<Part> {
     let task = Task::new(args, path, header);
     let log = log::read_2d(path, &args.source)?;
     let limits = LimitArgs { range: task.range(), no_return: args.limits.no_return };
@@ -124,7 +124,7 @@ pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf<2>
 }
 
 /// Predicts 3-D scans.
-pub(super) fn in_3d(args: &Args, path: &Path, header: &MapHeader, tsdf: &TsdfBricks) -> anyhow::Result<Part> {
+pub(super) fn in_3d(args: &Args, path: &Path, header: &MapHeader, tsdf: &TsdfBricks<3>) -> anyhow::Result<Part> {
     let task = Task::new(args, path, header);
     let log = log::read_3d(path, &args.source, false)?;
     let filter = task.range().filter(task.settings.shape.self_filter.clone())?;

@@ -1,7 +1,7 @@
 //! `info` of a log.
 
 use portolan::geom::Aabb;
-use portolan_io::space_log::{CameraFrom, SpaceLog};
+use portolan_io::scan_log::{CameraFrom, ScanLog};
 use portolan_io::{CarmenLog, detect_no_return};
 use serde_json::{Value, json};
 
@@ -31,7 +31,7 @@ pub(super) fn of_2d(log: &CarmenLog) -> Value {
     })
 }
 
-pub(super) fn of_3d(log: &SpaceLog) -> Value {
+pub(super) fn of_3d(log: &ScanLog) -> Value {
     let camera = log.camera().map(|camera| {
         let p = &camera.pinhole;
         let from = match &camera.from {

@@ -3,7 +3,7 @@
 use portolan::cell::{Cell, Planes};
 use portolan::map::MapRepr;
 use portolan::store::{Bricks, Store};
-use portolan_io::{MapFile, MapHeader, SpaceMapFile};
+use portolan_io::{MapFile, MapHeader};
 use serde_json::{Value, json};
 
 use crate::json;
@@ -23,7 +23,7 @@ fn of_header(dimension: usize, header: &MapHeader, poses: usize, maps: Value) ->
     })
 }
 
-pub(super) fn of_2d(file: &MapFile) -> Value {
+pub(super) fn of_2d(file: &MapFile<2>) -> Value {
     let mut maps = json!({});
     if let Some(map) = &file.grid {
         maps["grid"] = json!({
@@ -55,7 +55,7 @@ pub(super) fn of_2d(file: &MapFile) -> Value {
     of_header(2, &file.header, file.poses.len(), maps)
 }
 
-pub(super) fn of_3d(file: &SpaceMapFile) -> Value {
+pub(super) fn of_3d(file: &MapFile<3>) -> Value {
     let mut maps = json!({});
     if let Some(map) = &file.occupancy {
         maps["tree"] = of_bricks("log odds, one byte", &map.store);

@@ -48,7 +48,7 @@ impl Source {
         Self { logs: logs.clone(), walk }
     }
 
-    fn recorded(&self) -> Option<&SpaceLog> {
+    fn recorded(&self) -> Option<&ScanLog> {
         match &self.logs.source_3d {
             Source3d::Recorded { log, .. } => Some(log),
             Source3d::Building | Source3d::Map { .. } => None,
@@ -72,7 +72,7 @@ impl Source {
     }
 
     /// The map that stands for frames.
-    pub(super) fn map(&self) -> Option<&SparseTsdf> {
+    pub(super) fn map(&self) -> Option<&Tsdf3> {
         match &self.logs.source_3d {
             Source3d::Map { tsdf, .. } => Some(tsdf),
             Source3d::Building | Source3d::Recorded { .. } => None,

@@ -217,7 +217,7 @@ impl View3d {
             "bricks": tsdf.store().len(),
             "bytes": {
                 "tsdf": tsdf.memory_bytes(),
-                "occupancy": maps.occupancy.as_ref().map(SparseOccupancy::memory_bytes),
+                "occupancy": maps.occupancy.as_ref().map(Occupancy::memory_bytes),
                 "esdf": maps.esdf.as_ref().map(SparseEsdf::memory_bytes),
                 "mesh": maps.mesh.memory_bytes(),
             },

@@ -44,8 +44,8 @@ impl<const D: usize> Esdf<D> {
         let limit = reach * reach;
         let whole = dirty.len() == self.keys.len();
         let around = if whole { dirty.to_vec() } else { self.held(within(dirty, (reach + 1.0).powi(2))) };
-        let furthest = furthest_of_cells::<D>();
-        let witnesses = parallel::map(&around, TOGETHER, |&key| self.unknown_near(store, key, &furthest));
+        let farthest = furthest_of_cells::<D>();
+        let witnesses = parallel::map(&around, TOGETHER, |&key| self.unknown_near(store, key, &farthest));
         let mut wanted = dirty.iter().peekable();
         let outputs = around.iter().zip(bounds(&around, witnesses, limit));
         // Ways are half a cell shorter along each axis than those from centre to centre, of which bricks know.
@@ -79,11 +79,11 @@ impl<const D: usize> Esdf<D> {
         &self,
         store: &Bricks<SignedDistance, D>,
         key: BlockKey<D>,
-        furthest: &[f32],
+        farthest: &[f32],
     ) -> Option<Witness<D>> {
         let at = |cell| Witness { cell, offset: [0.0; D], value: 0.0 };
         let weights = store.brick(key).map_or(&[][..], |brick| brick.weights());
-        let cells = weights.iter().zip(furthest).enumerate();
+        let cells = weights.iter().zip(farthest).enumerate();
         let unknown = cells.filter(|(_, (w, _))| !observed(**w, self.min_weight()));
         let nearest = unknown.min_by(|a, b| a.1.1.total_cmp(b.1.1));
         if let Some((i, _)) = nearest {

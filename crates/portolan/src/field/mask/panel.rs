@@ -125,7 +125,7 @@ impl<L: Integer, const N: usize> Panel<L, N> {
         let Window { row, first, last } = window;
         let rows = &self.rows;
         let mut found = Found::at(rows, window);
-        let end = window.furthest() + 1;
+        let end = window.farthest() + 1;
         let within = |k: usize| ((row.saturating_sub(k)).max(first) as u32, (row + k).min(last) as u32);
         let near = if SPAN { NEAR } else { end };
         let (k, done) = found.look::<OFFSET>(rows, window, squares, 1, near);

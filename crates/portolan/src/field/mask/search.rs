@@ -30,7 +30,7 @@ impl Window {
 
     /// The last offset that may be needed.
     #[inline(always)]
-    pub(super) fn furthest(&self) -> usize {
+    pub(super) fn farthest(&self) -> usize {
         let (below, above) = self.sides();
         below.max(above)
     }
@@ -87,7 +87,7 @@ impl<L: Integer, const N: usize> Found<L, N> {
             }
             k = stop;
         }
-        (k, k > window.furthest())
+        (k, k > window.farthest())
     }
 
     /// Whether a sample at this cost can be less than what some lane has.

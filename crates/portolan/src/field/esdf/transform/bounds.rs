@@ -43,13 +43,13 @@ impl<const D: usize> Witness<D> {
     }
 }
 
-/// Squared distance of the cell of the brick at 0 that is the furthest from a point.
+/// Squared distance of the cell of the brick at 0 that is the farthest from a point.
 fn furthest_sq<const D: usize>(p: [f32; D]) -> f32 {
     let far = p.map(|c| c.abs().max((BLOCK_EDGE as f32 - 1.0 - c).abs()));
     far.iter().map(|f| f * f).sum()
 }
 
-/// Of each cell of a brick: squared distance of the cell that is the furthest from it.
+/// Of each cell of a brick: squared distance of the cell that is the farthest from it.
 pub(crate) fn furthest_of_cells<const D: usize>() -> Vec<f32> {
     let of = |i| furthest_sq(BlockKey([0; D]).cell(i).map(|c| c as f32));
     (0..block_cells::<D>()).map(of).collect()

@@ -54,15 +54,15 @@ impl CellRule {
     }
 }
 
-/// Whether any cell was observed, and the least of `f + furthest` of the seeds (infinity: no seed).
+/// Whether any cell was observed, and the least of `f + farthest` of the seeds (infinity: no seed).
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
-pub(crate) fn survey(distances: &[f32], weights: &[f32], furthest: &[f32], rule: &CellRule) -> (bool, f32) {
+pub(crate) fn survey(distances: &[f32], weights: &[f32], farthest: &[f32], rule: &CellRule) -> (bool, f32) {
     const LANES: usize = 16;
     let inverse = rule.inverse();
     let mut best = [f32::INFINITY; LANES];
     let mut observed = [0u32; LANES];
     let chunks = distances.chunks_exact(LANES).zip(weights.chunks_exact(LANES));
-    for ((d, w), far) in chunks.zip(furthest.chunks_exact(LANES)) {
+    for ((d, w), far) in chunks.zip(farthest.chunks_exact(LANES)) {
         for i in 0..LANES {
             observed[i] |= u32::from(rule.observed(w[i]));
             let bound = rule.seed(inverse, d[i], w[i]) + far[i];

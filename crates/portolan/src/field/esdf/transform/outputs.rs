@@ -41,16 +41,16 @@ pub(crate) fn bricks_within(budget: f32) -> i32 {
 /// brick within reach, less what the way along the axis costs at least. In the same order.
 pub(crate) fn needed<const D: usize>(stage: &[Output<D>], axis: usize) -> Vec<Output<D>> {
     let mut needed = Vec::with_capacity(2 * stage.len());
-    let furthest = stage.iter().map(|r| bricks_within(r.budget)).max().unwrap_or(0);
+    let farthest = stage.iter().map(|r| bricks_within(r.budget)).max().unwrap_or(0);
     // Budgets of neighbouring bricks of a line, from `start` on; negative: not needed.
     let (mut start, mut budgets) = (0, Vec::new());
     for line in stage.chunk_by(|a, b| same_line(&a.key, &b.key, axis)) {
         for reach in line {
             let (at, far) = (reach.key.0[axis], bricks_within(reach.budget));
-            if at - furthest >= start + budgets.len() as i32 || budgets.is_empty() {
+            if at - farthest >= start + budgets.len() as i32 || budgets.is_empty() {
                 // Nothing that follows reaches back to what is collected.
                 flush(line[0].key, axis, start, &mut budgets, &mut needed);
-                start = at - furthest;
+                start = at - farthest;
             }
             let length = (at + far - start + 1) as usize;
             budgets.resize(budgets.len().max(length), -1.0f32);

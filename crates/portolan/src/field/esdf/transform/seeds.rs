@@ -48,7 +48,7 @@ pub(crate) struct SeedMap<'a, const D: usize> {
 impl<'a, const D: usize> SeedMap<'a, D> {
     pub(crate) fn of(store: &'a Bricks<SignedDistance, D>, rule: &'a CellRule) -> Self {
         let places = (0..block_cells::<D>()).map(|i| layout::<D>(0, i) as u16).collect();
-        let furthest = furthest_of_cells::<D>();
+        let farthest = furthest_of_cells::<D>();
         let keys = store.keys();
         let mut found: Vec<(bool, Option<Witness<D>>)> = vec![(false, None); keys.len()];
         // A brick is too little for a task.
@@ -59,7 +59,7 @@ impl<'a, const D: usize> SeedMap<'a, D> {
             |(keys, found), ()| {
                 for (&key, found) in keys.iter().zip(found) {
                     if let Some(brick) = store.brick(key) {
-                        *found = look(key, brick, &furthest, rule);
+                        *found = look(key, brick, &farthest, rule);
                     }
                 }
             },
@@ -98,15 +98,15 @@ const SURVEYED: usize = 256;
 fn look<const D: usize>(
     key: BlockKey<D>,
     brick: &DistanceBrick,
-    furthest: &[f32],
+    farthest: &[f32],
     rule: &CellRule,
 ) -> (bool, Option<Witness<D>>) {
-    let (observed, best) = survey(brick.distances(), brick.weights(), furthest, rule);
+    let (observed, best) = survey(brick.distances(), brick.weights(), farthest, rule);
     if best == f32::INFINITY {
         return (observed, None);
     }
-    let mut values = vec![0.0; furthest.len()];
+    let mut values = vec![0.0; farthest.len()];
     seeds(brick.distances(), brick.weights(), rule, &mut values);
-    let at = values.iter().zip(furthest).position(|(value, far)| value + far == best);
+    let at = values.iter().zip(farthest).position(|(value, far)| value + far == best);
     (observed, at.map(|i| Witness { cell: key.cell(i), offset: [0.0; D], value: values[i] }))
 }
