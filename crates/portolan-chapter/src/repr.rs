@@ -1,8 +1,10 @@
 //! The text's thesis as an interface: a map is what it can answer cheaply.
 
 use portolan::geom::Pose;
-use portolan::map::{Cloud, OccupancyGrid, OccupancyTree, Tsdf};
+use portolan::cell::{LogOdds8, SignedDistance};
+use portolan::map::{Cloud, MapError, Occupancy, Tsdf};
 use portolan::scan::{Scan, ScanStats};
+use portolan::store::Store;
 
 /// Which questions a representation answers at all, within its documented cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +21,10 @@ pub struct Abilities {
 /// means that it does not *know*.
 pub trait MapRepr<const D: usize> {
     /// Folds one scan in, with a known pose.
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats;
+    ///
+    /// # Errors
+    /// Where the map has no room for it, or it reaches too far.
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> Result<ScanStats, MapError>;
 
     /// P(occupied) at a point (world, metres). `None`: never observed, which is not 0.5.
     fn occupancy(&self, p_world: [f64; D]) -> Option<f64>;
@@ -35,8 +40,8 @@ pub trait MapRepr<const D: usize> {
     fn abilities(&self) -> Abilities;
 }
 
-impl<const D: usize> MapRepr<D> for OccupancyGrid<D> {
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
+impl<const D: usize, S: Store<LogOdds8, D>> MapRepr<D> for Occupancy<D, LogOdds8, S> {
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> Result<ScanStats, MapError> {
         self.integrate(world_from_sensor, scan)
     }
 
@@ -57,32 +62,9 @@ impl<const D: usize> MapRepr<D> for OccupancyGrid<D> {
     }
 }
 
-impl<const D: usize> MapRepr<D> for OccupancyTree<D> {
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
+impl<const D: usize, S: Store<SignedDistance, D>> MapRepr<D> for Tsdf<D, S> {
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> Result<ScanStats, MapError> {
         self.integrate(world_from_sensor, scan)
-    }
-
-    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
-        self.probability(p_world).known()
-    }
-
-    fn distance(&self, _: [f64; D]) -> Option<f64> {
-        None
-    }
-
-    fn memory_bytes(&self) -> usize {
-        self.memory_bytes()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { occupancy: true, distance: false }
-    }
-}
-
-impl<const D: usize> MapRepr<D> for DenseTsdf<D> {
-    /// With carving.
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        self.integrate(world_from_sensor, scan, true)
     }
 
     /// The sign of the estimate: 1 behind the surface, 0 in front of it.
@@ -104,8 +86,8 @@ impl<const D: usize> MapRepr<D> for DenseTsdf<D> {
 }
 
 impl<const D: usize> MapRepr<D> for Cloud<D> {
-    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> ScanStats {
-        self.integrate(world_from_sensor, scan)
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> Result<ScanStats, MapError> {
+        Ok(self.integrate(world_from_sensor, scan))
     }
 
     fn occupancy(&self, _: [f64; D]) -> Option<f64> {
@@ -131,13 +113,14 @@ mod tests {
     use super::*;
     use portolan::cell::OccupancyModel;
     use portolan::geom::Grid;
+    use portolan::map::OccupancyGrid;
 
     #[test]
     fn what_cannot_be_asked_is_not_what_is_not_known() {
         let mut grid =
-            OccupancyGrid::<2>::covering(Grid::new([0.0; 2], 0.1, [4; 2]), OccupancyModel::default()).unwrap();
+            OccupancyGrid::<2>::covering(&Grid::new([0.0; 2], 0.1, [4; 2]), OccupancyModel::default()).unwrap();
         let (no_scan, p) = (Scan::from_beams([]), [0.2, 0.2]);
-        assert_eq!(grid.integrate_scan(&Pose::IDENTITY, &no_scan).scans, 1);
+        assert_eq!(grid.integrate_scan(&Pose::IDENTITY, &no_scan).unwrap().scans, 1);
         assert_eq!((MapRepr::occupancy(&grid, p), MapRepr::distance(&grid, p)), (None, None));
         assert_eq!(grid.abilities(), Abilities { occupancy: true, distance: false });
         let cloud = Cloud::from_points([[0.2, 0.5]]);

@@ -44,6 +44,7 @@ pub mod field;
 pub mod geom;
 pub mod handover;
 pub mod map;
+pub mod mapper;
 mod parallel;
 pub mod plan;
 pub mod scan;
@@ -52,3 +53,4 @@ pub mod surface;
 pub mod sweep;
 
 pub use answer::{Answer, Status};
+pub use mapper::{Mapper, MapperSettings};

@@ -1,7 +1,7 @@
 //! The lap's poses: true, as the wheels have them, and as the pose graph corrects them.
 
 use portolan::geom::{Aabb, Grid, Pose};
-use portolan::map::{MapError, Tsdf, TsdfConfig};
+use portolan::map::{MapError, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use portolan_graph::GraphError;
@@ -91,23 +91,19 @@ impl Drift {
         }
     }
 
-    /// Maps the same scans with each set of poses and measures the contours.
-    pub(crate) fn measure_maps(
-        &mut self,
-        log: &Lap,
-        world: &World,
-        settings: &Settings,
-    ) -> anyhow::Result<()> {
-        let r = settings.resolution();
+    /// Maps the same scans with each set of poses, carving, and measures the contours. Of `config` all is taken but
+    /// the cells.
+    ///
+    /// # Errors
+    /// Where the settings of the map are not possible.
+    pub fn measure_maps(&mut self, log: &Lap, world: &World, config: &TsdfConfig<2>) -> Result<(), MapError> {
         // A multiple of cells around the box of the maps: the lattices coincide.
         let grid = Grid::covering(world.aabb().grown(ROOM), config.resolution);
         let Some(grid) = grid else { return Ok(()) };
-        let config =
-            TsdfConfig { truncation: settings.truncation(), w_max: settings.w_max(), ..Default::default() };
         for (k, set) in PoseSet::ALL.into_iter().enumerate() {
-            let mut tsdf = Tsdf2::new(config.with_grid(&grid))?;
+            let mut tsdf = Tsdf2::covering(&grid, *config)?;
             for (pose, (_, scan)) in self.poses(set).iter().zip(log) {
-                tsdf.integrate(pose, scan, settings.shape.carve);
+                tsdf.integrate(pose, scan)?;
             }
             let contour = marching_squares(&tsdf, &ContourSettings::default());
             let errors = contour.vertices.iter().map(|&v| world.signed_distance(v));

@@ -7,7 +7,7 @@ use super::row::{Cost, Row};
 use super::run::{Gallery, GallerySettings};
 use crate::memory::inner_only_node_bytes;
 use portolan::cell::OccupancyModel;
-use portolan::geom::{Grid, Pose};
+use portolan::geom::{Grid, Lattice, Pose};
 use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
 use portolan::scan::{Scan, ScanStats};
 use portolan::store::Store;
@@ -24,14 +24,14 @@ impl<M> Fused<M> {
         clock: &mut Clock<'_>,
         log: &[(Pose<2>, Scan<2>)],
         mut map: M,
-        mut fuse: impl FnMut(&mut M, &Pose<2>, &Scan<2>) -> ScanStats,
-    ) -> Self {
+        mut fuse: impl FnMut(&mut M, &Pose<2>, &Scan<2>) -> Result<ScanStats, MapError>,
+    ) -> Result<Self, MapError> {
         let start = clock();
         for (pose, scan) in log {
-            fuse(&mut map, pose, scan);
+            fuse(&mut map, pose, scan)?;
         }
         let update = (clock() - start) / log.len().max(1) as f64;
-        Self { map, update }
+        Ok(Self { map, update })
     }
 }
 
@@ -56,20 +56,20 @@ impl Maps {
         clock: &mut Clock<'_>,
     ) -> Result<Self, MapError> {
         let (grid, model) = (settings.grid, settings.model);
-        let config = settings.tsdf.with_grid(&grid);
-        let march = TsdfConfig { sweep: BeamSweep::March, ..config };
+        let carving = TsdfConfig { carve: true, ..settings.tsdf };
+        let banded = TsdfConfig { carve: false, ..settings.tsdf };
+        let march = TsdfConfig { beams: BeamSweep::March, ..carving };
         let in_tree = |map: &mut Quadtree, at: &Pose<2>, scan: &Scan<2>| map.integrate(at, scan);
-        let carving = |map: &mut Tsdf2, at: &Pose<2>, scan: &Scan<2>| map.integrate(at, scan, true);
+        let in_tsdf = |map: &mut Tsdf2, at: &Pose<2>, scan: &Scan<2>| map.integrate(at, scan);
 
-        let occupancy =
-            Fused::new(clock, log, OccupancyGrid::covering(grid, model)?, |map, at, scan| map.integrate(at, scan));
-        let tree = Fused::new(clock, log, Quadtree::covering(&grid, model)?, in_tree);
-        let chapter_tree = Fused::new(clock, log, chapter_tree(&grid, model)?, in_tree);
-        let tsdf = Fused::new(clock, log, Tsdf2::new(config)?, carving);
-        let banded =
-            Fused::new(clock, log, Tsdf2::new(config)?, |map, at, scan| map.integrate(at, scan, false));
-        let marched = Fused::new(clock, log, Tsdf2::new(march)?, carving);
-        let mut cloud = Fused::new(clock, log, Cloud::new(), |map, at, scan| map.integrate(at, scan));
+        let grid_of_bytes = OccupancyGrid::covering(&grid, model)?;
+        let occupancy = Fused::new(clock, log, grid_of_bytes, |map, at, scan| map.integrate(at, scan))?;
+        let tree = Fused::new(clock, log, Quadtree::covering(&grid, model)?, in_tree)?;
+        let chapter_tree = Fused::new(clock, log, chapter_tree(&grid, model)?, in_tree)?;
+        let tsdf = Fused::new(clock, log, Tsdf2::covering(&grid, carving)?, in_tsdf)?;
+        let banded = Fused::new(clock, log, Tsdf2::covering(&grid, banded)?, in_tsdf)?;
+        let marched = Fused::new(clock, log, Tsdf2::covering(&grid, march)?, in_tsdf)?;
+        let mut cloud = Fused::new(clock, log, Cloud::new(), |map, at, scan| Ok(map.integrate(at, scan)))?;
         let (cloud_build, ()) = seconds_of(clock, || cloud.map.rebuild());
         Ok(Self { occupancy, tree, chapter_tree, tsdf, banded, marched, cloud, cloud_build })
     }
@@ -78,7 +78,7 @@ impl Maps {
     fn rows(&self, segments: impl Fn(&Tsdf2) -> usize) -> Vec<Row> {
         let (occupancy, cloud, tsdf) = (&self.occupancy.map, &self.cloud.map, &self.tsdf.map);
         let nodes = |map: &Quadtree| {
-            format!("{} nodes, {} of them inner", map.tree().nodes(), map.tree().inner_nodes())
+            format!("{} nodes, {} of them inner", map.store().nodes(), map.store().inner_nodes())
         };
         let tree = |name, fused: &Fused<Quadtree>| {
             row(name, fused.map.memory_bytes(), Cost::direct(fused.update), nodes(&fused.map))
@@ -170,7 +170,7 @@ fn row(name: &str, memory_bytes: usize, update: Option<Cost>, note: String) -> R
 fn chapter_tree(grid: &Grid<2>, model: OccupancyModel) -> Result<Quadtree, MapError> {
     let extent = grid.aabb().extent().into_iter().fold(0.0, f64::max);
     let doublings = (extent / 16.0).log2().ceil().max(0.0) as u32;
-    Quadtree::new(grid.lattice.origin, 0.0625, 8 + doublings, model)
+    Quadtree::with_depth(Lattice::new(grid.lattice.origin, 0.0625), 8 + doublings, model)
 }
 
 fn tree_crossovers(settings: &GallerySettings, contour: &Contour, maps: &Maps) -> Vec<TreeCrossover> {
@@ -179,9 +179,9 @@ fn tree_crossovers(settings: &GallerySettings, contour: &Contour, maps: &Maps) -
     let plane = (settings.surface_length.unwrap_or(contour.length()), width * height);
     let dense = grid.len();
     let ours = inner_only_node_bytes::<2>(9.0);
-    let (fine, coarse) = (grid.lattice.resolution, chapter_tree.tree().lattice().resolution);
+    let (fine, coarse) = (grid.lattice.resolution, chapter_tree.store().lattice().resolution);
     vec![
-        TreeCrossover::new(CHAPTER_NODE, (20.0, coarse), plane, (20 * chapter_tree.tree().nodes(), dense)),
+        TreeCrossover::new(CHAPTER_NODE, (20.0, coarse), plane, (20 * chapter_tree.store().nodes(), dense)),
         TreeCrossover::new(OUR_NODE, (ours, fine), plane, (tree.memory_bytes(), dense)),
     ]
 }

@@ -5,7 +5,7 @@ use super::probes::{Clock, points, seconds_of, seconds_per_probe};
 use super::row::{Cost, Workload, winners};
 use super::run::Gallery;
 use crate::MapRepr;
-use portolan::field::Esdf2;
+use portolan::field::EsdfGrid;
 use portolan::geom::{Grid, vector};
 use portolan::map::{OccupancyGrid, Quadtree, Tsdf2};
 use portolan::store::Store;
@@ -107,13 +107,13 @@ fn occupancy_contour(grid: &Grid<2>, value: impl Fn([i32; 2]) -> Option<i8>) -> 
 }
 
 /// 1 where the distance of the cell that holds a point is negative, 0 where it is not; `None` where it is unknown.
-pub(super) fn sign_of(field: &Esdf2, p: [f64; 2]) -> Option<f64> {
+pub(super) fn sign_of(field: &EsdfGrid<2>, p: [f64; 2]) -> Option<f64> {
     let d = *field.samples().get(field.grid().index_of(p)?)?;
     (!d.is_nan()).then_some(if d < 0.0 { 1.0 } else { 0.0 })
 }
 
 /// Where a distance field is zero.
-pub(super) fn zero_of(field: &crate::field::EsdfGrid<2>) -> Contour {
+pub(super) fn zero_of(field: &EsdfGrid<2>) -> Contour {
     let samples = field.samples();
     level_set(field.grid(), samples, |i| !samples[i].is_nan(), Ambiguity::Decide)
 }

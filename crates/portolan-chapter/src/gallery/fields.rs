@@ -1,9 +1,10 @@
 //! One distance field by each method.
 
 use super::probes::{Clock, seconds_of};
-use crate::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings};
-use crate::geom::vector;
-use crate::map::Tsdf2;
+use portolan::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings};
+use portolan::geom::vector;
+use portolan::map::Tsdf2;
+use portolan_sim::ErrorSummary;
 
 /// A distance field of the TSDF, and how far to trust it.
 #[derive(Debug)]

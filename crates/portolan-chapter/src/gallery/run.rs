@@ -8,7 +8,7 @@ use super::fields::MeasuredField;
 use super::probes::{Clock, points};
 use super::row::{Row, Winner, Workload};
 use portolan::cell::OccupancyModel;
-use portolan::field::{Esdf2, EsdfSettings};
+use portolan::field::{EsdfGrid, EsdfSettings};
 use portolan::geom::{Grid, Pose};
 use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
@@ -21,7 +21,7 @@ pub struct GallerySettings {
     /// The cells of the dense maps.
     pub grid: Grid<2>,
     /// The TSDF; its grid is replaced by `grid`.
-    pub tsdf: TsdfConfig,
+    pub tsdf: TsdfConfig<2>,
     /// The occupancy filter of grid and trees.
     pub model: OccupancyModel,
     /// Contour extraction.
@@ -71,7 +71,7 @@ pub struct Gallery {
 
 impl Gallery {
     /// The accurate distance field.
-    pub fn distance(&self) -> &Esdf2 {
+    pub fn distance(&self) -> &EsdfGrid<2> {
         &self.fields[0].field
     }
 
@@ -95,7 +95,8 @@ pub fn run(
     let grid = settings.grid;
     let mut gallery = build(log, settings, clock)?;
     let everywhere = points(&grid.aabb(), settings.probes);
-    let free = observed_free(&gallery.tsdf, settings.esdf.min_weight, truth);
+    let min_weight = settings.esdf.min_weight.unwrap_or(gallery.tsdf.thresholds().observed);
+    let free = observed_free(&gallery.tsdf, min_weight, truth);
     hold_against_truth(&mut gallery, &Asker { truth, free, everywhere: &everywhere, grid });
     for workload in Workload::ALL {
         gallery.measure(workload, settings.probes, clock);

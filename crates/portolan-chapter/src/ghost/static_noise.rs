@@ -2,7 +2,7 @@
 
 use super::GhostSettings;
 use portolan::geom::{Aabb, Grid};
-use portolan::map::{MapError, Tsdf, TsdfConfig};
+use portolan::map::{MapError, Tsdf2, TsdfConfig};
 use portolan_sim::{LapConfig, apartment, lap};
 
 /// Noise of a map of a world in which nothing moves.

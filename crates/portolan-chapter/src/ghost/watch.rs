@@ -4,7 +4,7 @@ use super::followed::{Fate, Followed, GhostGroup};
 use super::run::{StoreCell, cells_in, old_place};
 use portolan::cell::{FusionEvent, TsdfRule};
 use portolan::geom::Aabb;
-use portolan::map::Tsdf;
+use portolan::map::Tsdf2;
 use portolan_sim::World;
 
 /// Cells where a thing stood and where it stands now, and what scans did to them since it moved.

@@ -2,7 +2,7 @@
 
 use super::{DenseTsdf, Tsdf};
 use crate::cell::SignedDistance;
-use crate::store::{Bricks, Store};
+use crate::store::{Bricks, Dense, Store};
 use crate::sweep::WeightModel;
 use std::borrow::Cow;
 
@@ -36,6 +36,11 @@ pub trait DistanceMap<const D: usize> {
 
     /// Its cells in bricks; of a dense map a copy, O(cells).
     fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>>;
+
+    /// Its cells in a dense array, if that is what holds them.
+    fn dense(&self) -> Option<&Dense<SignedDistance, D>> {
+        None
+    }
 }
 
 impl<const D: usize> DistanceMap<D> for Bricks<SignedDistance, D> {
@@ -65,6 +70,10 @@ impl<const D: usize> DistanceMap<D> for DenseTsdf<D> {
 
     fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>> {
         Cow::Owned(self.store().into())
+    }
+
+    fn dense(&self) -> Option<&Dense<SignedDistance, D>> {
+        Some(self.store())
     }
 }
 

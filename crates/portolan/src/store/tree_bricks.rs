@@ -47,6 +47,22 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         Some(tree)
     }
 
+    /// The cells of bricks in this tree, brick by brick; those outside of its root are left out. `None` where the lattices
+    /// do not coincide. O(cells).
+    pub fn with_bricks(mut self, bricks: &Bricks<V, D>) -> Option<Self> {
+        if *bricks.lattice() != self.lattice {
+            return None;
+        }
+        let mut in_order: Vec<_> =
+            bricks.bricks_by_age().filter(|(key, _)| self.inside(key.first_cell())).collect();
+        in_order.sort_unstable_by_key(|(key, _)| interleaved(*key));
+        for (key, brick) in in_order {
+            self.set_block(key, &brick.cells());
+        }
+        self.compact();
+        Some(self)
+    }
+
     /// The cells of the tree as bricks on `lattice`, which may take `limit` bytes. O(blocks with an observed cell): a
     /// leaf that is large in the tree is many bricks.
     ///

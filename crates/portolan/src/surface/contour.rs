@@ -67,6 +67,11 @@ impl Contour {
         })
     }
 
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.vertices.capacity() * size_of::<[f64; 2]>() + self.segments.capacity() * size_of::<[u32; 2]>()
+    }
+
     /// The segments joined end to end.
     pub fn polylines(&self) -> Vec<Polyline> {
         super::polyline::join(self)

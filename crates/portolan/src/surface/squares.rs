@@ -1,8 +1,9 @@
 //! Marching squares over cell centers.
 
 use super::Contour;
-use crate::geom::Grid;
-use crate::map::{DistanceMap, Tsdf2};
+use crate::geom::{BLOCK_EDGE, Grid, Lattice};
+use crate::map::DistanceMap;
+use crate::store::Store;
 
 /// Treatment of ambiguous squares: those whose diagonal corners have equal signs and neighboring corners different ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,16 +44,52 @@ struct RowEdges {
     side: Vec<u32>,
 }
 
-/// The zero level set of a TSDF as oriented segments, free space on the left.
+/// A row of samples at cell centers.
+struct Row {
+    values: Vec<f32>,
+    observed: Vec<bool>,
+}
+
+impl Row {
+    fn new(width: usize) -> Self {
+        Self { values: vec![0.0; width], observed: vec![false; width] }
+    }
+}
+
+/// The zero level set of signed distances as oriented segments, free space on the left. `map` is a TSDF, or the cells of
+/// one in bricks.
 ///
 /// The corners of a square are the centers of four neighboring cells; a vertex is placed on an edge by linear interpolation,
-/// `t = D_a / (D_a - D_b)`. Negative is inside, zero is free. O(cells).
-pub fn marching_squares(tsdf: &Tsdf2, settings: &ContourSettings) -> Contour {
-    let planes = tsdf.store().planes();
-    let weight = planes.weights();
-    let min_weight = settings.min_weight.unwrap_or(tsdf.thresholds().surface);
-    let observed = |i: usize| weight[i] > 0.0 && weight[i] >= min_weight;
-    level_set(tsdf.grid(), planes.distances(), observed, settings.ambiguity)
+/// `t = D_a / (D_a - D_b)`. Negative is inside, zero is free. O(cells of the box around what was observed).
+pub fn marching_squares(map: &impl DistanceMap<2>, settings: &ContourSettings) -> Contour {
+    let min_weight = settings.min_weight.unwrap_or(map.thresholds().surface);
+    let is_observed = |weight: f32| weight > 0.0 && weight >= min_weight;
+    if let Some(dense) = map.dense() {
+        let planes = dense.planes();
+        let weight = planes.weights();
+        return level_set(dense.grid(), planes.distances(), |i| is_observed(weight[i]), settings.ambiguity);
+    }
+    let bricks = map.bricks();
+    let keys = bricks.keys();
+    let (Some(low), Some(high)) = (keys.first(), keys.last()) else { return Contour::default() };
+    let columns = keys.iter().fold([i32::MAX, i32::MIN], |[a, b], key| [a.min(key.0[0]), b.max(key.0[0])]);
+    let edge = BLOCK_EDGE as i32;
+    let first = [columns[0] * edge, low.0[1] * edge];
+    let shape = [columns[1] - columns[0] + 1, high.0[1] - low.0[1] + 1].map(|n| n as usize * BLOCK_EDGE);
+    // Keys ascend along y, then along x.
+    let load = |y: usize, row: &mut Row| {
+        row.observed.fill(false);
+        let (line, from) = (low.0[1] + (y / BLOCK_EDGE) as i32, y % BLOCK_EDGE * BLOCK_EDGE);
+        let start = keys.partition_point(|key| key.0[1] < line);
+        for key in keys[start..].iter().take_while(|key| key.0[1] == line) {
+            let Some(brick) = bricks.brick(*key) else { continue };
+            let to = (key.0[0] - columns[0]) as usize * BLOCK_EDGE;
+            row.values[to..to + BLOCK_EDGE].copy_from_slice(&brick.distances()[from..from + BLOCK_EDGE]);
+            let weights = &brick.weights()[from..from + BLOCK_EDGE];
+            row.observed[to..].iter_mut().zip(weights).for_each(|(o, &w)| *o = is_observed(w));
+        }
+    };
+    extract(&Samples { lattice: bricks.lattice(), first, shape }, load, settings.ambiguity)
 }
 
 /// [`marching_squares`] over any samples at cell centers, x fastest; a square with a corner that is not `observed` gets no
@@ -63,30 +100,53 @@ pub fn level_set(
     observed: impl Fn(usize) -> bool,
     ambiguity: Ambiguity,
 ) -> Contour {
-    let [width, height] = grid.shape;
+    let width = grid.shape[0];
+    let load = |y: usize, row: &mut Row| {
+        row.values.copy_from_slice(&samples[y * width..][..width]);
+        row.observed.iter_mut().enumerate().for_each(|(x, o)| *o = observed(y * width + x));
+    };
+    extract(&Samples { lattice: &grid.lattice, first: [0; 2], shape: grid.shape }, load, ambiguity)
+}
+
+/// Where a box of samples lies.
+struct Samples<'a> {
+    lattice: &'a Lattice<2>,
+    /// Its lowest cell.
+    first: [i32; 2],
+    /// Cells along each axis.
+    shape: [usize; 2],
+}
+
+/// The level set of samples that are loaded row by row.
+fn extract(samples: &Samples<'_>, load: impl Fn(usize, &mut Row), ambiguity: Ambiguity) -> Contour {
+    let [width, height] = samples.shape;
     let mut contour = Contour::default();
     if width < 2 || height < 2 {
         return contour;
     }
     let mut edges = RowEdges { below: vec![NONE; width], above: vec![NONE; width], side: vec![NONE; width] };
+    let (mut lower, mut upper) = (Row::new(width), Row::new(width));
+    load(0, &mut upper);
     for y in 0..height - 1 {
+        std::mem::swap(&mut lower, &mut upper);
+        load(y + 1, &mut upper);
         std::mem::swap(&mut edges.below, &mut edges.above);
         edges.above.fill(NONE);
         edges.side.fill(NONE);
-        let (lower, upper) = (&samples[y * width..][..width], &samples[(y + 1) * width..][..width]);
         for x in 0..width - 1 {
             // Corners counter-clockwise from the lower left.
-            let d = [lower[x], lower[x + 1], upper[x + 1], upper[x]];
+            let d = [lower.values[x], lower.values[x + 1], upper.values[x + 1], upper.values[x]];
             let code = d.iter().enumerate().fold(0, |code, (n, &v)| code | usize::from(v < 0.0) << n);
             if code == 0 || code == 15 {
                 continue;
             }
-            let low = y * width + x;
-            if ![low, low + 1, low + width + 1, low + width].into_iter().all(&observed) {
+            let known = [lower.observed[x], lower.observed[x + 1], upper.observed[x + 1], upper.observed[x]];
+            if known != [true; 4] {
                 continue;
             }
             for &[from, to] in segments(code, &d, ambiguity) {
-                let ends = [from, to].map(|edge| vertex(&mut contour, &mut edges, grid, [x, y], &d, edge));
+                let ends =
+                    [from, to].map(|edge| vertex(&mut contour, &mut edges, samples, [x, y], &d, edge));
                 contour.segments.push(ends);
             }
         }
@@ -130,7 +190,7 @@ pub(crate) fn segments(code: usize, d: &[f32; 4], ambiguity: Ambiguity) -> &'sta
 fn vertex(
     contour: &mut Contour,
     edges: &mut RowEdges,
-    grid: &Grid<2>,
+    samples: &Samples<'_>,
     [x, y]: [usize; 2],
     d: &[f32; 4],
     edge: u8,
@@ -143,8 +203,8 @@ fn vertex(
         _ => (&mut edges.side[x], [x, y], 1, d[0], d[3]),
     };
     if *slot == NONE {
-        let lattice = &grid.lattice;
-        let mut p = lattice.center(low.map(|v| v as i32));
+        let lattice = samples.lattice;
+        let mut p = lattice.center([0, 1].map(|k| samples.first[k] + low[k] as i32));
         p[axis] += crossing_place(da, db) * lattice.resolution;
         *slot = contour.vertices.len() as u32;
         contour.vertices.push(p);
@@ -163,7 +223,8 @@ pub(crate) fn crossing_place(a: f32, b: f32) -> f64 {
 mod tests {
     use super::*;
     use crate::geom::vector::{distance, sub};
-    use crate::map::TsdfConfig;
+    use crate::map::{Tsdf, Tsdf2, TsdfConfig};
+    use crate::store::Bricks;
     use proptest::prelude::*;
 
     /// A field with these values at the centres, observed where the value is not NaN.

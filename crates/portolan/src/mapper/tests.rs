@@ -1,0 +1,144 @@
+//! A mapper makes what its parts make, with thresholds that fit.
+
+use super::*;
+use crate::answer::Status;
+use crate::field::Esdf;
+use crate::geom::{Pose, vector};
+use crate::map::{Occupancy, ScanKind, Tsdf};
+use crate::scan::{Beam, BeamKind, Scan};
+use crate::store::Store;
+use crate::surface::{ContourSettings, MeshSettings, marching_cubes, marching_squares};
+use crate::sweep::WeightModel;
+
+const POSES: usize = 5;
+
+/// Beams from near the middle of a ball of 2 m.
+fn scan<const D: usize>(k: usize) -> (Pose<D>, Scan<D>) {
+    let mut pose = Pose::<D>::IDENTITY;
+    pose.translation[0] = 0.1 * k as f64;
+    let fraction = |i: usize, a: f64| 2.0 * (0.5 + (i + 7 * k) as f64 * a).fract() - 1.0;
+    let beams = (0..2000).filter_map(|i| {
+        let along = [0.754_877_666, 0.569_840_291, 0.618_033_989];
+        let direction = vector::unit(std::array::from_fn::<_, D, _>(|j| fraction(i, along[j])))?;
+        // The root of |o + s d| = 2.
+        let b = vector::dot(pose.translation, direction);
+        let c = vector::dot(pose.translation, pose.translation) - 4.0;
+        Some(Beam { direction, range: (b * b - c).sqrt() - b, kind: BeamKind::Hit })
+    });
+    (pose, Scan::from_beams(beams))
+}
+
+fn fused<const D: usize>(settings: MapperSettings<D>) -> Mapper<D>
+where
+    Scan<D>: ScanKind<D>,
+{
+    let mut mapper = Mapper::with(settings);
+    for k in 0..POSES {
+        let (pose, scan) = scan(k);
+        assert_eq!(mapper.integrate(&pose, &scan).unwrap().scans, 1);
+    }
+    assert_eq!(mapper.stats().scans, POSES as u64);
+    mapper
+}
+
+/// Whatever the weights, what was seen is a surface and free space is known.
+fn thresholds_fit<const D: usize>(surface: impl Fn(&mut Mapper<D>) -> usize) {
+    let usual = MapperSettings::<D>::new(0.1);
+    let all = [
+        usual,
+        MapperSettings { carve_weight: 1.0, ..usual },
+        MapperSettings { carve_weight: 0.03, ..usual },
+        MapperSettings { weights: WeightModel::InverseSquare, ..usual },
+        MapperSettings { weights: WeightModel::InverseSquareCosIncidence, ..usual },
+    ];
+    let count = surface(&mut fused(usual));
+    assert!(count > 50, "{count}");
+    for settings in all {
+        let mut mapper = fused(settings);
+        let found = surface(&mut mapper);
+        assert!(found * 10 > count * 9, "{settings:?}: {found} of {count}");
+        let field = mapper.esdf().unwrap();
+        for x in [0.0, 0.5, 1.0] {
+            let mut p = [0.0; D];
+            p[0] = x;
+            assert!(field.distance(p).status() != Status::Unknown, "{settings:?}: unknown at {x}");
+        }
+    }
+}
+
+#[test]
+fn thresholds_fit_whatever_the_weights_2d() {
+    thresholds_fit::<2>(|mapper| mapper.contour().segments.len());
+}
+
+#[test]
+fn thresholds_fit_whatever_the_weights_3d() {
+    thresholds_fit::<3>(|mapper| mapper.mesh().triangles.len());
+}
+
+fn makes_what_its_parts_make<const D: usize>() {
+    let settings = MapperSettings::<D>::new(0.1);
+    let mut mapper = fused(settings);
+    let mut tsdf = Tsdf::<D>::new(settings.tsdf([0.0; D])).unwrap();
+    let mut occupancy =
+        Occupancy::<D>::new(crate::geom::Lattice::new([0.0; D], 0.1), Default::default()).unwrap();
+    for k in 0..POSES {
+        let (pose, scan) = scan(k);
+        tsdf.integrate(&pose, &scan).unwrap();
+        occupancy.integrate(&pose, &scan).unwrap();
+        // Asked for in between, it follows.
+        let _ = mapper.esdf();
+    }
+    let (ours, theirs) = (mapper.tsdf().unwrap().store(), tsdf.store());
+    assert_eq!(ours.keys(), theirs.keys());
+    assert!(ours.keys().iter().all(|&key| ours.brick(key) == theirs.brick(key)));
+    let (ours, theirs) = (mapper.occupancy().unwrap().store(), occupancy.store());
+    assert!(!ours.is_empty() && ours.keys() == theirs.keys());
+    assert!(ours.keys().iter().all(|&key| ours.brick(key) == theirs.brick(key)));
+    let settings = mapper.esdf_settings().unwrap();
+    let anew = Esdf::of(&tsdf, &settings);
+    let field = mapper.esdf().unwrap();
+    for key in anew.keys() {
+        assert!((0..crate::geom::block_cells::<D>()).all(|i| field.cell(key.cell(i)) == anew.cell(key.cell(i))));
+    }
+}
+
+#[test]
+fn makes_what_its_parts_make_2d_and_3d() {
+    makes_what_its_parts_make::<2>();
+    makes_what_its_parts_make::<3>();
+    let mut mapper = fused(MapperSettings::<3>::new(0.1));
+    let tsdf = mapper.tsdf().unwrap().clone();
+    assert_eq!(mapper.mesh(), marching_cubes(&tsdf, None, &MeshSettings::default()));
+    let mapper = fused(MapperSettings::<2>::new(0.1));
+    let tsdf = mapper.tsdf().unwrap();
+    assert_eq!(mapper.contour(), marching_squares(tsdf, &ContourSettings::default()));
+}
+
+#[test]
+fn memory_is_kept_by_both_maps_together() {
+    fn keeps<const D: usize>(memory: usize) {
+        let mut mapper = Mapper::with(MapperSettings { memory, ..MapperSettings::<D>::new(0.05) });
+        let (pose, scan) = scan::<D>(0);
+        assert!(mapper.integrate(&pose, &scan).is_err(), "{memory} bytes were enough");
+        let held = mapper.occupancy().unwrap().memory_bytes() + mapper.tsdf().unwrap().memory_bytes();
+        assert!(held <= memory, "{held} of {memory} bytes");
+    }
+    keeps::<2>(60_000);
+    keeps::<3>(3_000_000);
+}
+
+#[test]
+fn far_from_zero_the_lattice_begins_at_the_first_sensor() {
+    let settings = MapperSettings::<2>::new(0.05);
+    assert_eq!(settings.origin_near([40.0, -3.0]), [0.0; 2]);
+    let far = settings.origin_near([500_000.013, 4_000_000.0]);
+    assert_eq!(far[1], 4_000_000.0);
+    assert!((far[0] - 500_000.0).abs() < 0.051 && (far[0] / 0.05).fract().abs() < 1e-6);
+    let mut mapper = Mapper::with(MapperSettings { distances: false, ..settings });
+    let tilted = Pose { rotation: [[0.5; 2]; 2], translation: [1.0; 2] };
+    assert_eq!(mapper.integrate(&tilted, &scan::<2>(0).1).unwrap().refused_poses, 1);
+    assert!(mapper.occupancy().is_none() && mapper.esdf().is_none());
+    mapper.integrate(&scan::<2>(0).0, &scan::<2>(0).1).unwrap();
+    assert!(mapper.occupancy().is_some() && mapper.tsdf().is_none() && mapper.contour().segments.is_empty());
+}
