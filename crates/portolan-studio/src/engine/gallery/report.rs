@@ -42,7 +42,7 @@ pub(super) fn constants(built: &Built) -> Value {
     })
 }
 
-/// Of what the crossover's formula is told (metres).
+/// The length of surface that the crossover's formula takes (metres).
 pub(super) fn surface_length(built: &Built) -> f64 {
     built.settings.surface_length.unwrap_or_else(|| built.measured.contour.length())
 }
@@ -93,7 +93,7 @@ fn tree(t: &TreeCrossover) -> Value {
     })
 }
 
-/// The chapter's node and ours over leaves of one size.
+/// The textbook's node and ours over leaves of one size.
 pub(super) fn tree_pair(pair: &[TreeCrossover; 2]) -> Value {
     json!(pair.each_ref().map(tree))
 }

@@ -1,18 +1,12 @@
 //! What the page's sliders set.
 
 use portolan::cell::OccupancyModel;
-use portolan::field::SparseEsdfSettings;
 use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdf, SparseTsdfConfig};
-use portolan::surface::MeshSettings;
+use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdfConfig};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
-
-/// What an observation of free space weighs, as in `map`.
-const CARVE_WEIGHT: f32 = 0.3;
-/// Rays are followed so far (cells), as in `map`: beyond a million cells a range is no measurement.
-const FARTHEST_CELLS: f64 = (1u32 << 20) as f64;
+use crate::engine::recipe::{CARVE_WEIGHT, FARTHEST_CELLS, within};
 
 /// How frames are made and fused.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -39,7 +33,7 @@ pub(in crate::engine) enum Sensor {
     /// Sees all around.
     #[default]
     Lidar,
-    /// Sees colours.
+    /// Sees colors.
     Camera,
 }
 
@@ -64,10 +58,6 @@ impl Settings {
     /// # Errors
     /// Names the setting that is out of its range.
     pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<SparseTsdfConfig, Refusal> {
-        let within = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
-            true => Ok(value),
-            false => Err(Refusal::new(format!("{name} must be from {low} to {high}, and is {value}"))),
-        };
         let resolution = within("resolution", self.resolution, 0.005, 1.0)?;
         let truncation = within("truncation", self.truncation, resolution, 20.0 * resolution)?;
         let w_max = within("w_max", self.w_max, 0.5, 1e6)?;
@@ -77,7 +67,7 @@ impl Settings {
             truncation,
             w_max: w_max as f32,
             carve: self.carve,
-            carve_weight: CARVE_WEIGHT,
+            carve_weight: CARVE_WEIGHT as f32,
             color,
             max_range: FARTHEST_CELLS * resolution - truncation,
             ..SparseTsdfConfig::default()
@@ -88,16 +78,4 @@ impl Settings {
     pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<SparseOccupancy, Refusal> {
         SparseOccupancy::new(lattice, OccupancyModel::default(), OccupancySweep::Auto).map_err(Refusal::new)
     }
-}
-
-/// As `map` does: half of what one ordinary ray weighs; what was seen once is a surface.
-pub(super) fn mesh_settings(tsdf: &SparseTsdf) -> MeshSettings {
-    MeshSettings { min_weight: 0.5 * tsdf.config().weights.typical_low(), ..MeshSettings::default() }
-}
-
-/// As `map` does: half of what one ordinary observation of free space weighs; what was seen free once is known.
-pub(super) fn esdf_settings(tsdf: &SparseTsdf) -> SparseEsdfSettings {
-    let config = tsdf.config();
-    let min_weight = 0.5 * config.weights.typical_low() * config.carve_weight;
-    SparseEsdfSettings { min_weight, ..SparseEsdfSettings::default() }
 }

@@ -73,7 +73,7 @@ pub(super) fn layer_index(
     Ok(cells.clamp(f64::from(extent.first[k]), f64::from(extent.end[k] - 1)) as i32)
 }
 
-/// What a field says of a cell; NaN: nothing.
+/// The value of a field at a cell; NaN: unknown.
 pub(super) fn value_of<'a>(
     field: Field,
     tsdf: &'a SparseTsdf,
@@ -92,7 +92,7 @@ pub(super) fn value_of<'a>(
     }
 }
 
-/// What is said with a number, be it as far as is maintained.
+/// The number of an answer, a saturated one included.
 pub(super) trait KnownOrSaturated<T> {
     fn known_or_saturated(self) -> Option<T>;
 }
