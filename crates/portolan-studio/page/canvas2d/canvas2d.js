@@ -1,6 +1,8 @@
 // @ts-check
 import { el } from "../ui/controls.js";
 import { colors } from "../ui/theme.js";
+import { listen } from "./pointer.js";
+import { scaleBar } from "./scale_bar.js";
 
 /**
  * @typedef {object} Camera where the world is on the canvas, in CSS pixels
@@ -13,8 +15,8 @@ import { colors } from "../ui/theme.js";
  */
 
 /**
- * A canvas that shows a part of the plane: pan, zoom, layers from back to front. Drawn once per picture, when
- * asked.
+ * A canvas that shows a part of a 2-D world: pan, zoom, layers from back to front. Drawn once per picture,
+ * when asked.
  */
 export class Canvas2d {
   /**
@@ -54,13 +56,13 @@ export class Canvas2d {
      */
     this.onhover = undefined;
     /**
-     * A drag begins here: take it and get its moves, or let the plane pan.
+     * A drag begins here: take it and get its moves, or let the picture pan.
      * @type {((p: [number, number]) => ((p: [number, number], last: boolean) => void) | undefined) |
      *   undefined}
      */
     this.ondrag = undefined;
     this.oncamera = () => {};
-    this.#listen();
+    listen(this);
     new ResizeObserver(() => this.draw()).observe(this.node);
   }
 
@@ -173,7 +175,7 @@ export class Canvas2d {
     return what !== undefined;
   }
 
-  /** What the address says of the camera; nothing where it is at home. @returns {Record<string, string>} */
+  /** What a link says of the camera; empty where it is at home. @returns {Record<string, string>} */
   state() {
     const [x0, y0, x1, y1] = this.home;
     const home =
@@ -189,88 +191,4 @@ export class Canvas2d {
     this.zoom = Math.min(200, Math.max(0.25, zoom));
     this.draw();
   }
-
-  #listen() {
-    const { canvas } = this;
-    /** @type {[number, number] | undefined} where the first pointer went down */
-    let down;
-    /** @type {((p: [number, number], last: boolean) => void) | undefined} */
-    let taken;
-    let moved = false;
-    const at = (/** @type {PointerEvent | WheelEvent} */ e) =>
-      /** @type {[number, number]} */ ([e.offsetX, e.offsetY]);
-    canvas.onpointerdown = (e) => {
-      canvas.setPointerCapture(e.pointerId);
-      this.pointers.set(e.pointerId, at(e));
-      if (this.pointers.size > 1) return;
-      down = at(e);
-      moved = false;
-      taken = this.ondrag?.(this.camera().toWorld(...down));
-    };
-    canvas.onpointermove = (e) => {
-      const before = this.pointers.get(e.pointerId);
-      const now = at(e);
-      if (!before) return this.onhover?.(this.camera().toWorld(...now));
-      this.pointers.set(e.pointerId, now);
-      if (down && Math.hypot(now[0] - down[0], now[1] - down[1]) > 4) moved = true;
-      if (this.pointers.size === 2) {
-        const other = [...this.pointers].find(([id]) => id !== e.pointerId)?.[1] ?? now;
-        const ratio =
-          Math.hypot(now[0] - other[0], now[1] - other[1]) /
-          Math.max(1, Math.hypot(before[0] - other[0], before[1] - other[1]));
-        this.zoomAt(ratio, (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
-      } else if (taken) {
-        if (moved) taken(this.camera().toWorld(...now), false);
-      } else if (moved) this.pan(now[0] - before[0], now[1] - before[1]);
-    };
-    canvas.onpointerup = canvas.onpointercancel = (e) => {
-      if (!this.pointers.delete(e.pointerId) || this.pointers.size > 0) return;
-      const p = this.camera().toWorld(...at(e));
-      if (taken && moved) taken(p, true);
-      else if (!moved && e.type === "pointerup") this.onclick?.(p, e);
-      taken = undefined;
-    };
-    canvas.onpointerleave = () => this.onhover?.(undefined);
-    canvas.addEventListener(
-      "wheel",
-      (e) => {
-        e.preventDefault();
-        this.zoomAt(Math.exp(-e.deltaY * (e.deltaMode ? 0.05 : 0.0015)), ...at(e));
-      },
-      { passive: false },
-    );
-    canvas.ondblclick = () => this.reset();
-  }
-}
-
-/**
- * A round length at the lower left.
- * @param {CanvasRenderingContext2D} g
- * @param {Camera} camera
- * @param {number} height
- */
-function scaleBar(g, camera, height) {
-  const wanted = 90 / camera.scale;
-  const power = 10 ** Math.floor(Math.log10(wanted));
-  const metres = [5, 2, 1].map((n) => n * power).find((n) => n <= wanted) ?? power;
-  const length = metres * camera.scale;
-  const [x, y] = [14, height - 14];
-  g.strokeStyle = g.fillStyle = colors().muted;
-  g.lineWidth = 1.5;
-  g.beginPath();
-  g.moveTo(x, y - 5);
-  g.lineTo(x, y);
-  g.lineTo(x + length, y);
-  g.lineTo(x + length, y - 5);
-  g.stroke();
-  g.font = "11px system-ui, sans-serif";
-  g.fillText(
-    metres >= 1
-      ? `${metres} m`
-      : metres >= 0.01
-        ? `${Math.round(metres * 100)} cm`
-        : `${Math.round(metres * 1000)} mm`,
-    x + length + 6,
-    y,
-  );
 }

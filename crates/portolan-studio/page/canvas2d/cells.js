@@ -2,7 +2,7 @@
 import { rgb } from "../ui/theme.js";
 
 /**
- * Cells as an image: one pixel each, drawn sharp. What a cell's colour is says a function of its index.
+ * Cells as an image: one pixel each, drawn sharp. A function of its index gives a cell its color.
  */
 export class Cells {
   /**
@@ -71,14 +71,12 @@ export const word = (
 export const STEPS = 256;
 
 /**
- * A diverging ramp over [-1, 1]: one colour, transparent zero, the other. Opacity grows with the root of the
- * distance
- * from zero, so that small distances are told from none.
+ * A diverging ramp over [-1, 1]: one color, transparent zero, the other. Opacity grows with the root of the
+ * distance from zero, so that small distances differ from zero.
  * @param {string} negative `#rrggbb`
  * @param {string} positive
  * @param {[number, number]} most opacity at either end, 0 to 1: there is more free space than anything else,
- *   and it should
- *   not shout
+ *   and it should not shout
  */
 export function diverging(negative, positive, most = [0.95, 0.5]) {
   const ramp = new Uint32Array(STEPS);
@@ -90,7 +88,7 @@ export function diverging(negative, positive, most = [0.95, 0.5]) {
   return ramp;
 }
 
-/** A sequential ramp between two colours. @param {string} from @param {string} to */
+/** A sequential ramp between two colors. @param {string} from @param {string} to */
 export function sequential(from, to) {
   const [a, b] = [rgb(from), rgb(to)];
   const ramp = new Uint32Array(STEPS);

@@ -2,8 +2,7 @@
 
 /**
  * Asks one question at a time: while one is under way only the latest of those that come waits, the others
- * are never
- * asked.
+ * are never asked.
  *
  * @template Q, A
  * @param {(question: Q) => Promise<A>} ask

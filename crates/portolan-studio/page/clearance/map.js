@@ -27,7 +27,7 @@ export class FieldImage {
     this.paint();
   }
 
-  /** All cells in the colours of the theme. */
+  /** All cells in the colors of the theme. */
   paint() {
     const ramp = opaque(diverging(colors().negative, colors().positive, [1, 0.85]));
     const { reach } = this;

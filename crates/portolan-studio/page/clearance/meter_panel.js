@@ -48,13 +48,15 @@ export function meterPanel() {
         (/** @type {number} */ _, /** @type {number} */ i) => i * meter.bin,
       );
       histogram.set([edges, share(meter.euclidean.counts), share(meter.truncated.counts)]);
-      note.textContent = `At ${meter.corners} corners between known cells. A distance field grows by a metre a metre: 1, but where two surfaces are equally near. A constant has no direction: 0.`;
+      note.textContent =
+        `At ${meter.corners} corners between known cells. A distance field grows by a metre a metre: 1, ` +
+        "except where two surfaces are equally near. A constant has no direction: 0.";
     },
-    /** @param {any} said */
-    probe(said) {
+    /** @param {any} answer */
+    probe(answer) {
       numbers.set({
-        "norm-euclidean": text(said.euclidean.norm),
-        "norm-truncated": text(said.truncated.norm),
+        "norm-euclidean": text(answer.euclidean.norm),
+        "norm-truncated": text(answer.truncated.norm),
       });
     },
   };

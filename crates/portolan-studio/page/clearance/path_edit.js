@@ -10,7 +10,7 @@ export const MOST = 1000;
 /** @typedef {[number, number]} Point */
 
 /**
- * The waypoint that a place is on; -1: on none.
+ * The waypoint that a place is on; -1: none.
  * @param {Point[]} points
  * @param {Point} p
  * @param {number} scale pixels per metre
@@ -23,7 +23,7 @@ export function waypointAt(points, p, scale) {
 }
 
 /**
- * The leg that a place is on, by its first waypoint; -1: on none.
+ * The leg that a place is on, by its first waypoint; -1: none.
  * @param {Point[]} points
  * @param {Point} p
  * @param {number} scale
@@ -40,8 +40,7 @@ function legAt(points, p, scale) {
 
 /**
  * What a drag that begins at `from` does to a path: moves a waypoint, bends a leg, or (where `drawing`) draws
- * a line on
- * from the end. Nothing: the plane pans.
+ * a line on from the end. `undefined`: the picture pans.
  *
  * @param {{points: Point[], scale: () => number, drawing: boolean, changed: () => void}} path `points` is
  *   changed in place

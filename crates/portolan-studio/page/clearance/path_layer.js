@@ -2,14 +2,14 @@
 import { colors } from "../ui/theme.js";
 
 /**
- * A path as the engine has checked it: lines of its parts, and what is said of each.
+ * A path as the engine has checked it: lines of its parts, and the verdict on each.
  * @typedef {{points: Float32Array, starts: Uint32Array, pieces: {from: number, to: number, verdict: Verdict,
  *   cause: string | null}[]}} Checked
  * @typedef {"certified" | "violated" | "undecided"} Verdict
  */
 
 /**
- * Colours by the names of style.css, and dashes: the verdicts differ without colour, too.
+ * Colors by the names of style.css, and dashes: the verdicts differ without color, too.
  * @type {Record<Verdict, {color: string, dash: number[]}>}
  */
 export const VERDICTS = {

@@ -25,8 +25,7 @@ const metres = (/** @type {number | null} */ v) =>
 export class PathPanel {
   /**
    * @param {{radius: number, setRadius: (v: number) => void, undo: () => void, clear: () => void, drive: ()
-   *   => void,
-   *   draw: (on: boolean) => void}} o `drive`: takes the driven way
+   *   => void, draw: (on: boolean) => void}} o `drive`: takes the driven way
    */
   constructor(o) {
     this.radius = slider({

@@ -4,7 +4,7 @@ import { el } from "../ui/controls.js";
 /** @typedef {import("./map.js").Which} Which */
 
 /**
- * Rows of the table: id, label, and what a field's answer says there.
+ * Rows of the table: id, label, and its text of a field's answer.
  * @type {[string, string, (f: any) => string][]}
  */
 const ROWS = [
@@ -22,7 +22,7 @@ const ROWS = [
 
 const metres = (/** @type {unknown} */ v) => (typeof v === "number" ? v.toFixed(4) : "–");
 
-/** What both fields say where the probe is. */
+/** Distance, bounds and gradient of both fields where the probe is. */
 export function probePanel() {
   const column = (/** @type {Which} */ which) => ROWS.map(([id]) => el("td", { id: `probe-${which}-${id}` }));
   const cells = { euclidean: column("euclidean"), truncated: column("truncated") };
@@ -67,20 +67,21 @@ export function probePanel() {
   );
   return {
     node,
-    /** @param {any} said @param {"optimistic" | "pessimistic"} unknown it was asked with */
-    show(said, unknown) {
-      put(at, `${said.at.map((/** @type {number} */ v) => v.toFixed(3)).join(", ")} m`);
+    /** @param {any} answer @param {"optimistic" | "pessimistic"} unknown it was asked with */
+    show(answer, unknown) {
+      put(at, `${answer.at.map((/** @type {number} */ v) => v.toFixed(3)).join(", ")} m`);
       for (const which of /** @type {Which[]} */ (["euclidean", "truncated"])) {
         for (const [i, [, , text]] of ROWS.entries()) {
           const none = which === "truncated" && i > 1 && i < 4;
-          put(cells[which][i], none ? "none" : text(said[which]));
+          put(cells[which][i], none ? "none" : text(answer[which]));
         }
-        cells[which][0].dataset.status = said[which].status;
+        cells[which][0].dataset.status = answer[which].status;
       }
-      put(row, said.row);
+      put(row, answer.row);
+      const or = unknown === "pessimistic" ? " or unknown cell" : "";
       put(
         note,
-        `At least and at most are certified, to the nearest surface${unknown === "pessimistic" ? " or unknown cell" : ""}; the distance is interpolated.`,
+        `At least and at most are certified, to the nearest surface${or}; the distance is interpolated.`,
       );
       put(command, `--unknown ${unknown}`);
     },

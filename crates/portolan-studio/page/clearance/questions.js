@@ -5,8 +5,7 @@ import { latest } from "./latest.js";
 
 /**
  * What the view asks about the map that it shows. Each kind of question is asked one at a time, the latest
- * next; its
- * answer is taken in within the picture's work.
+ * next; its answer is taken in within the picture's work.
  */
 export class Questions {
   /** @param {Clearance} view */

@@ -16,8 +16,7 @@ const RAMP = "background: linear-gradient(90deg, var(--negative), var(--paper), 
 export class ShownPanel {
   /**
    * @param {{visible: Record<string, boolean>, field: (which: Which) => void, unknown: () => void, spacing:
-   *   () => void,
-   *   toggled: () => void}} o
+   *   () => void, toggled: () => void}} o
    */
   constructor(o) {
     this.visible = o.visible;

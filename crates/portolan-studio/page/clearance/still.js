@@ -2,10 +2,8 @@
 
 /**
  * Layers that stay as they are while the probe moves: kept as a picture once the camera rests, and copied
- * until it moves or
- * what they show changes. While it moves they are drawn as they are: a picture costs the main thread what a
- * browser
- * otherwise does beside it.
+ * until it moves or what they show changes. While it moves they are drawn as they are: a picture costs the
+ * main thread what a browser otherwise does beside it.
  */
 export class Still {
   /** @param {import("../canvas2d/canvas2d.js").Layer[]} layers from back to front */

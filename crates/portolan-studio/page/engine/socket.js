@@ -14,7 +14,7 @@ export function connect(url = `ws://${location.host}/engine`) {
   /** @type {((why: string) => void)[]} */
   const listeners = [];
   let next = 1;
-  /** How many answers are awaited, for whoever must know that the page is at rest. */
+  /** How many answers are awaited: 0 when the page is at rest. */
   const count = () => (document.body.dataset.awaited = String(waiting.size));
 
   socket.onmessage = ({ data }) => {

@@ -3,13 +3,14 @@ import { el, facts, group } from "../ui/controls.js";
 import { plot } from "../ui/plot.js";
 
 const HINT =
-  "Drag the chair anywhere, or press the button: the map keeps the old one until enough scans have contradicted it.";
+  "Drag the chair anywhere, or press the button: the map keeps the old one until enough scans have " +
+  "contradicted it.";
 const PREDICTED =
-  "The prediction ln 2 / ln(1 + w / W_max) is for cells that were saturated when the chair was moved and have " +
-  "been seen as free ever since.";
+  "The prediction ln 2 / ln(1 + w / W_max) is for cells that were saturated when the chair was moved " +
+  "and have been seen as free ever since.";
 const UNPREDICTED =
-  "No cell of the old place was saturated when the chair was moved, or seen again since: choose a smaller W_max, " +
-  "or drive more laps before.";
+  "No cell of the old place was saturated when the chair was moved, or seen again since: choose a " +
+  "smaller W_max, or drive more laps before.";
 
 const number = (/** @type {number | null} */ v) => (v === null ? "–" : v.toFixed(2));
 

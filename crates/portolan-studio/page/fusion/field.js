@@ -25,7 +25,7 @@ export class Field {
   }
 
   /**
-   * Colours of the theme; distances up to the truncation, weights up to the clamp.
+   * Colors of the theme; distances up to the truncation, weights up to the clamp.
    * @param {number} truncation
    * @param {number} wMax
    */

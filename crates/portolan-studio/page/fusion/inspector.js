@@ -3,7 +3,7 @@ import { el, facts, group } from "../ui/controls.js";
 import { plot } from "../ui/plot.js";
 
 /**
- * What the engine tells of a cell; an event is `[scan, D before, W before, d, K, D after, W after]`.
+ * What a scan did to a cell: `[scan, D before, W before, d, K, D after, W after]`.
  * @typedef {[number, number | null, number, number, number, number, number]} Event
  */
 
@@ -77,22 +77,23 @@ export class Inspector {
     this.shownAt = 0;
   }
 
-  /** Takes in what the engine told of the cell; `null`: none is followed. @param {any} told */
-  take(told) {
-    if (!told) {
+  /** Takes in what is new of the cell; `null`: no cell is followed. @param {any} watched */
+  take(watched) {
+    if (!watched) {
       this.events = [];
       this.details.hidden = true;
       this.title.textContent = HINT;
       return;
     }
     this.details.hidden = false;
-    const added = told.events.length > 0 || told.from < this.events.length;
-    this.events.length = told.from;
-    this.events.push(...told.events);
+    const added = watched.events.length > 0 || watched.from < this.events.length;
+    this.events.length = watched.from;
+    this.events.push(...watched.events);
     if (this.picked !== undefined && this.picked >= this.events.length) this.picked = undefined;
-    this.decay = told.decay;
-    const [x, y] = told.center ?? [0, 0];
-    const text = `Cell ${told.cell.join(", ")} at (${x.toFixed(3)}, ${y.toFixed(3)}) m: ${this.events.length} observations`;
+    this.decay = watched.decay;
+    const [x, y] = watched.center ?? [0, 0];
+    const place = `${x.toFixed(3)}, ${y.toFixed(3)}`;
+    const text = `Cell ${watched.cell.join(", ")} at (${place}) m: ${this.events.length} observations`;
     if (this.title.textContent !== text) this.title.textContent = text;
     if (added) this.show();
   }
@@ -123,7 +124,7 @@ export class Inspector {
             ]),
           ),
     );
-    // The plot costs more than the numbers, and nobody reads it sixty times a second.
+    // The plot costs more than the numbers, and it need not change sixty times a second.
     if (performance.now() - this.shownAt > 120 || this.picked !== undefined) this.showPlot();
     else {
       clearTimeout(this.later);
@@ -140,9 +141,18 @@ export class Inspector {
       if (i >= 0 && i < closed.length) closed[i] = v;
     });
     this.plot.set([events.map((_, i) => i + 1), events.map((e) => e[3]), events.map((e) => e[5]), closed]);
-    this.note.textContent = decay
-      ? `Since the chair was moved: D decays to ${decay.target.toFixed(3)} m with λ = W_max / (W_max + w) = ${decay.lambda.toFixed(4)}, half of it in ${decay.half_life.toFixed(2)} observations of weight ${decay.weight.toFixed(2)} (dashed). It had W = ${events[decay.since][2].toFixed(2)} then; below W_max a cell forgets faster than that.`
-      : "";
+    this.note.textContent = decay ? this.#decay() : "";
+  }
+
+  /** The closed form, in words. */
+  #decay() {
+    const { target, lambda, half_life: half, weight, since } = this.decay;
+    return (
+      `Since the chair was moved: D decays to ${target.toFixed(3)} m with λ = W_max / (W_max + w) = ` +
+      `${lambda.toFixed(4)}, half of it in ${half.toFixed(2)} observations of weight ${weight.toFixed(2)} ` +
+      `(dashed). It had W = ${this.events[since][2].toFixed(2)} then; below W_max a cell forgets faster ` +
+      "than that."
+    );
   }
 
   redraw() {

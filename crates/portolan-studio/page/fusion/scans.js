@@ -9,8 +9,8 @@ const SPEEDS = [1, 5, 20, 60, 200, FASTEST];
 /** The strip below the map: play, step and scrub through the scans of the log. */
 export class Scans {
   /**
-   * @param {{step: (scans: number) => Promise<unknown>, seek: (scan: number) => Promise<unknown>,
-   *   ontoggle: (playing: boolean) => void}} o
+   * @param {{step: (scans: number) => Promise<unknown>, seek: (scan: number) => Promise<unknown>, ontoggle:
+   *   (playing: boolean) => void}} o
    */
   constructor({ step, seek, ontoggle }) {
     this.seekTo = seek;

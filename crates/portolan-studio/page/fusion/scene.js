@@ -4,8 +4,8 @@ import { Field } from "./field.js";
 /**
  * @typedef {{min: [number, number], max: [number, number]}} Box
  * @typedef {{name: string, settings: import("./settings.js").Values, grid: Field["grid"], block: number, lap:
- *   number,
- *   truth: {faces: any, chair: Box} | null, moves: [number, [number, number]][]}} All what seldom changes
+ *   number, truth: {faces: any, chair: Box} | null, moves: [number, [number, number]][]}} All what seldom
+ *   changes
  */
 
 /** What is drawn: field and scan of the last answer, and what is chosen on the canvas. */

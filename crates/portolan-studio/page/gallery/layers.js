@@ -4,7 +4,7 @@ import { strokeFaces, strokeLines } from "../canvas2d/lines.js";
 import { colors, rgb } from "../ui/theme.js";
 import { Pixels } from "./pixels.js";
 
-/** Distance at which the colour of the Euclidean field is full (metres). */
+/** Distance at which the color of the Euclidean field is full (metres). */
 const FAR = 1.5;
 /** Value of cells that were never observed, where chances are bytes. */
 const UNOBSERVED = 255;
@@ -45,7 +45,7 @@ export class Picture {
     return [x, y - 0.07 * h * r, x + w * r, y + h * r];
   }
 
-  /** With the colours of the theme. */
+  /** With the colors of the theme. */
   recolor() {
     const c = colors();
     const a = this.arrays;
@@ -64,11 +64,11 @@ export class Picture {
     const [w, h] = this.grid.shape;
     for (let n = 0, k = 0; n < a.leaf_occupancy.length; n++, k += 3) {
       const [x, y, size] = [a.leaves[k], a.leaves[k + 1], a.leaves[k + 2]];
-      const colour = share(a.leaf_occupancy[n]);
+      const color = share(a.leaf_occupancy[n]);
       const right = Math.min(w, x + size);
       // The root covers more than the grid does.
       for (let j = y; j < Math.min(h, y + size); j++)
-        if (x < right) this.leaves.words.fill(colour, this.leaves.at(x, j), this.leaves.at(x, j) + right - x);
+        if (x < right) this.leaves.words.fill(color, this.leaves.at(x, j), this.leaves.at(x, j) + right - x);
     }
     this.leaves.touch(0, h);
   }
@@ -142,15 +142,15 @@ export class Picture {
       });
       for (let n = 0, k = 0; n < occupancy.length; n++, k += 3) {
         const size = leaves[k + 2];
-        const colour = strength[31 - Math.clz32(size)];
-        if (colour === 0) continue;
+        const color = strength[31 - Math.clz32(size)];
+        if (color === 0) continue;
         const [x, y] = [leaves[k], leaves[k + 1]];
         p.corner(
           Math.round(x0 + x * scale),
           Math.round(y0 - (y + size) * scale),
           Math.round(x0 + (x + size) * scale),
           Math.round(y0 - y * scale),
-          colour,
+          color,
         );
       }
     });
@@ -186,14 +186,14 @@ export class Picture {
   /** @type {import("../canvas2d/canvas2d.js").Layer} */
   #cloud = (g, camera) => {
     const { cloud } = this.arrays;
-    const colour = word(...rgb(colors().beam), 200);
+    const color = word(...rgb(colors().beam), 200);
     this.points.over(g, () => {
       const p = this.points;
       const [sx, sy] = camera.toScreen(0, 0);
       const s = camera.scale * p.ratio;
       const [x0, y0] = [sx * p.ratio, sy * p.ratio];
       const size = Math.max(1, Math.min(4, Math.round(0.012 * s)));
-      for (let i = 0; i < cloud.length; i += 2) p.dot(x0 + cloud[i] * s, y0 - cloud[i + 1] * s, size, colour);
+      for (let i = 0; i < cloud.length; i += 2) p.dot(x0 + cloud[i] * s, y0 - cloud[i + 1] * s, size, color);
     });
   };
 }

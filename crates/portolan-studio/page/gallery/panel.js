@@ -16,8 +16,7 @@ const METERS = [
 export class Panel {
   /**
    * @param {{name: string, title: string, label: string, meter: import("../ui/meter.js").Meter}} o `name`: in
-   *   the
-   *   engine's answers
+   *   the engine's answers
    */
   constructor({ name, title, label, meter }) {
     this.name = name;

@@ -38,7 +38,7 @@ export class Pixels {
   }
 
   /**
-   * Two sides, the left and the lower, of a square; its neighbours bring the others. Canvas pixels, y down.
+   * Two sides, the left and the lower, of a square; its neighbors bring the others. Canvas pixels, y down.
    * @param {number} x0 @param {number} y0 @param {number} x1 @param {number} y1 @param {number} word
    */
   corner(x0, y0, x1, y1, word) {

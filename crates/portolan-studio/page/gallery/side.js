@@ -55,8 +55,8 @@ export class WorkloadPanel {
   showScales({ memory, time }) {
     const ends = (/** @type {[number, number]} */ [a, b], /** @type {(power: number) => string} */ f) =>
       `${f(a)} to ${f(b)}`;
-    this.scale.textContent =
-      `Bars are logarithmic: memory from ${ends(memory, bytesOf)}, ` + `times from ${ends(time, timeOf)}.`;
+    const [bytes, seconds] = [ends(memory, bytesOf), ends(time, timeOf)];
+    this.scale.textContent = `Bars are logarithmic: memory from ${bytes}, times from ${seconds}.`;
   }
 
   /** @param {string} workload @param {number} n points @param {number} seconds */
@@ -145,9 +145,9 @@ export class TreesPanel {
     this.tree.sizes(sizes);
     this.note.textContent =
       `Lines: the formula; dots: trees fused just now${every > 1 ? ` of one scan in ${every}` : ""}. ` +
-      "Orange: 20 bytes a node, as in the textbook; blue: ours, 9 bytes an inner node. Below the dashed 1 a tree " +
-      "is the smaller one. A tree is refined along the border of what was never seen, too, which the formula " +
-      "leaves out.";
+      "Orange: 20 bytes a node, as in the textbook; blue: ours, 9 bytes an inner node. Below the dashed 1 " +
+      "a tree is the smaller one. A tree is refined along the border of what was never seen, too, which " +
+      "the formula leaves out.";
   }
 }
 
@@ -168,13 +168,14 @@ export class TablesPanel {
     ];
   }
 
-  /** What is no matter of time. @param {any} body */
+  /** What does not depend on time. @param {any} body */
   show({ picture, truth_and_trees: { fields, tsdf_gradient } }) {
     this.errorNote.textContent =
       picture.truth === null
-        ? "A recorded log has no truth to be compared with."
-        : "Occupancy: share of wrong answers more than half a cell from a surface. Distance and surface: median / " +
-          `95 % of the error in mm. Median ‖∇D‖ of the truncated field: ${tsdf_gradient?.toFixed(3) ?? "–"}.`;
+        ? "The truth is unknown for a recorded log."
+        : "Occupancy: share of wrong answers more than half a cell from a surface. Distance and surface: " +
+          "median / 95 % of the error in mm. " +
+          `Median ‖∇D‖ of the truncated field: ${tsdf_gradient?.toFixed(3) ?? "–"}.`;
     this.fields.replaceChildren(fieldTable(fields));
   }
 

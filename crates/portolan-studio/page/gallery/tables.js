@@ -82,7 +82,8 @@ export function treePanel() {
   const curve = plot({
     id: "gallery-tree-plot",
     label:
-      "Bytes of a quadtree over those of a dense array, by the size of the leaves: the formula's lines and what was measured",
+      "Bytes of a quadtree over those of a dense array, by the size of the leaves: the formula's lines and " +
+      "what was measured",
     height: 190,
     x: "edge of a leaf (cm)",
     y: "tree ÷ array",
@@ -99,14 +100,16 @@ export function treePanel() {
     words,
     out,
     curve,
-    /** @param {any} told */
-    show(told) {
+    /** @param {any} constants */
+    show(constants) {
       curve.node.hidden = true;
-      const { area, surface, surface_known: known, trees } = told;
+      const { area, surface, surface_known: known, trees } = constants;
       words.replaceChildren(
         el("span", { class: "formula" }, "r* = V ∕ (b · c · S)"),
-        ` with V = ${area.toFixed(0)} m² of plane, S = ${surface.toFixed(1)} m of ${known ? "true surface" : "extracted contour"}, c = 2 in the plane, b bytes a node. ` +
-          "With leaves smaller than r* a tree takes less than a byte a cell: bytes of the tree over those of the dense array fall below 1.",
+        ` with V = ${area.toFixed(0)} m² of area, S = ${surface.toFixed(1)} m of ` +
+          `${known ? "true surface" : "extracted contour"}, c = 2 in 2-D, b bytes a node. ` +
+          "With leaves smaller than r* a tree takes less than a byte a cell: bytes of the tree over those " +
+          "of the dense array fall below 1.",
       );
       out.replaceChildren(
         table(

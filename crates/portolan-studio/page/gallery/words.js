@@ -41,14 +41,16 @@ export function decades(values, otherwise) {
 export function answersOf(a) {
   const chance = (/** @type {number | null} */ p) =>
     p === null ? "never observed" : `occupied ${(100 * p).toFixed(1)} %`;
-  const far = (/** @type {number | null} */ d) => (d === null ? "not known" : length(d));
+  const far = (/** @type {number | null} */ d) => (d === null ? "unknown" : length(d));
+  const truth = a.truth === null ? "" : `; true ${far(a.truth)}`;
+  const side = a.contour.inside === null ? "" : a.contour.inside ? "inside, " : "outside, ";
   return {
     grid: `${chance(a.grid.occupied)}; ring search ${far(a.grid.searched)}`,
     tree: chance(a.tree.occupied),
     tsdf:
       a.tsdf.weight === null ? "never observed" : `D ${far(a.tsdf.distance)}, W ${a.tsdf.weight.toFixed(1)}`,
-    esdf: `d ${a.esdf.distance === null ? a.esdf.status : far(a.esdf.distance)}${a.truth === null ? "" : `; true ${far(a.truth)}`}`,
-    contour: `${a.contour.inside === null ? "" : a.contour.inside ? "inside, " : "outside, "}${far(a.contour.distance)} away`,
+    esdf: `d ${a.esdf.distance === null ? a.esdf.status : far(a.esdf.distance)}${truth}`,
+    contour: `${side}${far(a.contour.distance)} away`,
     cloud: `nearest point ${far(a.cloud.distance)}`,
   };
 }

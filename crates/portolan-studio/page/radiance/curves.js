@@ -62,7 +62,7 @@ export class Curves {
   }
 
   /**
-   * Takes in what the engine says; `show` draws it.
+   * Takes an answer in; `show` draws it.
    * @param {any} body @param {Float32Array} values
    */
   take(body, values) {
@@ -97,7 +97,7 @@ export class Curves {
     const turn = this.next++ % this.plots.length;
     const due = (/** @type {number} */ k) => !playing || turn === k;
     const rows = [...this.points, this.now];
-    // What is no number has no place on a plot, and neither has zero on a logarithmic one.
+    // Only positive numbers have a place on a logarithmic plot.
     const column = (/** @type {number} */ k) => rows.map((r) => (r[k] > 0 ? r[k] : null));
     const steps = rows.map((r) => r[0]);
     const level = (/** @type {number} */ v) => rows.map(() => v);

@@ -43,7 +43,7 @@ export class Explanation {
       ["bin-gradient", "the optimizer has"],
       ["bin-phi", "by the reflectance, ∂J/∂φ"],
     ]);
-    this.says = el("p", { class: "note", id: "bin-says" });
+    this.hint = el("p", { class: "note", id: "bin-hint" });
     this.unused = el("p", { class: "note", id: "bin-unused" });
     this.close = el(
       "button",
@@ -57,12 +57,13 @@ export class Explanation {
       el(
         "p",
         { class: "note" },
-        "Residuals count noises s. Slope = δ × passes × contrast; pull = residual × slope ÷ s. A pull below zero asks for more density.",
+        "Residuals count noises s. Slope = δ × passes × contrast; pull = residual × slope ÷ s. " +
+          "A pull below zero asks for more density.",
       ),
       ...this.tables.map((t) => t.table),
       this.unused,
       this.sums.node,
-      this.says,
+      this.hint,
     );
     this.node = group(
       "Why a bin moves, or does not",
@@ -92,16 +93,18 @@ export class Explanation {
       set(caption, `${title}, s = ${noise[key]}${unit && ` ${unit}`}`);
   }
 
-  /** @param {any} bin what the engine says of it, or null @param {string} channels */
+  /** @param {any} bin its terms, or null @param {string} channels */
   take(bin, channels) {
     this.details.hidden = this.close.hidden = !bin;
     if (!bin) {
       set(this.title, "Click a bin, or move to it with the arrows and press Enter.");
       return;
     }
+    const rays = bin.terms.length;
     set(
       this.title,
-      `Bin ${bin.bin}, ${bin.low.toFixed(1)} to ${bin.high.toFixed(1)} m, on ${bin.terms.length} training ray${bin.terms.length === 1 ? "" : "s"}.`,
+      `Bin ${bin.bin}, ${bin.low.toFixed(1)} to ${bin.high.toFixed(1)} m, on ${rays} training ` +
+        `ray${rays === 1 ? "" : "s"}.`,
     );
     this.facts.set({
       "bin-density": `${digits(bin.density)} /m`,
@@ -127,7 +130,7 @@ export class Explanation {
       "bin-gradient": digits(bin.gradient),
       "bin-phi": digits(bin.by_reflectance),
     });
-    set(this.says, bin.says ?? "");
+    set(this.hint, bin.hint ?? "");
   }
 }
 

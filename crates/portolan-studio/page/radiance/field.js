@@ -8,8 +8,8 @@
 
 /**
  * Density as bars, as high as the share of light that ends in the bin; what of the chosen ray's light does,
- * solid in
- * them, and how much of it is left, as a curve; reflectance as a strip; and what descent wants of every bin.
+ * solid in them, and how much of it is left, as a curve; reflectance as a strip; and what descent wants of
+ * every bin.
  * @param {CanvasRenderingContext2D} g
  * @param {Frame} f
  * @param {Scene} scene
@@ -153,8 +153,7 @@ function strip(g, f, scene, reflectance, c) {
 
 /**
  * Up: descent wants more density in the bin; down: less. Heights are roots, so that small pulls are seen
- * beside the
- * largest, which fills its half.
+ * beside the largest, which fills its half.
  * @param {CanvasRenderingContext2D} g
  * @param {Frame} f
  * @param {Scene} scene

@@ -35,8 +35,10 @@ export class LookPanel {
   setRays(rays) {
     const select = /** @type {HTMLSelectElement} */ (this.ray.node.querySelector("select"));
     if (select.options.length > 1) return;
-    const name = (/** @type {any} */ ray, /** @type {number} */ i) =>
-      `${i + 1} ${ray.ascending ? "›" : "‹"} ${ray.origin.toFixed(2)} m${ray.held_out ? ", held out" : ""}`;
+    const name = (/** @type {any} */ ray, /** @type {number} */ i) => {
+      const heldOut = ray.held_out ? ", held out" : "";
+      return `${i + 1} ${ray.ascending ? "›" : "‹"} ${ray.origin.toFixed(2)} m${heldOut}`;
+    };
     select.append(...rays.map((ray, i) => el("option", { value: i }, name(ray, i))));
   }
 

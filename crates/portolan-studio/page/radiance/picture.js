@@ -5,7 +5,7 @@ import { drawField } from "./field.js";
 import { drawRays } from "./rays.js";
 
 /**
- * What stays while a run lasts, as `tell.rs` says it.
+ * What stays while a run lasts, as `answer.rs` gives it.
  * @typedef {object} Scene
  * @property {number} length of the line (metres)
  * @property {number} bins
@@ -53,7 +53,8 @@ export class Picture {
       tabindex: 0,
       role: "img",
       "aria-label":
-        "The corridor: density of every bin, light of the chosen ray, reflectance, gradient, and ten rays with what they measured and what they render",
+        "The corridor: density of every bin, light of the chosen ray, reflectance, gradient, and ten rays " +
+        "with what they measured and what they render",
     });
     this.node = el("div", { class: "canvas" }, this.canvas);
     this.meter = meter;
@@ -238,7 +239,8 @@ function readout(g, f, scene, fit, bin, c) {
   g.textAlign = "center";
   g.textBaseline = "bottom";
   g.fillText(
-    `bin ${bin} at ${at.toFixed(2)} m: ${density[bin].toPrecision(3)} /m, ends ${(100 * opacity[bin]).toPrecision(3)} % of light, reflects ${reflectance[bin].toFixed(2)}`,
+    `bin ${bin} at ${at.toFixed(2)} m: ${density[bin].toPrecision(3)} /m, ends ` +
+      `${(100 * opacity[bin]).toPrecision(3)} % of light, reflects ${reflectance[bin].toFixed(2)}`,
     (f.left + f.right) / 2,
     f.field.top - 8,
   );

@@ -8,8 +8,7 @@
 
 /**
  * One row per ray: a line from its origin to what it measured, a ring at what it renders, the residual
- * between them,
- * and where a bin is looked at, what the ray wants of it.
+ * between them, and where a bin is looked at, what the ray wants of it.
  * @param {CanvasRenderingContext2D} g
  * @param {Frame} f
  * @param {Scene} scene

@@ -24,8 +24,7 @@ export function el(tag, attributes = {}, ...children) {
 /**
  * A slider with its name and value. `values`: the choices, for steps that are not equal.
  * @param {{id: string, label: string, values?: number[], min?: number, max?: number, step?: number, value:
- *   number,
- *   format?: (v: number) => string, oninput: (v: number) => void}} o
+ *   number, format?: (v: number) => string, oninput: (v: number) => void}} o
  */
 export function slider(o) {
   const { values } = o;
@@ -132,8 +131,8 @@ export function group(title, ...children) {
 }
 
 /**
- * A legend: a colour (or `ramp`), and what it means.
- * @param {{color: string, text: string, dashed?: boolean, ramp?: string}[]} items colours by the names of
+ * A legend: a color (or `ramp`), and what it means.
+ * @param {{color: string, text: string, dashed?: boolean, ramp?: string}[]} items colors by the names of
  *   style.css
  */
 export function legend(items) {

@@ -34,7 +34,7 @@ export class Meter {
     this.work.push(this.open);
     this.open = 0;
     if (this.work.length > LAST) this.work.shift();
-    if (this.work.length % 20 === 0) this.tell();
+    if (this.work.length % 20 === 0) this.show();
   }
 
   /** Median and worst of the pictures that are remembered (milliseconds). */
@@ -49,8 +49,9 @@ export class Meter {
     this.open = 0;
   }
 
-  tell() {
+  show() {
     const { median, worst } = this.summary();
-    this.out.textContent = `${median.toFixed(1)} ms a picture, worst ${worst.toFixed(1)}${this.note && ` · ${this.note}`}`;
+    const note = this.note && ` · ${this.note}`;
+    this.out.textContent = `${median.toFixed(1)} ms a picture, worst ${worst.toFixed(1)}${note}`;
   }
 }

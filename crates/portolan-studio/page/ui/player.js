@@ -11,8 +11,8 @@ import { el } from "./controls.js";
  * @property {Record<string, () => void>} keys besides Space, `<` and `>`
  * @property {(speed: number) => void} [onspeed]
  * @property {(seconds: number, speed: number, idle: boolean) => number | null} [due] how many steps to ask
- *   for now,
- *   `seconds` after the last picture; 0 to wait, `null` at the end. Left out: the view runs a loop of its own
+ *   for now, `seconds` after the last picture; 0 to wait, `null` at the end. Left out: the view runs a loop
+ *   of its own
  * @property {(n: number) => Promise<unknown>} [step]
  */
 

@@ -44,7 +44,7 @@ const NAMES = [
   "unknown",
 ];
 
-/** The colours of the theme by the names of style.css, as CSS colours. @returns {Record<string, string>} */
+/** The colors of the theme by the names of style.css, as CSS colors. @returns {Record<string, string>} */
 export function colors() {
   if (!palette) {
     const style = getComputedStyle(document.documentElement);
@@ -53,7 +53,7 @@ export function colors() {
   return palette;
 }
 
-/** A colour `#rrggbb` as numbers. @param {string} color @returns {[number, number, number]} */
+/** A color `#rrggbb` as numbers. @param {string} color @returns {[number, number, number]} */
 export function rgb(color) {
   const n = parseInt(color.slice(1), 16);
   return [(n >> 16) & 255, (n >> 8) & 255, n & 255];

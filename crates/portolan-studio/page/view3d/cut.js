@@ -17,7 +17,7 @@ export function image({ body, arrays }, field) {
   for (let i = 0; i < values.length; i++) {
     const v = values[i];
     if (v !== v) continue; // unknown: transparent
-    // What is occupied has the colour of what is behind a surface.
+    // What is occupied has the color of what is behind a surface.
     words[i] = ramp[field === "occupancy" ? step(1 - 2 * v, -1, 1) : step(v, -body.most, body.most)];
   }
   return { width: w, height: h, bytes: new Uint8Array(words.buffer) };
@@ -29,7 +29,7 @@ export function rampCss() {
   return `linear-gradient(to right, ${c.negative}, ${c.paper}, ${c.positive})`;
 }
 
-/** A layer of a field as a quad in space, with a thin frame. */
+/** A layer of a field as a quad in 3-D, with a thin frame. */
 export class Cut {
   constructor() {
     this.geometry = new THREE.BufferGeometry();

@@ -8,19 +8,22 @@ const metres = (v) =>
 /** @param {number[]} p */
 const place = (p) => p.map((v) => v.toFixed(3)).join(", ");
 
+/** What stands for values of the ESDF while frames are fused. */
+const PAUSED = "updated when paused";
+
 /** One voxel: what all maps know of it, and what its filter did frame by frame. */
 export class Inspector {
   constructor() {
     this.facts = facts([
       ["voxel-cell", "Voxel"],
-      ["voxel-center", "Centre (m)"],
+      ["voxel-center", "Center (m)"],
       ["voxel-distance", "TSDF D"],
       ["voxel-weight", "Weight W"],
       ["voxel-status", "Status"],
       ["voxel-occupancy", "Occupancy"],
       ["voxel-esdf", "ESDF distance"],
       ["voxel-interval", "certified"],
-      ["voxel-color", "Colour"],
+      ["voxel-color", "Color"],
       ["voxel-truth", "Truth"],
     ]);
     this.last = facts([
@@ -44,10 +47,11 @@ export class Inspector {
     this.hint = el(
       "p",
       { class: "note", id: "voxel-hint" },
-      "Click the surface or the slice, or press Enter for the middle of the picture. X, Y, Z step to the next voxel, with Shift back.",
+      "Click the surface or the slice, or press Enter for the middle of the picture. " +
+        "X, Y, Z step to the next voxel, with Shift to the one before.",
     );
     this.note = el("p", { class: "note", id: "voxel-note" });
-    this.events = el("div", {}, el("h2", {}, "Its filter, the last step"), this.last.node, this.plot.node);
+    this.events = el("div", {}, el("h2", {}, "Its filter, the last update"), this.last.node, this.plot.node);
     this.body = el(
       "div",
       { class: "group", style: "padding-top:0;border:0" },
@@ -81,18 +85,14 @@ export class Inspector {
         : o.probability === null
           ? "unknown"
           : `${o.occupied ? "occupied" : "free"}, P ${o.probability.toFixed(3)}`,
-      "voxel-esdf": !e
-        ? "when it rests"
-        : e.distance === null
-          ? e.status
-          : `${metres(e.distance)}, ${e.status}`,
+      "voxel-esdf": !e ? PAUSED : e.distance === null ? e.status : `${metres(e.distance)}, ${e.status}`,
       "voxel-interval": !e
-        ? "when it rests"
+        ? PAUSED
         : e.lower === null
           ? e.interval
           : `${e.lower.toFixed(4)} … ${e.upper === null ? "∞" : e.upper.toFixed(4)} m`,
       "voxel-color": v.color ? `${v.color.rgb.join(", ")} (W ${v.color.weight.toFixed(1)})` : "none",
-      "voxel-truth": v.truth === null ? "not known" : metres(v.truth),
+      "voxel-truth": metres(v.truth),
     });
     if (v.history !== undefined) this.showHistory(v.history, v.recorded);
     if (v.trouble) this.note.textContent = v.trouble;
@@ -107,17 +107,14 @@ export class Inspector {
     const events = history?.events ?? [];
     const last = events.at(-1);
     this.events.hidden = events.length === 0;
-    if (!recorded) this.note.textContent = "The map was made before; what its frames did is not kept in it.";
-    else if (history?.looked_at !== null && history)
-      this.note.textContent = `Fusing frames again to see what they did: ${history.looked_at} of ${history.to_look_at}.`;
-    else
-      this.note.textContent =
-        events.length === 0 ? "No frame has observed it." : `${events.length} of the frames observed it.`;
+    this.note.textContent = recorded
+      ? progress(history)
+      : "This map was read from a file, without its frames.";
     if (!last) return;
     const [frame, before, , d, gain, after, weight] = last;
     this.last.set({
       "event-frame": String(frame + 1),
-      "event-prior": before === null ? "none" : metres(before),
+      "event-prior": metres(before),
       "event-observation": metres(d),
       "event-gain": gain.toFixed(4),
       "event-posterior": metres(after),
@@ -129,4 +126,12 @@ export class Inspector {
       events.map((/** @type {any[]} */ e) => e[5]),
     ]);
   }
+}
+
+/** How many frames observed the voxel, or how far the search for them is. @param {any} history */
+function progress(history) {
+  if (history && history.looked_at !== null)
+    return `Fusing frames again to see what they did: ${history.looked_at} of ${history.to_look_at}.`;
+  const n = history?.events.length ?? 0;
+  return n === 0 ? "No frame has observed it." : `${n} of the frames observed it.`;
 }

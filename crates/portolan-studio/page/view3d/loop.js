@@ -6,14 +6,13 @@ const wait = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(r
 
 /**
  * The one loop that asks the engine, one question after another, for as long as something is due: first what
- * was set and
- * chosen, then frames and mesh, and when these rest, slice and voxel.
+ * was set and chosen, then frames and mesh, and when these rest, slice and voxel.
  */
 export class Loop {
   /**
    * @param {import("./state.js").Core} core
-   * @param {{frames: import("./frames.js").Frames, slice: import("./slice.js").Slice,
-   *   voxel: import("./voxel.js").Voxel, take: (answer: import("../engine/engine.js").Answer) => void}} parts
+   * @param {{frames: import("./frames.js").Frames, slice: import("./slice.js").Slice, voxel:
+   *   import("./voxel.js").Voxel, take: (answer: import("../engine/engine.js").Answer) => void}} parts
    */
   constructor(core, { frames, slice, voxel, take }) {
     this.core = core;

@@ -2,8 +2,8 @@
 import { colors, rgb } from "../ui/theme.js";
 
 /**
- * Colours in even steps from one end to the other, as `#rrggbb`.
- * @param {string} by what is coloured
+ * Colors in even steps from one end to the other, as `#rrggbb`.
+ * @param {string} by what is colored
  * @returns {string[]}
  */
 export function stops(by) {

@@ -22,7 +22,7 @@ export class Stage {
     this.canvas = canvas;
     this.meter = meter;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
-    // Colours are what style.css says: nothing is converted on the way.
+    // Colors are those of style.css: nothing is converted on the way.
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.scene = new THREE.Scene();
@@ -94,7 +94,7 @@ export class Stage {
     });
   }
 
-  /** Pictures a second of those that followed each other, and who draws them. */
+  /** Pictures a second of those that followed each other, and what draws them. */
   rate() {
     const gaps = this.times
       .slice(1)
@@ -116,7 +116,7 @@ export class Stage {
     line(this.sensor, sensor ?? []);
   }
 
-  /** The edges of a voxel; none: of none. @param {number[] | null} corner @param {number} edge */
+  /** The edges of a voxel. @param {number[] | null} corner @param {number} edge */
   showVoxel(corner, edge) {
     /** @type {number[]} */
     const ends = [];
@@ -133,7 +133,7 @@ export class Stage {
     this.draw();
   }
 
-  /** With the colours of the theme. */
+  /** With the colors of the theme. */
   redraw() {
     const set = (/** @type {any} */ o, /** @type {string} */ name) => o.material.color.setRGB(...raw(name));
     set(this.way, "truth");
@@ -174,7 +174,8 @@ function line(object, values) {
 }
 
 /**
- * Who draws, without the layers between: of `ANGLE (vendor, Vulkan 1.3.0 (device (0x…)), driver)` the device.
+ * What draws, without the layers between: the device of `ANGLE (vendor, Vulkan 1.3.0 (device (0x…)),
+ * driver)`.
  * @param {any} gl
  */
 function rendererName(gl) {

@@ -50,9 +50,8 @@ void main() {
 }`;
 
 /**
- * The mesh: one geometry, one draw call. The engine says where in its buffers each brick's piece lies; here
- * it is copied
- * there.
+ * The mesh: one geometry, one draw call. The engine decides where in its buffers each brick's piece lies;
+ * here it is copied there.
  */
 export class Surface {
   constructor() {
@@ -105,7 +104,7 @@ export class Surface {
       this.rooms[0] > 0
         ? { position: this.position, normal: this.normal, shade: this.shade, index: this.index }
         : null;
-    // The graphics card's buffers of this size are no more.
+    // Frees the graphics card's buffers of the old size.
     this.geometry.dispose();
     this.position = new Float32Array(3 * vertices);
     this.normal = new Int8Array(4 * vertices);
@@ -208,7 +207,7 @@ export class Surface {
     this.material.uniforms.up.value.set(...up);
   }
 
-  /** With the colours of the theme. */
+  /** With the colors of the theme. */
   redraw() {
     this.material.uniforms.mode.value = MODES.indexOf(this.by);
     this.ramp.image.data.set(texels(stops(this.by)));

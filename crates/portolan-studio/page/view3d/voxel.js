@@ -45,7 +45,7 @@ export class Voxel {
       const slice = this.slice.answer ? this.slice.question() : null;
       const { body: hit } = await ask({ op: "pick", ...stage.eye.ray(x, y), slice });
       if (hit) this.look(hit.cell);
-      else app.say("There is no surface in this direction.");
+      else app.say("No surface was hit.");
     } catch (error) {
       app.fail(error);
     }
@@ -74,7 +74,7 @@ export class Voxel {
     this.core.app.meter.measure(() => this.inspector.showHistory(history, watched.recorded));
   }
 
-  /** What an answer about the map says of it. @param {any} body */
+  /** Takes in its state from an answer about the map. @param {any} body */
   take({ voxel }) {
     if (voxel) {
       this.known = { ...this.known, ...voxel };

@@ -132,15 +132,15 @@ export class Fusion {
 
   /** @param {import("../engine/engine.js").Answer} answer */
   #take({ body, arrays }) {
-    if (body.all) this.#takeAll(body.all);
+    if (body.all) this.#takeAll(body.all, body.lap);
     this.scene.take(body, arrays);
     this.last = body;
   }
 
-  /** @param {import("../fusion/scene.js").All} all */
-  #takeAll(all) {
+  /** @param {import("../fusion/scene.js").All} all @param {number} lap scans in it */
+  #takeAll(all, lap) {
     const { scene } = this;
-    const { grid, truth, name, lap } = all;
+    const { grid, truth, name } = all;
     if (!scene.field) {
       const [x, y] = grid.origin;
       const [w, h] = grid.shape;
@@ -203,6 +203,8 @@ export class Fusion {
   /** @param {[number, number]} to middle of the chair */
   async #moveChair(to) {
     const answer = await this.tryAsk({ op: "move_chair", to });
+    // Not with the next picture: the link must have the move.
+    this.takeIn();
     this.scene.held = undefined;
     this.canvas2d.draw();
     if (answer) this.app.say("The chair was moved. Play on, and watch the ghost fade.");

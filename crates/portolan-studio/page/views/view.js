@@ -4,8 +4,8 @@
  * A view: built when it is first shown, then shown and hidden.
  *
  * Every view is made of the same parts: a file in `views/` that puts them together, and a folder of its name
- * with the
- * scene that is drawn, the strip of controls below it, the panels beside it, and the link that restores it.
+ * with the scene that is drawn, the strip of controls below it, the panels beside it, and the link that
+ * restores it.
  *
  * @typedef {object} View
  * @property {string} id also in the address
@@ -17,14 +17,12 @@
  * A view that was built.
  * @typedef {object} Shown
  * @property {(link: URLSearchParams) => Promise<void> | void} show the view is on the page now; `link` is the
- *   address
- *   without the view's name, empty when the view was chosen by its tab
+ *   address without the view's name, empty when the view was chosen by its tab
  * @property {() => void} hide
  * @property {() => Record<string, string>} state the link that makes another page show the same
  * @property {() => Promise<HTMLCanvasElement> | HTMLCanvasElement} picture of what is shown
  * @property {(event: KeyboardEvent) => boolean} key handles a key and returns whether it has a meaning here;
- *   never
- *   called while text is typed
+ *   never called while text is typed
  * @property {[string, string][]} keys each key with its meaning
  * @property {() => void} redraw after the theme has changed
  *

@@ -1,4 +1,4 @@
-//! The time, as the caller tells it.
+//! The time, by the caller's clock.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What the studio shows: a log of the plane and one of space, recorded or simulated.
+//! What the studio shows: a 2-D log and a 3-D log or map, recorded or simulated.
 
 use portolan::geom::Pose;
 use portolan::map::Tsdf3;
@@ -8,16 +8,16 @@ use portolan_io::scan_log::ScanLog;
 /// The two logs that every session looks at. They never change.
 #[derive(Default)]
 pub struct Logs {
-    /// What the views of the plane show.
+    /// What the 2-D views show.
     pub source_2d: Source2d,
-    /// What the view of space shows.
+    /// What the 3-D view shows.
     pub source_3d: Source3d,
 }
 
-/// Scans of the plane.
+/// 2-D scans.
 #[derive(Default)]
 pub enum Source2d {
-    /// The chapter's lap through the Apartment, over and over.
+    /// A lap through the Apartment, over and over.
     #[default]
     Apartment,
     /// A log that was read.
@@ -29,7 +29,7 @@ pub enum Source2d {
     },
 }
 
-/// Scans of space.
+/// 3-D frames, or a map.
 #[derive(Default)]
 pub enum Source3d {
     /// The simulated building, of which the truth is known.

@@ -8,6 +8,7 @@ mod gallery;
 mod logs;
 mod protocol;
 mod radiance;
+mod recipe;
 mod session;
 mod view3d;
 

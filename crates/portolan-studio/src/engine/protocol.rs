@@ -43,9 +43,9 @@ pub(super) enum View {
 /// An answer.
 #[derive(Debug, Default)]
 pub struct Reply {
-    /// What is said in words and numbers.
+    /// The JSON part.
     pub body: Value,
-    /// What comes in bulk.
+    /// Typed arrays.
     pub arrays: Vec<Array>,
 }
 
@@ -77,7 +77,7 @@ pub enum Values {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The message is none.
+    /// The message cannot be read.
     #[error("not a message of the studio: {0}")]
     Malformed(#[from] serde_json::Error),
     /// It is one, but what it asks for cannot be.

@@ -27,12 +27,12 @@ impl Default for Limits {
 /// Whether a tab can open these logs with the settings that it begins with.
 ///
 /// # Errors
-/// Where the map would not fit into the limits, or its extent is none.
+/// Where the map would not fit into the limits, or its extent is empty.
 pub fn check(logs: &Arc<Logs>, limits: Limits) -> Result<(), Refusal> {
     Fusion::new(logs, limits, &Clock::new(|| 0.0)).tsdf().map(|_| ())
 }
 
-/// The maps of one tab of the browser and what the page has been told of them. Dropping it frees them.
+/// The maps of one tab of the browser and what the page has of them. Dropping it frees them.
 pub struct Session {
     limits: Limits,
     fusion: Fusion,
@@ -105,7 +105,7 @@ impl Session {
     }
 }
 
-/// The number of a message that is otherwise none.
+/// The number of a message that cannot be read otherwise.
 fn id_of(message: &str) -> Option<u32> {
     let value: serde_json::Value = serde_json::from_str(message).ok()?;
     value.get("id")?.as_u64()?.try_into().ok()

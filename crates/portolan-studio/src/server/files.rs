@@ -11,6 +11,8 @@ pub(super) const FILES: &[(&str, &[u8])] = files![
     "canvas2d/canvas2d.js",
     "canvas2d/cells.js",
     "canvas2d/lines.js",
+    "canvas2d/pointer.js",
+    "canvas2d/scale_bar.js",
     "clearance/latest.js",
     "clearance/map.js",
     "clearance/meter_panel.js",

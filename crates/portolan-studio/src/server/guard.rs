@@ -1,7 +1,7 @@
 //! Who may ask: pages that came from here, under a name that means this machine.
 //!
 //! A page of another site can open connections to 127.0.0.1, too, and a name of its own can be made to point here
-//! (DNS rebinding). The browser says in `Host` which name was asked for and in `Origin` whose page asks.
+//! (DNS rebinding). The browser sends in `Host` which name was asked for and in `Origin` whose page asks.
 
 use std::net::IpAddr;
 
@@ -44,7 +44,7 @@ fn allowed(headers: &HeaderMap, ip: IpAddr, port: u16) -> Result<(), &'static st
     }
 }
 
-/// Whether `host` is a loopback name, or the address that was told to listen at, with the right port.
+/// Whether `host` is a loopback name, or the address that the server listens at, with the right port.
 fn names_this_machine(host: &str, ip: IpAddr, port: u16) -> bool {
     let Some(name) = host.strip_suffix(&format!(":{port}")).or((port == 80).then_some(host)) else {
         return false;
@@ -61,7 +61,7 @@ fn names_this_machine(host: &str, ip: IpAddr, port: u16) -> bool {
     }
 }
 
-/// The same for a socket, which must say whose page it belongs to: browsers always do.
+/// The same for a socket, which must have an `Origin`: browsers always send one.
 pub(super) fn has_origin(headers: &HeaderMap) -> bool {
     headers.contains_key(header::ORIGIN)
 }

@@ -36,7 +36,7 @@ pub struct Settings {
     pub address: IpAddr,
     /// 0: any that is free.
     pub port: u16,
-    /// Sessions at a time; one more tab is told to wait.
+    /// Sessions at a time; one more tab is refused.
     pub sessions: usize,
     /// What each of them may take.
     pub limits: Limits,
@@ -140,7 +140,7 @@ impl Server {
     /// Where interruptions cannot be listened for.
     pub fn wait(self) -> io::Result<()> {
         let interrupted = self.runtime.block_on(tokio::signal::ctrl_c());
-        // Whatever sessions are at, nobody waits for it any more.
+        // Work of the sessions that is under way is dropped.
         self.runtime.shutdown_background();
         interrupted
     }

@@ -25,7 +25,7 @@ pub(super) async fn open(
     upgrade: WebSocketUpgrade,
 ) -> Response {
     if !guard::has_origin(&headers) {
-        return (StatusCode::FORBIDDEN, "a socket must say whose page it belongs to\n").into_response();
+        return (StatusCode::FORBIDDEN, "a socket must send an Origin header\n").into_response();
     }
     upgrade
         .max_message_size(LONGEST)
@@ -71,7 +71,7 @@ async fn converse(mut socket: WebSocket, shared: Shared) {
     }
 }
 
-/// The next message; `None` where the peer is gone. One that says nothing for long is asked whether it is still there:
+/// The next message; `None` where the peer is gone. A silent one is pinged after a while:
 /// of a machine that went to sleep nothing else would ever be heard.
 async fn next(socket: &mut WebSocket, patience: Duration) -> Option<Result<Message, axum::Error>> {
     if let Ok(message) = timeout(patience, socket.recv()).await {

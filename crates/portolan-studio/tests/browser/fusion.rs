@@ -11,7 +11,7 @@ use super::{Page, Screen, Studio};
 /// The Apartment's box (metres), as the canvas shows it before anything is moved.
 const APARTMENT: [f64; 2] = [12.0, 9.0];
 
-/// Where a point of the Apartment is on the canvas (CSS pixels), as `plane.js` puts it.
+/// Where a point of the Apartment is on the canvas (CSS pixels), as `canvas2d.js` puts it.
 fn on_canvas(page: &Page, [x, y]: [f64; 2]) -> [f64; 2] {
     let [_, _, w, h] = page.area("fusion-canvas");
     let margin = f64::min(28.0, 0.04 * w.min(h));

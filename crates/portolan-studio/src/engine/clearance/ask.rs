@@ -9,7 +9,7 @@ use serde::Deserialize;
 pub(in crate::engine) enum Ask {
     /// Both fields whole, the contour and the meter.
     Open {
-        /// The revision that the page has drawn: where it is still the map's, the answer says no more than that.
+        /// The revision that the page has drawn: where it is still the map's, the answer is only that.
         have: Option<u64>,
     },
     /// Level rings.
@@ -28,7 +28,7 @@ pub(in crate::engine) enum Ask {
         /// From arrow to arrow (metres).
         spacing: f64,
     },
-    /// What both fields say of a point.
+    /// Distance, bounds and gradient of both fields at a point.
     Probe {
         /// World (metres).
         at: [f64; 2],

@@ -15,10 +15,10 @@ pub(super) type Sample = (f64, [f64; 2]);
 /// Both fields, over the cells of the map.
 pub(super) struct Fields {
     /// As `query` makes it, with distances to unknown cells.
-    pub(super) euclidean: Esdf<2>,
-    /// The same at the cells' centres.
-    pub(super) dense: EsdfGrid<2>,
-    /// What the filter keeps, read as if it were a distance field: bilinear between the centres of the same cells that the
+    pub(super) euclidean: SparseEsdf<2>,
+    /// The same at the cells' centers.
+    pub(super) dense: DenseEsdf<2>,
+    /// What the filter keeps, read as if it were a distance field: bilinear between the centers of the same cells that the
     /// Euclidean field knows.
     truncated: EsdfGrid<2>,
     /// From here on (metres) the truncated field is a constant.
@@ -28,7 +28,7 @@ pub(super) struct Fields {
 impl Fields {
     pub(super) fn of(tsdf: &Tsdf2) -> Result<Self, EsdfError> {
         let euclidean = exports::field(tsdf, true);
-        // A probe must not wait for bricks that nobody has read yet.
+        // A probe must not wait for bricks that were not read yet.
         euclidean.measure();
         let dense = euclidean.dense(tsdf.grid());
         let planes = tsdf.store().planes();
@@ -38,8 +38,8 @@ impl Fields {
         Ok(Self {
             euclidean,
             dense,
-            truncated: EsdfGrid::from_samples(*tsdf.grid(), kept.collect())?,
-            // As the map itself tells its saturated cells from others.
+            truncated: Esdf::from_samples(*tsdf.grid(), kept.collect())?,
+            // As the map itself decides which cells are saturated.
             limit: f64::from(tsdf.rule().truncation) * (1.0 - 1e-4),
         })
     }
@@ -52,7 +52,7 @@ impl Fields {
         self.grid().aabb()
     }
 
-    /// At the cells' centres, x fastest; NaN where nothing is known.
+    /// At the cells' centers, x fastest; NaN where nothing is known.
     pub(super) fn samples(&self, which: Which) -> &[f32] {
         match which {
             Which::Truncated => self.truncated.samples(),
@@ -68,7 +68,7 @@ impl Fields {
         }
     }
 
-    /// What the truncated field says of a point; saturated where it is a constant.
+    /// The truncated field at a point; saturated where it is a constant.
     pub(super) fn truncated(&self, p: [f64; 2]) -> Answer<Sample> {
         match self.truncated.distance_and_gradient(p) {
             Answer::Known(sample) if sample.0.abs() >= self.limit => Answer::Saturated(sample),

@@ -14,7 +14,7 @@ const MOST_POINTS: usize = 1000;
 const SAMPLES: f64 = 1500.0;
 /// Steps of a check, about: the longer a path, the coarser.
 const STEPS: f64 = 20_000.0;
-/// Parts of a path that are told apart, at most; what comes after them is undecided.
+/// Parts of a path with verdicts of their own, at most; what comes after them is undecided.
 const MOST_PIECES: usize = 400;
 
 /// A part of a path, from and to an arc length (metres).
@@ -174,7 +174,7 @@ fn word(cause: Cause) -> &'static str {
     }
 }
 
-/// Both bounds, below zero inside of a surface; NaN where there is none.
+/// Both bounds, below zero inside of a surface; NaN where unknown.
 fn signed(clearance: Answer<Clearance>) -> [f32; 2] {
     let (c, upper) = match clearance {
         Answer::Known(c) => (c, c.upper),

@@ -1,4 +1,4 @@
-//! What both fields say of one point: of the Euclidean one exactly what `query` prints.
+//! Both fields at one point: of the Euclidean one exactly what `query` prints.
 
 use portolan::Answer;
 use portolan::field::{Esdf, UnknownSpace};
@@ -51,8 +51,8 @@ pub(super) fn row(tsdf: &Tsdf2, field: &Esdf<2>, p: [f64; 2], unknown: UnknownSp
     row
 }
 
-/// A map of the plane is a box: what lies outside does not depend on where something was seen.
-fn in_box(tsdf: &Tsdf2, field: &Esdf<2>, p: [f64; 2]) -> Answer<Sample> {
+/// A 2-D map is a box: what lies outside does not depend on where something was seen.
+fn in_box(tsdf: &Tsdf2, field: &SparseEsdf<2>, p: [f64; 2]) -> Answer<Sample> {
     match field.distance_and_gradient(p) {
         _ if !tsdf.grid().aabb().contains(p) => Answer::Outside,
         Answer::Outside => Answer::Unknown,

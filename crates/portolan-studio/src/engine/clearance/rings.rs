@@ -14,7 +14,7 @@ const MOST_LEVELS: f64 = 200.0;
 const MOST_CELLS: f64 = 4e8;
 
 /// Rings at all multiples of `spacing` but zero, which is the contour. Where that would be more of them than anyone can
-/// see, the spacing is doubled until it is not; the answer says what it has become.
+/// see, the spacing is doubled until it is not; the answer has the spacing that was used.
 pub(super) fn rings(fields: &Fields, which: Which, spacing: f64) -> Result<Reply, Refusal> {
     if !(0.01..=100.0).contains(&spacing) {
         return Err(Refusal::new(format!("rings are from 0.01 to 100 m apart, not {spacing}")));

@@ -70,7 +70,7 @@ fn plain(wall: bool) -> Studio {
     })
 }
 
-/// Points all over a map and beyond, cell centres and corners among them.
+/// Points all over a map and beyond, cell centers and corners among them.
 fn points(tsdf: &Tsdf2, n: usize) -> Vec<[f64; 2]> {
     let bounds = tsdf.grid().aabb().grown(1.0);
     let lattice = tsdf.grid().lattice;
@@ -183,7 +183,7 @@ fn the_truncated_field_is_a_constant_beyond_its_truncation() {
             _ => assert!(kept["distance"].is_null() && kept["gradient"].is_null()),
         }
     }
-    // At the last centre of the constant the field bends.
+    // At the last center of the constant the field bends.
     assert!(known > 200 && saturated > 200 && bent < 50, "{known} {saturated} {bent}");
 }
 

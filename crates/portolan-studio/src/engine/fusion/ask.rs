@@ -30,7 +30,7 @@ pub(in crate::engine) enum Ask {
         /// World (metres).
         to: [f64; 2],
     },
-    /// Follows this cell's filter from now on, and tells what it did from the beginning; none: follows none.
+    /// Follows this cell's filter from now on, and answers what it did from the beginning; `null`: follows no cell.
     Watch {
         /// Of the grid.
         cell: Option<[i32; 2]>,

@@ -12,7 +12,7 @@ pub(super) struct Inspected {
     cell: [i32; 2],
     /// The scan that did it, and what it did.
     events: Vec<(usize, FusionEvent)>,
-    /// Events that the page has been sent.
+    /// Events that the page has.
     sent: std::cell::Cell<usize>,
 }
 
@@ -35,7 +35,7 @@ impl Inspected {
         self.events.extend(of_cell.map(|e| (scan, e.1)));
     }
 
-    /// What has happened since the page was sent; the page forgets what it has of event `from` and those after it.
+    /// What is new to the page; the page forgets what it has of event `from` and those after it.
     pub(super) fn news(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
         self.to_json(self.sent.get().min(self.events.len()), tsdf, moved)
     }
@@ -61,7 +61,7 @@ impl Inspected {
 
     /// The closed form `D_n = m + (D_0 - m) lambda^n` with `lambda = W_max / (W_max + w)`, from the observation before
     /// the chair was moved: `m` is the new truth, clamped, `w` the median weight of the observations since. `null` where
-    /// nothing moved as far as this cell can tell, nothing was seen before or since, or nothing is forgotten.
+    /// the truth at this cell did not change, nothing was seen before or since, or nothing is forgotten.
     fn decay(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
         let rule = tsdf.rule();
         let (Some(moved), true) = (moved, rule.w_max.is_finite()) else { return Value::Null };

@@ -1,4 +1,4 @@
-//! What the page has been told of the map: the next answer holds only blocks that differ.
+//! The page's copy of the map: the next answer holds only blocks that differ.
 
 use portolan::map::Tsdf2;
 
@@ -25,7 +25,7 @@ pub(super) struct Delta {
 }
 
 impl PageCopy {
-    /// A page that knows nothing: all is unobserved.
+    /// A page that has nothing: all is unobserved.
     pub(super) fn nothing(shape: [usize; 2]) -> Self {
         let cells = shape[0] * shape[1];
         Self { shape, distance: vec![0.0; cells], weight: vec![0.0; cells], fresh: true }

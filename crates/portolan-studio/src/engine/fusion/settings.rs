@@ -5,6 +5,7 @@ use portolan_io::{sweep_of, sweep_word, weights_of, weights_word};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
+use crate::engine::recipe::{CARVE_WEIGHT, within};
 
 /// How scans are made and fused.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -28,13 +29,10 @@ pub(in crate::engine) struct Settings {
     pub(in crate::engine) sweep: String,
 }
 
-/// What an observation of free space weighs where `map` fuses a recorded log: thin things survive.
-const CARVE_WEIGHT_OF_LOGS: f64 = 0.3;
-
 impl Settings {
     /// Those that `map` has, so that the same log gives the same map.
     pub(super) fn of_log() -> Self {
-        Self { carve_weight: CARVE_WEIGHT_OF_LOGS, ..Self::default() }
+        Self { carve_weight: CARVE_WEIGHT, ..Self::default() }
     }
 }
 
@@ -60,11 +58,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(in crate::engine) fn config(&self) -> Result<TsdfConfig<2>, Refusal> {
-        let within = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
-            true => Ok(value),
-            false => Err(Refusal::new(format!("{name} must be from {low} to {high}, and is {value}"))),
-        };
+    pub(in crate::engine) fn config(&self) -> Result<Tsdf2Config, Refusal> {
         let resolution = within("resolution", self.resolution, 0.01, 1.0)?;
         let truncation = within("truncation", self.truncation, resolution, 10.0)?;
         within("noise", self.noise, 0.0, 0.5)?;

@@ -89,7 +89,7 @@ fn a_cells_history_is_what_the_library_says() {
 }
 
 #[test]
-fn laps_are_the_chapters() {
+fn laps_are_those_of_the_simulator() {
     let mut lap_of = super::scans::Scans::new(&Arc::default(), 0.01);
     let world = apartment().world;
     for k in [0, 1] {

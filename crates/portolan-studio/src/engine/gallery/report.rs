@@ -43,7 +43,7 @@ pub(super) fn constants(built: &Built) -> Value {
     })
 }
 
-/// Of what the crossover's formula is told (metres).
+/// The length of surface that the crossover's formula takes (metres).
 pub(super) fn surface_length(built: &Built) -> f64 {
     built.settings.surface_length.unwrap_or_else(|| built.measured.contour.length())
 }

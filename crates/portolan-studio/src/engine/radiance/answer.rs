@@ -133,8 +133,8 @@ fn light(fit: &Fit, m: &Measurement) -> Light {
     let share = transmittance(line, &m.ray);
     let half = 0.5 * line.resolution;
     let border = |i: usize| {
-        let centre = line.centre(crossing.bin(i));
-        if crossing.ascending { centre + half } else { centre - half }
+        let center = line.centre(crossing.bin(i));
+        if crossing.ascending { center + half } else { center - half }
     };
     let mut ends = vec![0.0; line.bins()];
     for i in 0..crossing.count {
@@ -166,12 +166,12 @@ fn explained(run: &Run, gradient: &[f64], bin: usize) -> Value {
         "pulls": sum.pulls, "chain": sum.chain, "prior": sum.prior, "sum": sum.gradient(),
         "gradient": gradient[bin],
         "by_reflectance": gradient[line.bins() + bin],
-        "says": says(&terms, sum.chain * line.resolution),
+        "hint": hint(&terms, sum.chain * line.resolution),
     })
 }
 
 /// What is worth seeing in the terms of a bin; `free`: how much of a change of `θ` is one of `σδ`.
-fn says(terms: &[Terms], free: f64) -> Option<&'static str> {
+fn hint(terms: &[Terms], free: f64) -> Option<&'static str> {
     let pulls = || terms.iter().flat_map(|t| [t.depth.pull, t.reflectance.pull, t.second_moment.pull]);
     let (net, gross) = (pulls().sum::<f64>().abs(), pulls().map(f64::abs).sum::<f64>());
     if terms.is_empty() {

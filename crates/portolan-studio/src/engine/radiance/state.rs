@@ -77,7 +77,7 @@ impl Radiance {
         }
     }
 
-    /// The run; the one that the text speaks of most where none was asked for.
+    /// The run; where none was asked for, the one that gets stuck, which the textbook discusses.
     fn run(&mut self) -> Result<&mut Run, Refusal> {
         if self.run.is_none() {
             let (channels, optimizer) = (ChannelsChoice::Depth, OptimizerChoice::Descent);

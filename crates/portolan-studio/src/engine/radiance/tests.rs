@@ -164,7 +164,7 @@ fn words_say_what_the_terms_show() {
             worst = ask(&mut session, &json!({ "op": "step", "steps": 2000 })).body["worst"].clone();
         }
         let body = ask(&mut session, &json!({ "op": "look", "bin": worst })).body;
-        assert!(body["bin"]["says"].as_str().unwrap().contains(says), "{}: {}", named.name, body["bin"]);
+        assert!(body["bin"]["hint"].as_str().unwrap().contains(says), "{}: {}", named.name, body["bin"]);
         assert_eq!(body["bin"]["by_reflectance"], 0.0, "depth alone does not move reflectance");
     }
 }

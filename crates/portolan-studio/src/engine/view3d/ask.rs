@@ -1,4 +1,4 @@
-//! What the view of space can be asked.
+//! What the 3-D view can be asked.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use super::settings::Settings;
 
 /// A question. `open`, `step`, `seek`, `set`, `color` and `mesh` are answered with what is new of the mesh.
 ///
-/// Places are metres from the origin that `open` tells, so that a map far from the world's zero is buffers as finely as one
+/// Places are metres from the origin that the answer to `open` has, so that a map far from the world's zero is drawn as finely as one
 /// near it.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case", deny_unknown_fields)]
@@ -28,7 +28,7 @@ pub(in crate::engine) enum Ask {
         /// All of them.
         settings: Settings,
     },
-    /// Colours the mesh by something else.
+    /// Colors the mesh by something else.
     Color {
         /// By what.
         by: ColorBy,
@@ -49,7 +49,7 @@ pub(in crate::engine) enum Ask {
         /// The slice that is shown.
         slice: Option<Slice>,
     },
-    /// Looks at a cell from now on; none: at none.
+    /// Selects a cell from now on; `null`: deselects it.
     Voxel {
         /// Its index.
         cell: Option<[i32; 3]>,
@@ -63,14 +63,14 @@ pub(in crate::engine) enum Ask {
     },
 }
 
-/// What the colour of the surface tells.
+/// What the surface is colored by.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(in crate::engine) enum ColorBy {
     /// How high it is; the page knows by the places.
     #[default]
     Height,
-    /// The colours that were seen.
+    /// The colors that were seen.
     Color,
     /// The weight of the cell that holds the place.
     Weight,

@@ -1,4 +1,4 @@
-//! Files of a map of space, in memory: the same bytes that the command line writes.
+//! Files of a 3-D map, in memory: the same bytes that the command line writes.
 
 use portolan::field::Esdf;
 use portolan::store::Tree;

@@ -1,4 +1,4 @@
-//! The maps of space, and what follows them.
+//! The 3-D maps of a tab, and mesh and field that follow them.
 
 use std::sync::Arc;
 
@@ -11,8 +11,9 @@ use portolan::surface::{IncrementalMesh, MeshSettings};
 
 use super::history::Watched;
 use super::mesh_buffers::MeshBuffers;
-use super::settings::{Settings, esdf_settings, mesh_settings};
+use super::settings::Settings;
 use super::source::Source;
+use crate::engine::recipe::{esdf_settings, mesh_settings};
 use crate::engine::{Clock, Refusal};
 
 /// Points of the last frame that are shown.
@@ -25,7 +26,7 @@ const FAR_CELLS: f64 = 1e6;
 pub(super) struct Seconds {
     /// Reading, or simulating.
     pub(super) frames: f64,
-    /// Fusing distances and colours.
+    /// Fusing distances and colors.
     pub(super) tsdf: f64,
     /// Fusing occupancy.
     pub(super) occupancy: f64,

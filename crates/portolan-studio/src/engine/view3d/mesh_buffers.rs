@@ -1,4 +1,4 @@
-//! What the page has of the mesh: the pieces of bricks in ranges of its buffers, and which of them it must be told anew.
+//! What the page has of the mesh: the pieces of bricks in ranges of its buffers, and which of them are still to be sent.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,7 +43,7 @@ pub(super) struct MeshBuffers {
 pub(super) struct Delta {
     /// What it has is no more.
     pub(super) fresh: bool,
-    /// First index and number of indices that become 0: a triangle of three equal corners is none.
+    /// First index and number of indices that become 0: a triangle of three equal corners draws nothing.
     pub(super) holes: Vec<u32>,
     /// Per piece: first vertex, vertices, first index, indices, room for indices, of which the rest becomes 0.
     pub(super) runs: Vec<u32>,
@@ -51,7 +51,7 @@ pub(super) struct Delta {
     pub(super) positions: Vec<f32>,
     /// Four per vertex: 127 times a unit normal, and 0.
     pub(super) normals: Vec<i8>,
-    /// Four per vertex, as [`super::shade`] says.
+    /// Four per vertex, as [`super::shade`] makes them.
     pub(super) shades: Vec<u8>,
     /// Relative to the piece's first vertex.
     pub(super) indices: Vec<u16>,
@@ -112,12 +112,12 @@ impl MeshBuffers {
         }
     }
 
-    /// Everything must be told again, in the places that it has.
+    /// Everything is to be sent again, in the places that it has.
     pub(super) fn again(&mut self) {
         self.pending = self.places.keys().copied().collect();
     }
 
-    /// What the page must be told next, of as many pieces as one answer holds, but at least one.
+    /// What is to be sent next, of as many pieces as one answer holds, but at least one.
     pub(super) fn next(
         &mut self,
         mesh: &IncrementalMesh,
@@ -158,7 +158,7 @@ impl MeshBuffers {
         self.triangles
     }
 
-    /// Pieces that the page is still to be told.
+    /// Pieces that are still to be sent.
     pub(super) fn pending(&self) -> usize {
         self.pending.len()
     }
@@ -168,8 +168,8 @@ impl MeshBuffers {
         [self.vertices.end(), 3 * self.corners.end()]
     }
 
-    /// Between which heights the surface lies that the page was told of, but for the lowest and highest fiftieth of its
-    /// bricks: a stray point shall not take the colours from the rest.
+    /// Between which heights the surface lies that the page has, but for the lowest and highest fiftieth of its
+    /// bricks: a stray point shall not take the colors from the rest.
     pub(super) fn heights(&self) -> Option<[f32; 2]> {
         let pick = |k: usize, share: f64| {
             let mut all: Vec<f32> = self.places.values().filter_map(|p| Some(p.heights?[k])).collect();
@@ -181,7 +181,7 @@ impl MeshBuffers {
     }
 
     /// The box of the bricks with surface, but for a hundredth of them on each side: the first brick, and the last. `None`:
-    /// there is none.
+    /// no brick has surface.
     pub(super) fn extent(&self) -> Option<[BlockKey<3>; 2]> {
         let last = self.places.len().checked_sub(1)?;
         let stray = self.places.len() / 100;

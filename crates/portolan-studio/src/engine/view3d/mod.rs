@@ -1,14 +1,21 @@
-//! View3d: a log is fused frame by frame, and its mesh follows brick by brick.
+//! 3-D: a log is fused frame by frame, and its mesh follows brick by brick.
 //!
-//! [`ask`] is what can be asked, [`settings`] and [`source`] what is fused and how, [`state`] the maps and what they are
-//! at; [`buffers`] is what the page has of the mesh, laid out in ranges by [`ranges`] and coloured by [`shade`]; [`slice`]
-//! cuts the fields, [`voxel`] and [`history`] look at one cell.
+//! | module | what |
+//! |---|---|
+//! | [`ask`], [`answer`], [`queries`] | what can be asked, and the answers |
+//! | [`settings`], [`source`] | how is fused, and what |
+//! | [`state`], [`maps`] | the view, and the maps of a run |
+//! | [`mesh_buffers`], [`ranges`], [`shade`] | the page's copy of the mesh, its layout and its colors |
+//! | [`slice`], [`voxel`], [`history`] | a layer of a field, one cell, and what each frame did to it |
+//! | [`export`] | files to save |
 
+mod answer;
 mod ask;
 mod export;
 mod history;
 mod maps;
 mod mesh_buffers;
+mod queries;
 mod ranges;
 mod settings;
 mod shade;

@@ -2,16 +2,12 @@
 
 use portolan::cell::OccupancyModel;
 use portolan::geom::Lattice;
-use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
-use portolan::sweep::OccupancySweep;
-use portolan::surface::MeshSettings;
-use portolan::sweep::LONGEST_RAY_CELLS;
+use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdfConfig};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
+use crate::engine::recipe::{CARVE_WEIGHT, FARTHEST_CELLS, within};
 
-/// What an observation of free space weighs, as in `map`.
-const CARVE_WEIGHT: f32 = 0.3;
 /// How frames are made and fused.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -37,7 +33,7 @@ pub(in crate::engine) enum Sensor {
     /// Sees all around.
     #[default]
     Lidar,
-    /// Sees colours.
+    /// Sees colors.
     Camera,
 }
 
@@ -61,11 +57,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<TsdfConfig<3>, Refusal> {
-        let within = |name: &str, value: f64, low: f64, high: f64| match (low..=high).contains(&value) {
-            true => Ok(value),
-            false => Err(Refusal::new(format!("{name} must be from {low} to {high}, and is {value}"))),
-        };
+    pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<SparseTsdfConfig, Refusal> {
         let resolution = within("resolution", self.resolution, 0.005, 1.0)?;
         let truncation = within("truncation", self.truncation, resolution, 20.0 * resolution)?;
         let w_max = within("w_max", self.w_max, 0.5, 1e6)?;
@@ -75,7 +67,7 @@ impl Settings {
             truncation,
             w_max: w_max as f32,
             carve: self.carve,
-            carve_weight: CARVE_WEIGHT,
+            carve_weight: CARVE_WEIGHT as f32,
             color,
             max_range: LONGEST_RAY_CELLS * resolution - truncation,
             ..TsdfConfig::default()

@@ -1,4 +1,4 @@
-//! What the colour of a vertex tells, in four bytes.
+//! The color of a vertex, in four bytes.
 
 use portolan::map::Tsdf3;
 use portolan::store::Store;
@@ -11,8 +11,8 @@ use super::ask::ColorBy;
 /// The error that is buffers at the end of the ramp, in cells.
 const ERROR_CELLS: f64 = 1.0;
 
-/// Four bytes per vertex: red, green, blue, 255 for colours as they were seen; else a step of a ramp, 0, 0, and 255 where
-/// there is a value. Nothing but zeros for heights, which the places tell.
+/// Four bytes per vertex: red, green, blue, 255 for colors as they were seen; else a step of a ramp, 0, 0, and 255 where
+/// there is a value. Zeros for heights, which follow from the positions.
 pub(super) fn shades(
     by: ColorBy,
     piece: &Mesh,

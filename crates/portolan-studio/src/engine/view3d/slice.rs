@@ -73,7 +73,7 @@ pub(super) fn layer_index(
     Ok(cells.clamp(f64::from(extent.first[k]), f64::from(extent.end[k] - 1)) as i32)
 }
 
-/// What a field says of a cell; NaN: nothing.
+/// The value of a field at a cell; NaN: unknown.
 pub(super) fn value_of<'a>(
     field: Field,
     tsdf: &'a Tsdf3,
@@ -89,6 +89,20 @@ pub(super) fn value_of<'a>(
                 .map(|p| p as f32),
         };
         value.unwrap_or(f32::NAN)
+    }
+}
+
+/// The number of an answer, a saturated one included.
+pub(super) trait KnownOrSaturated<T> {
+    fn known_or_saturated(self) -> Option<T>;
+}
+
+impl<T> KnownOrSaturated<T> for portolan::Answer<T> {
+    fn known_or_saturated(self) -> Option<T> {
+        match self {
+            Self::Known(v) | Self::Saturated(v) => Some(v),
+            Self::Unknown | Self::Outside => None,
+        }
     }
 }
 

@@ -22,7 +22,7 @@ const LIDAR_SCANS: usize = 40;
 const CAMERA_FRAMES: usize = 160;
 /// The camera's pixels along each side, as a share of 640 x 480.
 const CAMERA_SHARE: f64 = 0.4;
-/// What is told of a sensor's way has no more places than this.
+/// Positions that the page gets of the sensor's way, at most.
 const WAY: usize = 4000;
 
 /// Where frames come from.
@@ -109,7 +109,7 @@ impl Source {
     /// Frame `i`, and where it was taken.
     ///
     /// # Errors
-    /// Where there is none, or its file cannot be read.
+    /// Where `i` is out of range, or the file cannot be read.
     pub(super) fn frame(&mut self, i: usize) -> Result<(Pose<3>, Arc<Frame>), Refusal> {
         let none = || Refusal::new(format!("there is no frame {i}"));
         let pose = self.pose(i).ok_or_else(none)?;
@@ -125,12 +125,12 @@ impl Source {
         Ok((pose, frame))
     }
 
-    /// What there is in truth; `None` where nobody knows.
-    pub(super) fn world(&self) -> Option<&World3> {
+    /// The true world; `None` for recorded logs.
+    pub(super) fn world(&self) -> Option<&SpaceWorld> {
         self.walk.as_ref().map(|walk| &walk.world)
     }
 
-    /// Whether frames may have colours.
+    /// Whether frames may have colors.
     pub(super) fn has_color(&self) -> bool {
         match &self.walk {
             Some(walk) => walk.kind == Sensor::Camera,
@@ -138,7 +138,7 @@ impl Source {
         }
     }
 
-    /// The axis of the world that points up: z, but where cameras tell otherwise, whose frames have it down their y. Their
+    /// The axis of the world that points up: z, except in the worlds of cameras, whose y points down. Their
     /// worlds are often those of the first picture.
     pub(super) fn up(&self) -> [f64; 3] {
         let z = [0.0, 0.0, 1.0];

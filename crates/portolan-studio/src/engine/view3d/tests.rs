@@ -6,8 +6,8 @@ use std::sync::Arc;
 use portolan::surface::{MeshSettings, marching_cubes};
 use serde_json::{Value, json};
 
-use super::settings::mesh_settings;
 use super::state::View3d;
+use crate::engine::recipe::mesh_settings;
 use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Session, Values, Wire};
 
 fn view() -> View3d {
@@ -128,7 +128,7 @@ fn what_the_page_has_is_the_mesh() {
     let reply = drain(&mut view, &mut other, reply);
     assert_eq!(reply.body["mesh"]["triangles"], other.triangles().len());
     assert!(other.triangles() == page.triangles());
-    // Other colours in the same places.
+    // Other colors in the same places.
     for by in ["weight", "error", "height"] {
         let reply = ask(&mut view, json!({ "op": "color", "by": by })).unwrap();
         assert_eq!(reply.body["color"]["by"], by);

@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 
 use super::ask::Slice;
 use super::maps::Maps;
-use super::settings::mesh_settings;
 use super::slice::{AXES, Extent, KnownOrSaturated, layer_index, value_of};
 use super::source::Source;
 use crate::engine::Refusal;
+use crate::engine::recipe::mesh_settings;
 
 /// Rays are followed so far (metres).
 const FARTHEST: f64 = 10_000.0;
