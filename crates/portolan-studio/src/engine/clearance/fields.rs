@@ -15,9 +15,9 @@ pub(super) type Sample = (f64, [f64; 2]);
 /// Both fields, over the cells of the map.
 pub(super) struct Fields {
     /// As `query` makes it, with distances to unknown cells.
-    pub(super) euclidean: SparseEsdf<2>,
+    pub(super) euclidean: Esdf<2>,
     /// The same at the cells' centers.
-    pub(super) dense: DenseEsdf<2>,
+    pub(super) dense: EsdfGrid<2>,
     /// What the filter keeps, read as if it were a distance field: bilinear between the centers of the same cells that the
     /// Euclidean field knows.
     truncated: EsdfGrid<2>,
@@ -38,7 +38,7 @@ impl Fields {
         Ok(Self {
             euclidean,
             dense,
-            truncated: Esdf::from_samples(*tsdf.grid(), kept.collect())?,
+            truncated: EsdfGrid::from_samples(*tsdf.grid(), kept.collect())?,
             // As the map itself decides which cells are saturated.
             limit: f64::from(tsdf.rule().truncation) * (1.0 - 1e-4),
         })

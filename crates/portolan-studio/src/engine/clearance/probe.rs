@@ -2,7 +2,7 @@
 
 use portolan::Answer;
 use portolan::field::{Esdf, UnknownSpace};
-use portolan::map::{MapRepr, Tsdf2};
+use portolan::map::Tsdf2;
 use portolan_io::{AnswerRow, certified_reach, write_answer};
 use serde_json::{Value, json};
 
@@ -52,7 +52,7 @@ pub(super) fn row(tsdf: &Tsdf2, field: &Esdf<2>, p: [f64; 2], unknown: UnknownSp
 }
 
 /// A 2-D map is a box: what lies outside does not depend on where something was seen.
-fn in_box(tsdf: &Tsdf2, field: &SparseEsdf<2>, p: [f64; 2]) -> Answer<Sample> {
+fn in_box(tsdf: &Tsdf2, field: &Esdf<2>, p: [f64; 2]) -> Answer<Sample> {
     match field.distance_and_gradient(p) {
         _ if !tsdf.grid().aabb().contains(p) => Answer::Outside,
         Answer::Outside => Answer::Unknown,

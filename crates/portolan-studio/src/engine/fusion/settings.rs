@@ -5,7 +5,8 @@ use portolan_io::{sweep_of, sweep_word, weights_of, weights_word};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
-use crate::engine::recipe::{CARVE_WEIGHT, within};
+use crate::engine::recipe::within;
+use portolan::mapper::CARVE_WEIGHT;
 
 /// How scans are made and fused.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -32,7 +33,7 @@ pub(in crate::engine) struct Settings {
 impl Settings {
     /// Those that `map` has, so that the same log gives the same map.
     pub(super) fn of_log() -> Self {
-        Self { carve_weight: CARVE_WEIGHT, ..Self::default() }
+        Self { carve_weight: (1e4 * f64::from(CARVE_WEIGHT)).round() / 1e4, ..Self::default() }
     }
 }
 
@@ -58,7 +59,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(in crate::engine) fn config(&self) -> Result<Tsdf2Config, Refusal> {
+    pub(in crate::engine) fn config(&self) -> Result<TsdfConfig<2>, Refusal> {
         let resolution = within("resolution", self.resolution, 0.01, 1.0)?;
         let truncation = within("truncation", self.truncation, resolution, 10.0)?;
         within("noise", self.noise, 0.0, 0.5)?;

@@ -145,7 +145,7 @@ impl Fusion {
                 self.limits.memory >> 20
             )));
         }
-        let tsdf = Tsdf2::new(config.with_grid(&grid)).map_err(Refusal::new)?;
+        let tsdf = Tsdf2::covering(&grid, config).map_err(Refusal::new)?;
         let page = PageCopy::nothing(grid.shape);
         Ok(Fused { at: 0, tsdf, page, ghost: None, stats: ScanStats::default() })
     }
@@ -198,7 +198,7 @@ impl Fusion {
             fused.watch(self.inspected.as_ref());
         }
         while fused.at < to {
-            fused.fuse_one(&mut self.scans, self.settings.carve, self.inspected.as_mut());
+            fused.fuse_one(&mut self.scans, self.inspected.as_mut())?;
             fused.at += 1;
             if self.scans.move_before(fused.at).is_some() {
                 fused.start_ghost(&self.scans);
@@ -291,7 +291,7 @@ impl Fusion {
         let mut inspected = Inspected::new(cell);
         again.watch(Some(&inspected));
         while again.at < at {
-            again.fuse_one(&mut self.scans, self.settings.carve, Some(&mut inspected));
+            again.fuse_one(&mut self.scans, Some(&mut inspected))?;
             again.at += 1;
         }
         let mut body = json!(null);
@@ -328,9 +328,9 @@ impl Fusion {
 
 impl Fused {
     /// Fuses the scan after those that are fused.
-    fn fuse_one(&mut self, scans: &mut Scans, carve: bool, inspected: Option<&mut Inspected>) {
+    fn fuse_one(&mut self, scans: &mut Scans, inspected: Option<&mut Inspected>) -> Result<(), Refusal> {
         let (pose, scan) = scans.scan(self.at);
-        self.stats = self.tsdf.integrate(pose, scan, carve);
+        self.stats = self.tsdf.integrate(pose, scan).map_err(Refusal::new)?;
         if let Some(ghost) = &mut self.ghost {
             ghost.observe(self.tsdf.events());
         }

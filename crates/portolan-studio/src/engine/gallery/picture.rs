@@ -78,7 +78,7 @@ struct Leaves {
 
 fn leaves(built: &Built) -> Leaves {
     let map = &built.measured.tree;
-    let lattice = *map.tree().lattice();
+    let lattice = *map.store().lattice();
     let mut leaves = Leaves { squares: Vec::new(), occupancy: Vec::new() };
     map.store().for_each_leaf(|leaf| {
         leaves.squares.extend([leaf.cell[0] as u32, leaf.cell[1] as u32, 1 << leaf.height]);

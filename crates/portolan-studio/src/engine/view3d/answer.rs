@@ -1,9 +1,9 @@
 //! What the page gets after a question about map and mesh.
 
-use portolan::field::SparseEsdf;
+use portolan::field::Esdf;
 use portolan::geom::BLOCK_EDGE;
 use portolan::geom::vector::{dot, sub};
-use portolan::map::SparseOccupancy;
+use portolan::map::Occupancy;
 use serde_json::json;
 
 use super::ask::ColorBy;
@@ -19,7 +19,7 @@ impl View3d {
         let colors = [ColorBy::Height, ColorBy::Color, ColorBy::Weight, ColorBy::Error];
         let colors: Vec<_> = colors.map(|by| json!({ "by": by, "refused": self.refused(by) })).into();
         let Some(maps) = &mut self.maps else { return Err(Refusal::new("there is no map")) };
-        let (by, tsdf, world) = (self.color, &maps.tsdf, self.source.world());
+        let (by, tsdf, world) = (self.color, maps.tsdf(), self.source.world());
         let delta = maps.buffers.next(&maps.mesh, maps.first, &self.clock, |piece, out| {
             shade::shades(by, piece, tsdf, world, out);
         });
@@ -42,8 +42,8 @@ impl View3d {
             "bricks": tsdf.store().len(),
             "bytes": {
                 "tsdf": tsdf.memory_bytes(),
-                "occupancy": maps.occupancy.as_ref().map(SparseOccupancy::memory_bytes),
-                "esdf": maps.esdf.as_ref().map(SparseEsdf::memory_bytes),
+                "occupancy": maps.occupancy().map(Occupancy::<3>::memory_bytes),
+                "esdf": maps.esdf.as_ref().map(Esdf::memory_bytes),
                 "mesh": maps.mesh.memory_bytes(),
             },
             "surface": surface,
@@ -74,7 +74,7 @@ impl View3d {
                 "height": dot(maps.origin, self.source.up()),
                 "way": self.source.way().into_iter().map(local).collect::<Vec<_>>(),
                 "colors": colors,
-                "occupancy": maps.occupancy.is_some(),
+                "occupancy": maps.occupancy().is_some(),
                 "half_life": tsdf.rule().half_life(1.0),
             });
         }

@@ -24,7 +24,7 @@ pub(super) fn file(maps: &Maps, file: ExportFile) -> Result<Reply, Refusal> {
             dense(esdf)
         }
         ExportFile::Octree => {
-            let map = maps.occupancy.as_ref().ok_or_else(|| {
+            let map = maps.occupancy().ok_or_else(|| {
                 Refusal::new(
                     "this map holds distances only; switch on occupancy in the settings for an octree",
                 )

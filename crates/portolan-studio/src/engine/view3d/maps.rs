@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use portolan::Mapper;
 use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::vector::sub;
 use portolan::geom::{BlockKey, Pose};
@@ -13,13 +14,10 @@ use super::history::Watched;
 use super::mesh_buffers::MeshBuffers;
 use super::settings::Settings;
 use super::source::Source;
-use crate::engine::recipe::{esdf_settings, mesh_settings};
 use crate::engine::{Clock, Refusal};
 
 /// Points of the last frame that are shown.
 const POINTS: usize = 6000;
-/// A lattice begins at the world's zero, unless the log is further from it (cells); as in `map`.
-const FAR_CELLS: f64 = 1e6;
 
 /// Seconds that the last answer's frames took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,8 +36,8 @@ pub(super) struct Seconds {
 pub(super) struct Maps {
     /// Frames that are fused.
     pub(super) at: usize,
-    pub(super) tsdf: Tsdf3,
-    pub(super) occupancy: Option<Occupancy>,
+    /// Distances and, if they are wanted, occupancy.
+    mapper: Mapper<3>,
     pub(super) esdf: Option<Esdf<3>>,
     /// The map's epoch when the Euclidean field was made.
     measured: u64,
@@ -64,17 +62,12 @@ impl Maps {
     /// Maps of nothing, or the map that stands for frames.
     pub(super) fn new(source: &Source, settings: &Settings) -> Result<Self, Refusal> {
         let start = source.pose(0).map_or([0.0; 3], |pose| pose.translation);
-        let (tsdf, occupancy) = match source.map() {
-            Some(map) => (map.clone(), None),
-            None => {
-                let r = settings.resolution;
-                let anchor = start.map(|v| if (v / r).abs() < FAR_CELLS { 0.0 } else { (v / r).round() * r });
-                let config = settings.config(anchor, source.has_color())?;
-                let tsdf = Tsdf3::new(config).map_err(Refusal::new)?;
-                let occupancy = settings.occupancy.then(|| settings.empty_occupancy(*tsdf.lattice()));
-                (tsdf, occupancy.transpose()?)
-            }
-        };
+        let mut mapper = Mapper::with(settings.mapper(source.has_color())?);
+        if let Some(map) = source.map() {
+            mapper = Mapper::of_maps(*mapper.settings(), None, Some(map.clone())).map_err(Refusal::new)?;
+        }
+        mapper.prepare(start).map_err(Refusal::new)?;
+        let Some(tsdf) = mapper.tsdf() else { return Err(Refusal::new("there are no distances")) };
         let near = match source.map() {
             Some(map) => map.store().bricks_by_age().next().map_or(BlockKey([0; 3]), |(key, _)| key),
             None => BlockKey::of_cell(tsdf.lattice().cell_of(start).unwrap_or([0; 3])),
@@ -83,10 +76,9 @@ impl Maps {
             at: 0,
             origin: tsdf.lattice().corner(near.first_cell()),
             first: near,
-            mesh: IncrementalMesh::new(mesh_settings(&tsdf)),
+            mesh: IncrementalMesh::new(MeshSettings::of(tsdf)),
             buffers: MeshBuffers::nothing(source.up()),
-            tsdf,
-            occupancy,
+            mapper,
             esdf: None,
             measured: 0,
             watched: None,
@@ -129,27 +121,32 @@ impl Maps {
         memory: usize,
         clock: &Clock,
     ) -> Result<(), MapError> {
-        let others = self.occupancy.as_ref().map_or(0, Occupancy::<3>::memory_bytes);
-        self.tsdf.set_limit(memory.saturating_sub(others));
-        let (stats, seconds) = clock.time(|| self.tsdf.integrate(pose, frame));
-        self.seconds.tsdf += seconds;
-        self.stats = stats?;
-        if let Some(watched) = &mut self.watched {
-            watched.observe(self.at, self.tsdf.events());
-        }
-        if let Some(map) = &mut self.occupancy {
-            map.set_limit(memory.saturating_sub(self.tsdf.memory_bytes()));
-            let (fused, seconds) = clock.time(|| map.integrate(pose, frame));
-            self.seconds.occupancy += seconds;
-            fused?;
+        self.mapper.set_memory(memory);
+        let fused = self.mapper.integrate_timed(pose, frame, &|| clock.now())?;
+        self.seconds.occupancy += fused.seconds[0];
+        self.seconds.tsdf += fused.seconds[1];
+        self.stats = fused.stats();
+        if let (Some(watched), Some(tsdf)) = (&mut self.watched, self.mapper.tsdf()) {
+            watched.observe(self.at, tsdf.events());
         }
         Ok(())
     }
 
+    /// The signed distances.
+    pub(super) fn tsdf(&self) -> &Tsdf3 {
+        self.mapper.tsdf().expect("the mapper made distances")
+    }
+
+    /// The occupancy beside them, if it is wanted.
+    pub(super) fn occupancy(&self) -> Option<&Occupancy<3>> {
+        self.mapper.occupancy()
+    }
+
     /// Meshes again what has changed.
     pub(super) fn follow(&mut self, clock: &Clock) -> Result<(), Refusal> {
-        let colors = self.tsdf.colors().filter(|store| !store.is_empty());
-        let (changed, seconds) = clock.time(|| self.mesh.update(self.tsdf.store(), colors));
+        let Some(tsdf) = self.mapper.tsdf() else { return Ok(()) };
+        let colors = tsdf.colors().filter(|store| !store.is_empty());
+        let (changed, seconds) = clock.time(|| self.mesh.update(tsdf.store(), colors));
         self.seconds.mesh += seconds;
         if changed.is_empty() {
             return Ok(());
@@ -163,19 +160,20 @@ impl Maps {
     /// Where it would need more than `memory` bytes beside what is held.
     pub(super) fn measure(&mut self, memory: usize, clock: &Clock) -> Result<f64, Refusal> {
         // The field, and as much again while it is made.
-        let needed = 2 * self.tsdf.store().len() * 512 * size_of::<f32>();
+        let needed = 2 * self.tsdf().store().len() * 512 * size_of::<f32>();
         if self.esdf.is_none() && needed > memory {
             return Err(Refusal::new(format!(
                 "the Euclidean field needs {} MiB more than this tab may have; choose larger cells",
                 (needed - memory).div_ceil(1 << 20)
             )));
         }
-        let store = self.tsdf.store();
+        let Some(tsdf) = self.mapper.tsdf() else { return Ok(0.0) };
+        let store = tsdf.store();
         let ((), seconds) = clock.time(|| match &mut self.esdf {
             Some(esdf) => {
                 esdf.update(store);
             }
-            None => self.esdf = Some(Esdf::of(&self.tsdf, &EsdfSettings::default())),
+            None => self.esdf = Some(Esdf::of(tsdf, &EsdfSettings::default())),
         });
         self.measured = store.epoch();
         Ok(seconds)
@@ -183,12 +181,14 @@ impl Maps {
 
     /// The Euclidean field, where it is that of the map as it is now.
     pub(super) fn esdf_now(&self) -> Option<&Esdf<3>> {
-        self.esdf.as_ref().filter(|_| self.measured == self.tsdf.store().epoch())
+        self.esdf.as_ref().filter(|_| self.measured == self.tsdf().store().epoch())
     }
 
     /// Watches a cell, and what was found of it so far.
     pub(super) fn watch(&mut self, watched: Option<Watched>) {
-        self.tsdf.watch(watched.iter().map(|w| w.cell));
+        if let Some(tsdf) = self.mapper.tsdf_mut() {
+            tsdf.watch(watched.iter().map(|w| w.cell));
+        }
         self.watched = watched;
     }
 
@@ -206,8 +206,7 @@ impl Maps {
     }
 
     pub(super) fn memory_bytes(&self) -> usize {
-        self.tsdf.memory_bytes()
-            + self.occupancy.as_ref().map_or(0, Occupancy::memory_bytes)
+        self.mapper.memory_bytes()
             + self.esdf.as_ref().map_or(0, Esdf::memory_bytes)
             + self.mesh.memory_bytes()
             + self.buffers.memory_bytes()

@@ -24,19 +24,19 @@ impl View3d {
     pub(super) fn slice(&mut self, slice: Slice) -> Result<Reply, Refusal> {
         let seconds = if slice.field == Field::Esdf { self.measure()? } else { 0.0 };
         let maps = self.maps()?;
-        if slice.field == Field::Occupancy && maps.occupancy.is_none() {
+        if slice.field == Field::Occupancy && maps.occupancy().is_none() {
             return Err(Refusal::new("this map holds distances only; switch on occupancy in the settings"));
         }
-        let lattice = *maps.tsdf.lattice();
-        let Some(extent) = Extent::of(&maps.tsdf) else {
+        let lattice = *maps.tsdf().lattice();
+        let Some(extent) = Extent::of(maps.tsdf()) else {
             return Err(Refusal::new("nothing was observed yet, so that there is nothing to cut"));
         };
         let slice = in_world(slice, maps.origin);
         let cell = slice::layer_index(&slice, slice.at, &extent, &lattice)?;
-        let value = slice::value_of(slice.field, &maps.tsdf, maps.occupancy.as_ref(), maps.esdf.as_ref());
+        let value = slice::value_of(slice.field, maps.tsdf(), maps.occupancy(), maps.esdf.as_ref());
         let layer = slice::layer(slice.axis, cell, &extent, &lattice, value);
         let most = match slice.field {
-            Field::Tsdf => f64::from(maps.tsdf.rule().truncation),
+            Field::Tsdf => f64::from(maps.tsdf().rule().truncation),
             Field::Esdf => maps.esdf.as_ref().map_or(0.0, |e| f64::from(e.max_distance())),
             Field::Occupancy => 1.0,
         };
@@ -87,7 +87,7 @@ impl View3d {
         let since = self.at();
         let maps = self.maps()?;
         if maps.watched.as_ref().is_none_or(|w| w.cell != cell) {
-            let watched = Watched::new(cell, since, *maps.tsdf.config())?;
+            let watched = Watched::new(cell, since, *maps.tsdf().config())?;
             maps.watch(Some(watched));
         }
         let Some(maps) = &self.maps else { return Reply::of(Value::Null) };

@@ -1,12 +1,11 @@
 //! What the page's sliders set.
 
+use portolan::MapperSettings;
 use portolan::cell::OccupancyModel;
-use portolan::geom::Lattice;
-use portolan::map::{OccupancySweep, SparseOccupancy, SparseTsdfConfig};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
-use crate::engine::recipe::{CARVE_WEIGHT, FARTHEST_CELLS, within};
+use crate::engine::recipe::within;
 
 /// How frames are made and fused.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -40,11 +39,11 @@ pub(in crate::engine) enum Sensor {
 impl Default for Settings {
     /// Those of `map`: 5 cm, truncation three cells, W_max 64, with carving.
     fn default() -> Self {
-        let config = TsdfConfig::<3>::default();
+        let usual = MapperSettings::<3>::new(0.05);
         Self {
-            resolution: config.resolution,
-            truncation: config.truncation,
-            w_max: config.w_max.into(),
+            resolution: usual.resolution,
+            truncation: usual.truncation(),
+            w_max: usual.w_max.into(),
             carve: true,
             occupancy: false,
             sensor: Sensor::default(),
@@ -53,29 +52,21 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// As the map takes them.
+    /// As the mapper takes them.
     ///
     /// # Errors
     /// Names the setting that is out of its range.
-    pub(super) fn config(&self, origin: [f64; 3], color: bool) -> Result<SparseTsdfConfig, Refusal> {
+    pub(super) fn mapper(&self, color: bool) -> Result<MapperSettings<3>, Refusal> {
         let resolution = within("resolution", self.resolution, 0.005, 1.0)?;
         let truncation = within("truncation", self.truncation, resolution, 20.0 * resolution)?;
         let w_max = within("w_max", self.w_max, 0.5, 1e6)?;
-        Ok(TsdfConfig {
-            resolution,
-            origin,
-            truncation,
+        Ok(MapperSettings {
+            truncation: Some(truncation),
             w_max: w_max as f32,
             carve: self.carve,
-            carve_weight: CARVE_WEIGHT as f32,
+            occupancy: self.occupancy.then(OccupancyModel::default),
             color,
-            max_range: LONGEST_RAY_CELLS * resolution - truncation,
-            ..TsdfConfig::default()
+            ..MapperSettings::new(resolution)
         })
-    }
-
-    /// A map that is occupied or free beside that of distances.
-    pub(super) fn empty_occupancy(&self, lattice: Lattice<3>) -> Result<Occupancy<3>, Refusal> {
-        Occupancy::<3>::new(lattice, OccupancyModel::default()).map_err(Refusal::new)
     }
 }

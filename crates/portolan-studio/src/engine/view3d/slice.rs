@@ -77,7 +77,7 @@ pub(super) fn layer_index(
 pub(super) fn value_of<'a>(
     field: Field,
     tsdf: &'a Tsdf3,
-    occupancy: Option<&'a Occupancy>,
+    occupancy: Option<&'a Occupancy<3>>,
     esdf: Option<&'a Esdf<3>>,
 ) -> impl Fn([i32; 3]) -> f32 + 'a {
     move |cell| {

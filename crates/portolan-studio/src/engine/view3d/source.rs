@@ -126,7 +126,7 @@ impl Source {
     }
 
     /// The true world; `None` for recorded logs.
-    pub(super) fn world(&self) -> Option<&SpaceWorld> {
+    pub(super) fn world(&self) -> Option<&World3> {
         self.walk.as_ref().map(|walk| &walk.world)
     }
 

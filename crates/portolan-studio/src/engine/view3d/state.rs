@@ -134,7 +134,7 @@ impl View3d {
     fn begin(&mut self) -> Result<(), Refusal> {
         let mut maps = Maps::new(&self.source, &self.settings)?;
         let before = self.maps.take();
-        let same = before.as_ref().is_some_and(|b| b.tsdf.lattice() == maps.tsdf.lattice());
+        let same = before.as_ref().is_some_and(|b| b.tsdf().lattice() == maps.tsdf().lattice());
         if let Some(mut watched) = before.and_then(|b| b.watched).filter(|_| same) {
             watched.begin();
             maps.watch(Some(watched));
@@ -146,7 +146,7 @@ impl View3d {
     }
 
     fn set(&mut self, settings: Settings) -> Result<Reply, Refusal> {
-        settings.config([0.0; 3], false)?;
+        settings.mapper(false)?;
         self.settings = settings;
         self.source.set_sensor(self.settings.sensor);
         if self.color == ColorBy::Color && !self.source.has_color() {

@@ -7,7 +7,6 @@ use portolan::surface::{MeshSettings, marching_cubes};
 use serde_json::{Value, json};
 
 use super::state::View3d;
-use crate::engine::recipe::mesh_settings;
 use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Session, Values, Wire};
 
 fn view() -> View3d {
@@ -88,7 +87,7 @@ fn drain(view: &mut View3d, page: &mut Page, first: Reply) -> Reply {
 
 fn whole(view: &View3d) -> Vec<[[u32; 3]; 3]> {
     let maps = view.maps_for_tests();
-    let mesh = marching_cubes(maps.tsdf.store(), None, &mesh_settings(&maps.tsdf));
+    let mesh = marching_cubes(maps.tsdf(), None, &MeshSettings::default());
     // The same operations with another corner: places differ by rounding only where the corner does.
     let shift: [f64; 3] = std::array::from_fn(|k| mesh.origin[k] - maps.origin[k]);
     assert!(shift.iter().all(|s| s.is_finite()));
@@ -155,7 +154,7 @@ fn a_slice_holds_what_the_map_says() {
         let shape = [0, 1].map(|i| reply.body["shape"][i].as_u64().unwrap() as usize);
         assert_eq!(values.len(), shape[0] * shape[1]);
         let maps = view.maps_for_tests();
-        let lattice = maps.tsdf.lattice();
+        let lattice = maps.tsdf().lattice();
         let axes = [0, 1].map(|i| reply.body["axes"][i].as_u64().unwrap() as usize);
         let corner: [f64; 3] = std::array::from_fn(|k| reply.body["corner"][k].as_f64().unwrap());
         let mut known = 0;
@@ -164,12 +163,12 @@ fn a_slice_holds_what_the_map_says() {
             p[axes[0]] += (0.5 + (i % shape[0]) as f64) * lattice.resolution;
             p[axes[1]] += (0.5 + (i / shape[0]) as f64) * lattice.resolution;
             let expected = match field {
-                "tsdf" => maps.tsdf.signed_distance(p).known().or(saturated(maps.tsdf.signed_distance(p))),
+                "tsdf" => maps.tsdf().signed_distance(p).known().or(saturated(maps.tsdf().signed_distance(p))),
                 "esdf" => {
                     let cell = maps.esdf.as_ref().unwrap().cell(lattice.cell_of(p).unwrap());
                     cell.known().or(saturated(cell)).map(f64::from)
                 }
-                _ => maps.occupancy.as_ref().unwrap().probability(p).known(),
+                _ => maps.occupancy().unwrap().probability(p).known(),
             };
             known += usize::from(expected.is_some());
             assert_eq!(expected.map(|v| v as f32), (!value.is_nan()).then_some(*value), "{field} {i}");
@@ -209,8 +208,8 @@ fn the_history_of_a_voxel_ends_at_its_state() {
         let cell = std::array::from_fn::<_, 3, _>(|k| cell[k].as_i64().unwrap() as i32);
         let maps = view.maps_for_tests();
         let point: [f64; 3] = std::array::from_fn(|k| met["point"][k].as_f64().unwrap() + maps.origin[k]);
-        assert_eq!(maps.tsdf.lattice().cell_of(point), Some(cell));
-        if maps.tsdf.signed_distance(point).known().is_some_and(|d| d.abs() < 0.3) {
+        assert_eq!(maps.tsdf().lattice().cell_of(point), Some(cell));
+        if maps.tsdf().signed_distance(point).known().is_some_and(|d| d.abs() < 0.3) {
             found.insert(cell);
         }
     }
@@ -218,10 +217,10 @@ fn the_history_of_a_voxel_ends_at_its_state() {
     for cell in found {
         let body = ask(&mut view, json!({ "op": "voxel", "cell": cell })).unwrap().body;
         let maps = view.maps_for_tests();
-        let state = portolan::store::Store::cell(maps.tsdf.store(), cell).unwrap();
+        let state = portolan::store::Store::cell(maps.tsdf().store(), cell).unwrap();
         assert_eq!(body["distance"].as_f64(), Some(f64::from(state.distance)));
         assert_eq!(body["weight"].as_f64(), Some(f64::from(state.weight)));
-        let center = maps.tsdf.lattice().center(cell);
+        let center = maps.tsdf().lattice().center(cell);
         let truth = true_distance(&view, center);
         assert_eq!(body["truth"].as_f64(), Some(truth));
         let history = loop {

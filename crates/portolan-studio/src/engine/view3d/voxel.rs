@@ -8,10 +8,9 @@ use serde_json::{Value, json};
 
 use super::ask::Slice;
 use super::maps::Maps;
-use super::slice::{AXES, Extent, KnownOrSaturated, layer_index, value_of};
+use super::slice::{AXES, Extent, layer_index, value_of};
 use super::source::Source;
 use crate::engine::Refusal;
-use crate::engine::recipe::mesh_settings;
 
 /// Rays are followed so far (metres).
 const FARTHEST: f64 = 10_000.0;
@@ -37,24 +36,24 @@ pub(super) fn pick(
     }
     let direction = scale(direction, 1.0 / length);
     let settings = RayCastSettings {
-        min_weight: mesh_settings(&maps.tsdf).min_weight,
+        min_weight: Some(maps.tsdf().thresholds().surface),
         max_range: FARTHEST,
         // The eye is outside of the map: whatever lies between was not observed.
         unknown_tolerance: FARTHEST,
         blind: FARTHEST,
     };
-    let lattice = maps.tsdf.lattice();
-    let mut met = match RayCaster::new(maps.tsdf.store(), settings).cast(origin, direction) {
+    let lattice = maps.tsdf().lattice();
+    let mut met = match RayCaster::new(maps.tsdf().store(), settings).cast(origin, direction) {
         RayCast::Hit(range) => Some((range, false)),
         RayCast::Unknown(_) | RayCast::Outside(_) | RayCast::Free => None,
     };
-    if let (Some(slice), Some(extent)) = (slice, Extent::of(&maps.tsdf)) {
+    if let (Some(slice), Some(extent)) = (slice, Extent::of(maps.tsdf())) {
         let cell = layer_index(slice, slice.at, &extent, lattice)?;
         let k = slice.axis;
         let mut first = extent.first;
         first[k] = cell;
         let range = (lattice.center(first)[k] - origin[k]) / direction[k];
-        let value = value_of(slice.field, &maps.tsdf, maps.occupancy.as_ref(), maps.esdf.as_ref());
+        let value = value_of(slice.field, maps.tsdf(), maps.occupancy(), maps.esdf.as_ref());
         let there = lattice.cell_of(along(origin, direction, range)).map(|mut c| {
             c[k] = cell;
             c
@@ -69,7 +68,7 @@ pub(super) fn pick(
     Ok(met.and_then(|(range, on_slice)| {
         let point = along(origin, direction, range);
         let mut cell = lattice.cell_of(point)?;
-        if let (true, Some(slice), Some(extent)) = (on_slice, slice, Extent::of(&maps.tsdf)) {
+        if let (true, Some(slice), Some(extent)) = (on_slice, slice, Extent::of(maps.tsdf())) {
             cell[slice.axis] = layer_index(slice, slice.at, &extent, lattice).ok()?;
         }
         Some(Met { cell, point, on_slice })
@@ -78,10 +77,10 @@ pub(super) fn pick(
 
 /// What is known of a cell; its distance in the Euclidean field only where that was maps of the map as it is now.
 pub(super) fn describe(maps: &Maps, source: &Source, cell: [i32; 3], origin: [f64; 3]) -> Value {
-    let lattice = maps.tsdf.lattice();
+    let lattice = maps.tsdf().lattice();
     let center = lattice.center(cell);
-    let state = maps.tsdf.store().cell(cell);
-    let occupancy = maps.occupancy.as_ref().map(|map| {
+    let state = maps.tsdf().store().cell(cell);
+    let occupancy = maps.occupancy().map(|map| {
         let p = map.probability(center).known();
         json!({ "probability": p, "occupied": map.is_occupied(cell) })
     });
@@ -97,14 +96,14 @@ pub(super) fn describe(maps: &Maps, source: &Source, cell: [i32; 3], origin: [f6
             "interval": interval.status().word(),
         })
     });
-    let color = maps.tsdf.color(center).filter(|c| c.weight > 0);
+    let color = maps.tsdf().color(center).filter(|c| c.weight > 0);
     json!({
         "cell": cell,
         "center": center,
         "corner": std::array::from_fn::<_, 3, _>(|k| lattice.corner(cell)[k] - origin[k]),
         "distance": state.map(|s| s.distance),
         "weight": state.map(|s| s.weight),
-        "status": maps.tsdf.signed_distance(center).status(),
+        "status": maps.tsdf().signed_distance(center).status().word(),
         "occupancy": occupancy,
         "esdf": esdf,
         "color": color.map(|c| json!({ "rgb": c.rgb8(), "weight": c.weight() })),
