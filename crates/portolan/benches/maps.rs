@@ -6,7 +6,7 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use portolan::cell::OccupancyModel;
 use portolan::field::{EsdfGrid, esdf_from_tsdf};
-use portolan::geom::{Grid, Pose};
+use portolan::geom::{Grid, Lattice, Pose};
 use portolan::map::{Cloud, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
 use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
@@ -99,7 +99,7 @@ mod derive {
 
     #[divan::bench]
     fn contour() -> usize {
-        marching_squares(black_box(&TSDF), &ContourSettings::default()).segments.len()
+        marching_squares(black_box(&*TSDF), &ContourSettings::default()).segments.len()
     }
 
     #[divan::bench]
@@ -160,13 +160,13 @@ mod probe {
 
     #[divan::bench(sample_count = 10)]
     fn distance_contour_by_brute_force(bencher: Bencher) {
-        let contour = marching_squares(&TSDF, &ContourSettings::default());
+        let contour = marching_squares(&*TSDF, &ContourSettings::default());
         bench(bencher, |p| contour.nearest_distance(p));
     }
 
     #[divan::bench(sample_count = 10)]
     fn inside_contour_by_crossings(bencher: Bencher) {
-        let contour = marching_squares(&TSDF, &ContourSettings::default());
+        let contour = marching_squares(&*TSDF, &ContourSettings::default());
         bench(bencher, |p| contour.is_inside(p).map(|inside| f64::from(u8::from(inside))));
     }
 }

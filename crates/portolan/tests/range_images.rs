@@ -21,7 +21,7 @@ impl Maps {
         let lattice = Lattice::new([0.0; 3], RESOLUTION);
         let mut maps = Self {
             distances: Tsdf3::new(config).unwrap(),
-            occupancy: Occupancy::new(lattice, Default::default(), Default::default()).unwrap(),
+            occupancy: Occupancy::new(lattice, Default::default()).unwrap(),
         };
         maps.distances.integrate(&Pose::IDENTITY, frame).unwrap();
         maps.occupancy.integrate(&Pose::IDENTITY, frame).unwrap();

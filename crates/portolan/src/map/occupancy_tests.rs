@@ -251,8 +251,8 @@ fn images_and_beams_without_a_surface() {
     let beam = |kind| Beam { direction: [1.0, 0.0, 0.0], range: 1.05, kind };
     let mut by_beams = map([0.0; 3]);
     let scan = Scan::from_beams([beam(BeamKind::NoReturn)]);
-    let stats = by_beams.integrate_scan(&Pose::IDENTITY, &scan);
+    let stats = by_beams.integrate(&Pose::IDENTITY, &scan).unwrap();
     assert_eq!((stats.beams.no_return, by_beams.observed_cells()), (1, 10));
-    by_beams.integrate_scan(&Pose::IDENTITY, &Scan::from_beams([beam(BeamKind::Hit)]));
+    by_beams.integrate(&Pose::IDENTITY, &Scan::from_beams([beam(BeamKind::Hit)])).unwrap();
     assert_eq!(by_beams.is_occupied([10, 0, 0]), Some(true));
 }

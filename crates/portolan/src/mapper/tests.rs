@@ -6,7 +6,6 @@ use crate::field::Esdf;
 use crate::geom::{Pose, vector};
 use crate::map::{Occupancy, ScanKind, Tsdf};
 use crate::scan::{Beam, BeamKind, Scan};
-use crate::store::Store;
 use crate::surface::{ContourSettings, MeshSettings, marching_cubes, marching_squares};
 use crate::sweep::WeightModel;
 

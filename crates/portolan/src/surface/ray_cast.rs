@@ -229,7 +229,7 @@ pub(super) mod tests {
 
     pub(crate) fn wall<const D: usize>() -> DenseTsdf<D> {
         let mut tsdf =
-            Tsdf::new(TsdfConfig { cells: [20; D], resolution: 0.1, truncation: 0.3, ..Default::default() })
+            DenseTsdf::covering(&Grid::new([0.0; D], 0.1, [20; D]), TsdfConfig { truncation: 0.3, ..Default::default() })
                 .unwrap();
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);

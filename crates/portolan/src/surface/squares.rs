@@ -223,7 +223,7 @@ pub(crate) fn crossing_place(a: f32, b: f32) -> f64 {
 mod tests {
     use super::*;
     use crate::geom::vector::{distance, sub};
-    use crate::map::{Tsdf, Tsdf2, TsdfConfig};
+    use crate::map::{Tsdf2, TsdfConfig};
     use crate::store::Bricks;
     use proptest::prelude::*;
 
@@ -321,6 +321,24 @@ mod tests {
             }
             let joined: usize = contour.polylines().iter().map(|l| l.vertices.len() - usize::from(!l.closed)).sum();
             prop_assert_eq!(joined, contour.segments.len());
+        }
+    }
+
+    proptest! {
+        /// The same cells in bricks have the same contour, vertex by vertex.
+        #[test]
+        fn bricks_have_the_contour_of_an_array(
+            shape in [2usize..30, 2usize..30],
+            values in prop::collection::vec(prop_oneof![4 => -1.0..1.0f64, 1 => Just(f64::NAN)], 900),
+            far in any::<bool>(),
+        ) {
+            let at = |p: [f64; 2]| values[(p[1] as usize * 30 + p[0] as usize) % 900];
+            let tsdf = field(shape, at);
+            let settings = ContourSettings::of(&tsdf);
+            // Another cell 0 moves the borders of the bricks, but not the cells.
+            let origin = if far { [-3.0, -21.0] } else { [0.0; 2] };
+            let bricks = Bricks::of_dense(tsdf.store(), Lattice::new(origin, 1.0)).unwrap();
+            prop_assert_eq!(marching_squares(&bricks, &settings), marching_squares(&tsdf, &settings));
         }
     }
 }

@@ -19,10 +19,9 @@ impl View3d {
         let colors = [ColorBy::Height, ColorBy::Color, ColorBy::Weight, ColorBy::Error];
         let colors: Vec<_> = colors.map(|by| json!({ "by": by, "refused": self.refused(by) })).into();
         let Some(maps) = &mut self.maps else { return Err(Refusal::new("there is no map")) };
-        let (by, tsdf, world) = (self.color, maps.tsdf(), self.source.world());
-        let delta = maps.buffers.next(&maps.mesh, maps.first, &self.clock, |piece, out| {
-            shade::shades(by, piece, tsdf, world, out);
-        });
+        let (by, world) = (self.color, self.source.world());
+        let delta = maps.next(&self.clock, |piece, tsdf, out| shade::shades(by, piece, tsdf, world, out));
+        let tsdf = maps.tsdf();
         let lattice = tsdf.lattice();
         let bounds = Extent::of(tsdf).map(|e| e.aabb(lattice));
         let local = |p: [f64; 3]| sub(p, maps.origin);

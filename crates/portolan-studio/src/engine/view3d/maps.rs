@@ -8,10 +8,10 @@ use portolan::geom::vector::sub;
 use portolan::geom::{BlockKey, Pose};
 use portolan::map::{MapError, Occupancy, Tsdf3};
 use portolan::scan::{Frame, ScanStats};
-use portolan::surface::{IncrementalMesh, MeshSettings};
+use portolan::surface::{IncrementalMesh, Mesh, MeshSettings};
 
 use super::history::Watched;
-use super::mesh_buffers::MeshBuffers;
+use super::mesh_buffers::{Delta, MeshBuffers};
 use super::settings::Settings;
 use super::source::Source;
 use crate::engine::{Clock, Refusal};
@@ -130,6 +130,12 @@ impl Maps {
             watched.observe(self.at, tsdf.events());
         }
         Ok(())
+    }
+
+    /// What the page lacks of the mesh, each vertex with the byte that `shade` gives it.
+    pub(super) fn next(&mut self, clock: &Clock, mut shade: impl FnMut(&Mesh, &Tsdf3, &mut Vec<u8>)) -> Delta {
+        let tsdf = self.mapper.tsdf().expect("the mapper made distances");
+        self.buffers.next(&self.mesh, self.first, clock, |piece, out| shade(piece, tsdf, out))
     }
 
     /// The signed distances.

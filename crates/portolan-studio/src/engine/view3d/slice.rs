@@ -92,20 +92,6 @@ pub(super) fn value_of<'a>(
     }
 }
 
-/// The number of an answer, a saturated one included.
-pub(super) trait KnownOrSaturated<T> {
-    fn known_or_saturated(self) -> Option<T>;
-}
-
-impl<T> KnownOrSaturated<T> for portolan::Answer<T> {
-    fn known_or_saturated(self) -> Option<T> {
-        match self {
-            Self::Known(v) | Self::Saturated(v) => Some(v),
-            Self::Unknown | Self::Outside => None,
-        }
-    }
-}
-
 /// Cuts.
 pub(super) fn layer(
     axis: usize,

@@ -235,7 +235,7 @@ fn the_history_of_a_voxel_ends_at_its_state() {
         // It goes on while it is watched.
         ask(&mut view, json!({ "op": "step", "frames": 1 })).unwrap();
         let after = ask(&mut view, json!({ "op": "history" })).unwrap().body;
-        let state = portolan::store::Store::cell(view.maps_for_tests().tsdf.store(), cell).unwrap();
+        let state = portolan::store::Store::cell(view.maps_for_tests().tsdf().store(), cell).unwrap();
         let last = after["events"].as_array().unwrap().last().unwrap().clone();
         assert_eq!(last[5].as_f64().map(|v| v as f32), Some(state.distance));
     }

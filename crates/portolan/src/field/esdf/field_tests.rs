@@ -5,7 +5,7 @@ use crate::answer::Answer;
 use crate::cell::{DistanceBrick, Planes};
 use crate::field::esdf_from_tsdf;
 use crate::geom::{block_cells, vector};
-use crate::map::{Tsdf, TsdfConfig};
+use crate::map::{DenseTsdf, TsdfConfig};
 use proptest::prelude::*;
 
 const R: f64 = 0.1;
@@ -88,8 +88,8 @@ proptest! {
 
 /// A ball in a box of observed cells, dense and in bricks.
 fn ball<const D: usize>(n: usize) -> (DenseTsdf<D>, Bricks<SignedDistance, D>) {
-    let config = TsdfConfig { cells: [n; D], resolution: R, truncation: 0.3, ..Default::default() };
-    let mut tsdf = Tsdf::new(config).unwrap();
+    let config = TsdfConfig { truncation: 0.3, ..Default::default() };
+    let mut tsdf = DenseTsdf::covering(&crate::geom::Grid::new([0.0; D], R, [n; D]), config).unwrap();
     let mut bricks = Bricks::new(tsdf.grid().lattice);
     for i in 0..tsdf.grid().len() {
         let cell = tsdf.grid().cell(i);

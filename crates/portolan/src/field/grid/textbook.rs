@@ -49,11 +49,12 @@ mod tests {
     use super::*;
     use crate::answer::Answer;
     use crate::geom::vector;
+    use crate::geom::Grid;
     use crate::map::TsdfConfig;
 
     fn sphere<const D: usize>(n: usize, r: f64, radius: f64) -> DenseTsdf<D> {
-        let config = TsdfConfig { cells: [n; D], resolution: r, truncation: 3.0 * r, ..Default::default() };
-        let mut tsdf = Tsdf::new(config).unwrap();
+        let config = TsdfConfig { truncation: 3.0 * r, ..Default::default() };
+        let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; D], r, [n; D]), config).unwrap();
         let centre = [0.5 * n as f64 * r; D];
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);
@@ -90,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_map_without_a_surface_is_unknown_and_not_far() {
-        let mut tsdf = Tsdf2::new(TsdfConfig { cells: [10; 2], ..Default::default() }).unwrap();
+        let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; 2], 0.05, [10; 2]), TsdfConfig::default()).unwrap();
         (0..100).for_each(|i| {
             let cell = tsdf.grid().cell(i);
             tsdf.fuse(cell, 0.15, 1.0);
@@ -104,7 +105,7 @@ mod tests {
     #[test]
     fn unobserved_cells_make_their_neighbourhood_unknown() {
         let mut tsdf =
-            Tsdf2::new(TsdfConfig { cells: [20; 2], resolution: 0.1, ..Default::default() }).unwrap();
+            DenseTsdf::covering(&Grid::new([0.0; 2], 0.1, [20; 2]), TsdfConfig::default()).unwrap();
         for i in 0..400 {
             let cell = tsdf.grid().cell(i);
             if cell != [10, 10] {
