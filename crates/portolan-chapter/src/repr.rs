@@ -1,7 +1,7 @@
 //! The text's thesis as an interface: a map is what it can answer cheaply.
 
-use portolan::geom::Pose;
 use portolan::cell::{LogOdds8, SignedDistance};
+use portolan::geom::Pose;
 use portolan::map::{Cloud, MapError, Occupancy, Tsdf};
 use portolan::scan::{Scan, ScanStats};
 use portolan::store::Store;
@@ -118,7 +118,8 @@ mod tests {
     #[test]
     fn what_cannot_be_asked_is_not_what_is_not_known() {
         let mut grid =
-            OccupancyGrid::<2>::covering(&Grid::new([0.0; 2], 0.1, [4; 2]), OccupancyModel::default()).unwrap();
+            OccupancyGrid::<2>::covering(&Grid::new([0.0; 2], 0.1, [4; 2]), OccupancyModel::default())
+                .unwrap();
         let (no_scan, p) = (Scan::from_beams([]), [0.2, 0.2]);
         assert_eq!(grid.integrate_scan(&Pose::IDENTITY, &no_scan).unwrap().scans, 1);
         assert_eq!((MapRepr::occupancy(&grid, p), MapRepr::distance(&grid, p)), (None, None));

@@ -4,11 +4,14 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use portolan::Mapper;
 use portolan::cell::OccupancyModel;
 use portolan::field::{EsdfGrid, esdf_from_tsdf};
 use portolan::geom::{Grid, Lattice, Pose};
-use portolan::map::{Cloud, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
-use portolan::scan::Scan;
+use portolan::map::{
+    BeamSweep, Cloud, MapError, Occupancy, OccupancyGrid, Quadtree, Tsdf, Tsdf2, TsdfConfig,
+};
+use portolan::scan::{Scan, ScanStats};
 use portolan::surface::{ContourSettings, marching_squares};
 use std::sync::LazyLock;
 
@@ -60,8 +63,35 @@ fn tsdf(sweep: BeamSweep, carve: bool) -> Tsdf2 {
     map
 }
 
+/// Fuses the lap into a map in bricks.
+fn in_bricks<M>(mut map: M, fuse: impl Fn(&mut M, &Pose<2>, &Scan<2>) -> Result<ScanStats, MapError>) -> M {
+    for (pose, scan) in LOG.iter() {
+        fuse(&mut map, pose, scan).expect("memory without limit");
+    }
+    map
+}
+
 mod update {
     use super::*;
+
+    #[divan::bench]
+    fn occupancy_bricks(bencher: Bencher) {
+        let new = || Occupancy::<2>::new(grid().lattice, OccupancyModel::default()).expect("a valid map");
+        bencher.counter(scans()).bench(|| in_bricks(new(), |map, pose, scan| map.integrate(pose, scan)));
+    }
+
+    #[divan::bench(args = [false, true])]
+    fn tsdf_bricks(bencher: Bencher, carve: bool) {
+        let config = TsdfConfig { carve, ..Default::default() };
+        let new = || Tsdf::<2>::new(config).expect("a valid map");
+        bencher.counter(scans()).bench(|| in_bricks(new(), |map, pose, scan| map.integrate(pose, scan)));
+    }
+
+    #[divan::bench]
+    fn mapper(bencher: Bencher) {
+        let new = || Mapper::<2>::new(0.05);
+        bencher.counter(scans()).bench(|| in_bricks(new(), |map, pose, scan| map.integrate(pose, scan)));
+    }
 
     #[divan::bench]
     fn occupancy_grid(bencher: Bencher) {

@@ -8,7 +8,7 @@ use super::run::{Gallery, GallerySettings};
 use crate::memory::inner_only_node_bytes;
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Grid, Lattice, Pose};
-use portolan::map::{Cloud, MapError, OccupancyGrid, Quadtree, BeamSweep, Tsdf2, TsdfConfig};
+use portolan::map::{BeamSweep, Cloud, MapError, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::scan::{Scan, ScanStats};
 use portolan::store::Store;
 use portolan::surface::{Contour, marching_squares};

@@ -49,8 +49,7 @@ fn after_the_move() -> (f64, f64, Option<f64>) {
     let world = apartment().world;
     let moved = world.with_moved("chair", CHAIR_MOVE);
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
-    let mut tsdf =
-        Tsdf2::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
+    let mut tsdf = Tsdf2::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
     let mut cloud = Cloud::new();
     for (k, world) in [&world, &moved].into_iter().enumerate() {
         for (pose, scan) in lap(world, &LapConfig { first_index: 200 * k as u64, ..Default::default() }) {

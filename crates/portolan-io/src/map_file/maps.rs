@@ -30,7 +30,9 @@ pub(super) fn saved_tree<const D: usize>(
     Saved { store: map.store(), settings: OccupancySettings { model: *map.model(), more: Map::new() } }
 }
 
-pub(super) fn saved_tsdf<const D: usize>(map: &DenseTsdf<D>) -> Saved<'_, Dense<SignedDistance, D>, TsdfSettings> {
+pub(super) fn saved_tsdf<const D: usize>(
+    map: &DenseTsdf<D>,
+) -> Saved<'_, Dense<SignedDistance, D>, TsdfSettings> {
     let config = map.config();
     let settings = TsdfSettings {
         truncation: config.truncation,

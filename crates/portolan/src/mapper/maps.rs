@@ -162,7 +162,10 @@ impl<const D: usize> Mapper<D> {
         let memory = self.settings.memory;
         let Maps { occupancy, tsdf, .. } = &mut self.maps;
         let bytes = |occupancy: &Option<Occupancy<D>>, tsdf: &Option<Tsdf<D>>| {
-            [occupancy.as_ref().map_or(0, Occupancy::<D>::memory_bytes), tsdf.as_ref().map_or(0, Tsdf::memory_bytes)]
+            [
+                occupancy.as_ref().map_or(0, Occupancy::<D>::memory_bytes),
+                tsdf.as_ref().map_or(0, Tsdf::memory_bytes),
+            ]
         };
         let fuse_occupancy = |map: &mut Option<Occupancy<D>>, limit: usize| {
             map.as_mut().map(|map| {

@@ -98,7 +98,9 @@ fn makes_what_its_parts_make<const D: usize>() {
     let anew = Esdf::of(&tsdf, &settings);
     let field = mapper.esdf().unwrap();
     for key in anew.keys() {
-        assert!((0..crate::geom::block_cells::<D>()).all(|i| field.cell(key.cell(i)) == anew.cell(key.cell(i))));
+        assert!(
+            (0..crate::geom::block_cells::<D>()).all(|i| field.cell(key.cell(i)) == anew.cell(key.cell(i)))
+        );
     }
 }
 

@@ -228,9 +228,11 @@ pub(super) mod tests {
     use crate::map::TsdfConfig;
 
     pub(crate) fn wall<const D: usize>() -> DenseTsdf<D> {
-        let mut tsdf =
-            DenseTsdf::covering(&Grid::new([0.0; D], 0.1, [20; D]), TsdfConfig { truncation: 0.3, ..Default::default() })
-                .unwrap();
+        let mut tsdf = DenseTsdf::covering(
+            &Grid::new([0.0; D], 0.1, [20; D]),
+            TsdfConfig { truncation: 0.3, ..Default::default() },
+        )
+        .unwrap();
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);
             let x = tsdf.grid().lattice.center(cell)[0];

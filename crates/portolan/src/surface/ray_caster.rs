@@ -128,7 +128,8 @@ mod tests {
     fn bricks_say_what_an_array_says<const D: usize>() {
         // Whole bricks, so that both end at the same place; with a hole in what was observed.
         let whole = wall::<D>();
-        let mut tsdf = DenseTsdf::covering(&Grid { shape: [16; D], ..*whole.grid() }, *whole.config()).unwrap();
+        let mut tsdf =
+            DenseTsdf::covering(&Grid { shape: [16; D], ..*whole.grid() }, *whole.config()).unwrap();
         for i in 0..tsdf.grid().len() {
             let cell = tsdf.grid().cell(i);
             if let Some(v) = whole.store().cell(cell).filter(|_| !(cell[0] == 8 && cell[1] < 9)) {

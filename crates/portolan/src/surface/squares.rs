@@ -145,8 +145,7 @@ fn extract(samples: &Samples<'_>, load: impl Fn(usize, &mut Row), ambiguity: Amb
                 continue;
             }
             for &[from, to] in segments(code, &d, ambiguity) {
-                let ends =
-                    [from, to].map(|edge| vertex(&mut contour, &mut edges, samples, [x, y], &d, edge));
+                let ends = [from, to].map(|edge| vertex(&mut contour, &mut edges, samples, [x, y], &d, edge));
                 contour.segments.push(ends);
             }
         }

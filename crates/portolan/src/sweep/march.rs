@@ -1,7 +1,9 @@
 //! The textbook's march: samples along every beam.
 
 use super::touched::Touched;
-use super::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel, beam_stats, clip};
+use super::{
+    LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel, beam_stats, clip,
+};
 use crate::cell::{DistanceObservation, Distances};
 use crate::geom::vector::along;
 use crate::geom::{BlockKey, Lattice, Pose};

@@ -76,6 +76,7 @@ impl PageCopy {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use portolan::geom::Grid;
     use portolan::map::TsdfConfig;
     use proptest::prelude::*;
 

@@ -133,7 +133,11 @@ impl Maps {
     }
 
     /// What the page lacks of the mesh, each vertex with the byte that `shade` gives it.
-    pub(super) fn next(&mut self, clock: &Clock, mut shade: impl FnMut(&Mesh, &Tsdf3, &mut Vec<u8>)) -> Delta {
+    pub(super) fn next(
+        &mut self,
+        clock: &Clock,
+        mut shade: impl FnMut(&Mesh, &Tsdf3, &mut Vec<u8>),
+    ) -> Delta {
         let tsdf = self.mapper.tsdf().expect("the mapper made distances");
         self.buffers.next(&self.mesh, self.first, clock, |piece, out| shade(piece, tsdf, out))
     }

@@ -13,13 +13,7 @@ const ERROR_CELLS: f64 = 1.0;
 
 /// Four bytes per vertex: red, green, blue, 255 for colors as they were seen; else a step of a ramp, 0, 0, and 255 where
 /// there is a value. Zeros for heights, which follow from the positions.
-pub(super) fn shades(
-    by: ColorBy,
-    piece: &Mesh,
-    tsdf: &Tsdf3,
-    world: Option<&World3>,
-    out: &mut Vec<u8>,
-) {
+pub(super) fn shades(by: ColorBy, piece: &Mesh, tsdf: &Tsdf3, world: Option<&World3>, out: &mut Vec<u8>) {
     let known = |share: f64| [step(share), 0, 0, 255];
     for i in 0..piece.vertices.len() {
         let shade = match by {

@@ -163,7 +163,9 @@ fn a_slice_holds_what_the_map_says() {
             p[axes[0]] += (0.5 + (i % shape[0]) as f64) * lattice.resolution;
             p[axes[1]] += (0.5 + (i / shape[0]) as f64) * lattice.resolution;
             let expected = match field {
-                "tsdf" => maps.tsdf().signed_distance(p).known().or(saturated(maps.tsdf().signed_distance(p))),
+                "tsdf" => {
+                    maps.tsdf().signed_distance(p).known().or(saturated(maps.tsdf().signed_distance(p)))
+                }
                 "esdf" => {
                     let cell = maps.esdf.as_ref().unwrap().cell(lattice.cell_of(p).unwrap());
                     cell.known().or(saturated(cell)).map(f64::from)

@@ -48,8 +48,8 @@ pub fn esdf_from_tsdf<const D: usize>(tsdf: &DenseTsdf<D>, min_weight: f32, band
 mod tests {
     use super::*;
     use crate::answer::Answer;
-    use crate::geom::vector;
     use crate::geom::Grid;
+    use crate::geom::vector;
     use crate::map::TsdfConfig;
 
     fn sphere<const D: usize>(n: usize, r: f64, radius: f64) -> DenseTsdf<D> {
@@ -91,7 +91,8 @@ mod tests {
 
     #[test]
     fn a_map_without_a_surface_is_unknown_and_not_far() {
-        let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; 2], 0.05, [10; 2]), TsdfConfig::default()).unwrap();
+        let mut tsdf =
+            DenseTsdf::covering(&Grid::new([0.0; 2], 0.05, [10; 2]), TsdfConfig::default()).unwrap();
         (0..100).for_each(|i| {
             let cell = tsdf.grid().cell(i);
             tsdf.fuse(cell, 0.15, 1.0);

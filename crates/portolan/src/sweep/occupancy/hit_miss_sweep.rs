@@ -5,9 +5,7 @@ use super::masks::Bits;
 use crate::cell::HitMiss;
 use crate::geom::{BlockKey, Lattice, Pose};
 use crate::parallel;
-use crate::scan::{
-    BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout,
-};
+use crate::scan::{BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
 use crate::sweep::image::ProjectiveMisses;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept};
 use std::borrow::Cow;
@@ -127,7 +125,8 @@ impl<S: ?Sized> HitMissSweep<S> {
             };
             let (is_marked, is_seen) = (marked.get(i) == Some(&key), seen.get(j) == Some(&key));
             self.keys.push(key);
-            self.parts.push(Parts { rays: is_marked.then_some(i as u32), misses: is_seen.then_some(j as u32) });
+            self.parts
+                .push(Parts { rays: is_marked.then_some(i as u32), misses: is_seen.then_some(j as u32) });
             i += usize::from(is_marked);
             j += usize::from(is_seen);
         }
