@@ -11,6 +11,9 @@ use rustc_hash::FxHashMap;
 /// beyond a limit is forgotten quickly.
 const TOGETHER: usize = 4096;
 
+/// Cells that are worth a task of their own: 16 bricks in 3-D, 128 in 2-D.
+const CELLS_A_TASK: usize = 8192;
+
 /// Cells in bricks of `8^D`, found by hashing the brick's index.
 ///
 /// A brick shares its planes with every snapshot (a clone of the store) until one of the two changes it. Indices are
@@ -147,7 +150,7 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
                 let bytes = brick.as_ref().map_or(0, Planes::bytes);
                 Work { position: chunk * TOGETHER + i, slot, bytes, brick, cells: 0 }
             }));
-            parallel::change_each(&mut work, 16, &scratch, |w, s| {
+            parallel::change_each(&mut work, CELLS_A_TASK / block_cells::<D>(), &scratch, |w, s| {
                 w.cells = change(w.position, &mut w.brick, s)
             });
             let mut full = Ok(());
@@ -202,7 +205,8 @@ fn find<const D: usize>(
     keys: &[BlockKey<D>],
     found: &mut Vec<Option<u32>>,
 ) {
-    const TOGETHER: usize = 256;
+    // Fewer are found sooner than a thread wakes up.
+    const TOGETHER: usize = 2048;
     found.clear();
     found.resize(keys.len(), None);
     parallel::for_each(
