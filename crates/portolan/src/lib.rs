@@ -7,7 +7,7 @@
 //! output, prints nothing, starts no threads of its own and reads no clock.
 //!
 //! ```
-//! use portolan::{Answer, geom::{Grid, Pose}, map::{Tsdf2, Tsdf2Config}, scan::{RangeLimits, Scan}};
+//! use portolan::{Answer, field::Esdf, geom::{Grid, Pose}, map::{Tsdf2, Tsdf2Config}, scan::{RangeLimits, Scan}};
 //!
 //! // A laser in the middle of a room of 4 m x 4 m, 360 beams.
 //! let bearings: Vec<f64> = (0..360).map(|d| f64::from(d - 180).to_radians()).collect();
@@ -19,9 +19,9 @@
 //!
 //! // Where is the surface? How far is it, and which way is away from it? And what is not known?
 //! let contour = portolan::surface::marching_squares(&tsdf, &Default::default());
-//! let esdf = portolan::field::esdf_from_tsdf(&tsdf, 0.5, 1.5);
+//! let esdf = Esdf::of(&tsdf, &Default::default());
 //! let (clearance, away) = esdf.distance_and_gradient([1.5, 0.02]).known().expect("seen by the laser");
-//! assert!((clearance - 0.5).abs() < 0.05 && away[0] < -0.9);
+//! assert!((clearance - 0.5).abs() < 0.01 && away[0] < -0.99);
 //! assert!((contour.length() - 16.0).abs() < 0.2);
 //! assert_eq!(esdf.distance([2.4, 2.4]), Answer::Unknown);
 //! # Ok::<(), portolan::map::MapError>(())
@@ -32,7 +32,8 @@
 //! | is this point occupied? | [`map::OccupancyGrid`] | one index |
 //! | the same, in space that is mostly never seen | [`map::Quadtree`], [`map::Octree`] | a descent |
 //! | where is the surface? | [`map::Tsdf`], then [`surface::marching_squares`] | one pass over the cells |
-//! | how far to the nearest surface, and which way is away? | [`field::Esdf`] | one interpolation |
+//! | how far to the nearest surface, and which way is away? | [`field::Esdf`], kept up to date with its map | one interpolation |
+//! | how far for certain, at least and at most? | [`field::ClearanceField`] of it | a look at the surface nearby |
 //! | is this path free, this pose of a robot, and where would it be? | [`plan`] over a field | steps of the clearance |
 //! | where does the known end, and what would be seen from there? | [`explore`] over [`map::SparseTsdf`] | changed bricks |
 //! | how near is the nearest measurement? | [`map::Cloud`] | a k-d tree |
