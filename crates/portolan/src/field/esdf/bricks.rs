@@ -23,7 +23,7 @@ pub(crate) struct EsdfBrick {
 pub(crate) struct Nearest {
     /// `min over crossings w of |q - w|^2 + h_w`, squared cells; infinite beyond the largest distance.
     pub(crate) power: Box<[f32]>,
-    /// The edge of that crossing, as a [`super::feature::Feature`]; [`super::feature::Feature::NONE`] beyond it.
+    /// The edge of that crossing, as a feature, [`Feature::NONE`](super::transform::Feature::NONE) beyond it.
     pub(crate) feature: Box<[u32]>,
 }
 

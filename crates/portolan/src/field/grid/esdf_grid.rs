@@ -159,25 +159,6 @@ impl<const D: usize> EsdfGrid<D> {
         self.sample(p_world.into()).map(|(value, slope)| (value, vector::scale(slope, inverse)))
     }
 
-    /// The textbook's gradient: central differences of the distance over one cell to either side. Another field
-    /// than the one that the value comes from; [`EsdfGrid::gradient`] is the one to use.
-    pub fn central_difference(&self, p_world: impl Into<[f64; D]>) -> Answer<[f64; D]> {
-        let p = p_world.into();
-        let h = self.grid.lattice.resolution;
-        let mut gradient = [0.0; D];
-        for k in 0..D {
-            let (mut low, mut high) = (p, p);
-            low[k] -= h;
-            high[k] += h;
-            match (self.distance(low), self.distance(high)) {
-                (Answer::Known(a), Answer::Known(b)) => gradient[k] = (b - a) / (2.0 * h),
-                (Answer::Outside, _) | (_, Answer::Outside) => return Answer::Outside,
-                _ => return Answer::Unknown,
-            }
-        }
-        Answer::Known(gradient)
-    }
-
     #[inline(always)]
     fn sample(&self, p: [f64; D]) -> Answer<(f64, [f64; D])> {
         let Some((base, fraction)) = self.grid.interpolation(p) else { return self.nothing_at(p) };

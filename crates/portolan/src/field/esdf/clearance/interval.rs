@@ -21,7 +21,7 @@ impl Interval {
     }
 }
 
-/// Of fields made by [`super::EsdfMethod::Accurate`]; others certify nothing and answer that they do not know.
+/// Of fields made by [`EsdfMethod::Accurate`](crate::field::EsdfMethod::Accurate); others certify nothing and answer that they do not know.
 ///
 /// The distance meant is that to the segments or triangles that [`crate::surface::marching_squares`] and
 /// [`crate::surface::marching_cubes`] extract with the same `min_weight`, as they are: not to the true surface, from
@@ -36,7 +36,7 @@ impl Interval {
 /// to a distance of one cell. Further away, up to 24 cells, bounds that are more than 1/32 of a cell apart make it look at
 /// all elements that lie between them: O(bricks within the distance); O(1) otherwise.
 ///
-/// Pessimistic answers need the distances to unknown cells ([`super::EsdfSettings::unknown`]); without them
+/// Pessimistic answers need the distances to unknown cells ([`EsdfSettings::unknown`](crate::field::EsdfSettings::unknown)); without them
 /// unknown cells are looked for around the point only, and `lower` is never more than a cell.
 impl<const D: usize> ClearanceField<D> for Esdf<D> {
     fn clearance(&self, p_world: [f64; D], unknown: UnknownSpace) -> Answer<Clearance> {
@@ -75,7 +75,7 @@ impl<const D: usize> Esdf<D> {
 
     /// How far the nearest cell is that was not observed, at least and at most (metres); cells of bricks that were never
     /// made are among them. 0 in such a cell; saturated beyond the largest distance, and beyond a cell where
-    /// [`super::EsdfSettings::unknown`] did not ask for these distances. `inside` is false. O(1).
+    /// [`EsdfSettings::unknown`](crate::field::EsdfSettings::unknown) did not ask for these distances. `inside` is false. O(1).
     pub fn unknown_distance(&self, p_world: impl Into<[f64; D]>) -> Answer<Clearance> {
         let Some(point) = QueryPoint::of(self, p_world.into()) else { return Answer::Outside };
         if !self.observes(point.holder) {

@@ -1,9 +1,9 @@
 //! From the nearest crossings to the distances of the nodes of a brick.
 
+use super::groups::{Groups, digit};
 use super::simplices::{Block, LANES, Lane};
-use crate::field::esdf::surface::{SurfaceElements, cells_around};
-use crate::field::esdf::transform::Feature;
-use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
+use crate::field::esdf::surface::SurfaceElements;
+use crate::geom::BlockKey;
 use multiversion::multiversion;
 
 /// Scratch of [`NodeDistances::brick`], used again for every brick.
@@ -11,12 +11,8 @@ pub(crate) struct NodeDistances<const D: usize> {
     /// Elements of the cells at the brick's nodes.
     near: Vec<Near<D>>,
     lanes: Vec<Lane>,
-    /// For the brick's nodes and those beside it: the group of what the transform found; `NONE`.
-    groups_at: Vec<u16>,
-    groups: Vec<Group<D>>,
-    corners: Vec<[[Lane; D]; D]>,
+    groups: Groups<D>,
     blocks: Vec<Block<D>>,
-    table: Table,
     tasks: Vec<Task>,
     packed: Packed<D>,
 }
@@ -28,20 +24,6 @@ struct Near<const D: usize> {
     simplex: [[f32; D]; D],
 }
 
-/// The elements around one crossing.
-#[derive(Clone, Copy)]
-struct Group<const D: usize> {
-    /// Node where the crossing's edge starts, in cells from the brick's lowest node: what corners are relative to.
-    origin: [f32; D],
-    first: u32,
-    simplices: u32,
-    /// Nodes that ask for it.
-    nodes: u32,
-    /// Where they are packed.
-    packed: u32,
-    packed_end: u32,
-}
-
 /// A node whose distance to a group is wanted.
 #[derive(Clone, Copy)]
 struct Task {
@@ -49,22 +31,16 @@ struct Task {
     group: u16,
 }
 
-const NONE: u16 = u16::MAX;
 /// Nodes that are measured together, the widest vectors full; a group's are filled up to a multiple.
 const TOGETHER: usize = 16;
-/// Nodes along an axis with those beside the brick.
-const PADDED: usize = BLOCK_EDGE + 2;
 
 impl<const D: usize> NodeDistances<D> {
     pub(crate) fn new() -> Self {
         Self {
             near: Vec::new(),
             lanes: Vec::new(),
-            groups_at: vec![NONE; PADDED.pow(D as u32)],
-            groups: Vec::new(),
-            corners: Vec::new(),
+            groups: Groups::new(),
             blocks: Vec::new(),
-            table: Table::new(),
             tasks: Vec::new(),
             packed: Packed { points: std::array::from_fn(|_| Vec::new()), best: Vec::new() },
         }
@@ -74,12 +50,12 @@ impl<const D: usize> NodeDistances<D> {
     /// that the transform found for the node and for its `2 D` neighbours, and in the `2^D` cells around the node;
     /// infinite where nothing was found for the node.
     ///
-    /// `features` are the transform's words for the brick, `beside(axis, side)` those for the bricks below (0) and above
+    /// `features` are the transform's for the brick, `beside(axis, side)` those for the bricks below (0) and above
     /// (1), which hold nothing beyond what the transform is exact for.
     ///
     /// Never less than the distance to the surface, but for rounding (1e-6 of the distance and of a cell). Exact within
     /// one cell of the surface, where a ball lies in the cells around the node; further away nearly always. Depends on
-    /// the words and the elements alone.
+    /// the features and the elements alone.
     pub(crate) fn brick<'f>(
         &mut self,
         elements: &SurfaceElements<D>,
@@ -90,7 +66,7 @@ impl<const D: usize> NodeDistances<D> {
     ) {
         out.fill(f32::INFINITY);
         self.near(elements, key, out);
-        self.number(elements, key, features, beside);
+        self.groups.number(elements, key, features, beside);
         self.tasks.clear();
         for (node, found) in out.iter_mut().enumerate() {
             // A ball of a cell's size lies in the cells around the node.
@@ -98,24 +74,9 @@ impl<const D: usize> NodeDistances<D> {
                 continue;
             }
             *found = f32::INFINITY;
-            let at = padded::<D>(std::array::from_fn(|k| digit(node, k) as i32));
-            if self.groups_at[at] == NONE {
-                continue;
-            }
-            let mut groups = [NONE; 7];
-            groups[0] = self.groups_at[at];
-            let mut count = 1;
-            for k in 0..D {
-                for beside in [at - PADDED.pow(k as u32), at + PADDED.pow(k as u32)] {
-                    let group = self.groups_at[beside];
-                    if group != NONE && !groups[..count].contains(&group) {
-                        groups[count] = group;
-                        count += 1;
-                    }
-                }
-            }
+            let (groups, count) = self.groups.around(node);
             for &group in &groups[..count] {
-                self.groups[usize::from(group)].nodes += 1;
+                self.groups.list[usize::from(group)].nodes += 1;
                 self.tasks.push(Task { node: node as u16, group });
             }
         }
@@ -128,27 +89,27 @@ impl<const D: usize> NodeDistances<D> {
     /// Squared distances of all tasks.
     fn measure(&mut self, out: &mut [f32]) {
         let mut length = 0;
-        for group in &mut self.groups {
+        for group in &mut self.groups.list {
             group.packed = length;
             length += group.nodes.next_multiple_of(TOGETHER as u32);
             group.packed_end = group.packed;
         }
         self.packed.clear(length as usize);
         for task in &self.tasks {
-            let group = &mut self.groups[usize::from(task.group)];
+            let group = &mut self.groups.list[usize::from(task.group)];
             for k in 0..D {
                 let at = digit(usize::from(task.node), k) as f32 - group.origin[k];
                 self.packed.points[k][group.packed_end as usize] = at;
             }
             group.packed_end += 1;
         }
-        for group in &mut self.groups {
+        for group in &mut self.groups.list {
             group.packed_end = group.packed_end.next_multiple_of(TOGETHER as u32);
         }
         self.blocks.clear();
-        measure_groups(&self.corners, &mut self.blocks, &self.groups, &mut self.packed);
+        measure_groups(&self.groups, &mut self.blocks, &mut self.packed);
         for task in &self.tasks {
-            let next = &mut self.groups[usize::from(task.group)].packed;
+            let next = &mut self.groups.list[usize::from(task.group)].packed;
             let (found, least) = (self.packed.best[*next as usize], &mut out[usize::from(task.node)]);
             *least = if found < *least { found } else { *least };
             *next += 1;
@@ -181,105 +142,6 @@ impl<const D: usize> NodeDistances<D> {
             }
         }
     }
-
-    /// Finds the groups of all nodes.
-    fn number<'f>(
-        &mut self,
-        elements: &SurfaceElements<D>,
-        key: BlockKey<D>,
-        features: &[u32],
-        beside: impl Fn(usize, usize) -> Option<&'f [u32]>,
-    ) {
-        self.groups_at.fill(NONE);
-        self.groups.clear();
-        self.corners.clear();
-        self.table.clear();
-        let mut last = (u64::MAX, NONE);
-        for (i, &word) in features.iter().enumerate().take(block_cells::<D>()) {
-            self.number_one(elements, key, std::array::from_fn(|k| digit(i, k) as i32), word, &mut last);
-        }
-        for (axis, side) in (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]) {
-            let Some(features) = beside(axis, side) else { continue };
-            let layer = if side == 0 { BLOCK_EDGE - 1 } else { 0 };
-            for (i, &word) in features.iter().enumerate().filter(|(i, _)| digit(*i, axis) == layer) {
-                let mut node: [i32; D] = std::array::from_fn(|k| digit(i, k) as i32);
-                node[axis] = if side == 0 { -1 } else { BLOCK_EDGE as i32 };
-                self.number_one(elements, key, node, word, &mut last);
-            }
-        }
-    }
-
-    #[inline]
-    fn number_one(
-        &mut self,
-        elements: &SurfaceElements<D>,
-        key: BlockKey<D>,
-        node: [i32; D],
-        word: u32,
-        last: &mut (u64, u16),
-    ) {
-        let Some(feature) = Feature(word).known() else { return };
-        let offset = feature.offset::<D>();
-        let start: [i32; D] = std::array::from_fn(|k| node[k] + offset[k]);
-        let name = start.iter().fold(feature.axis() as u64, |name, &v| name << 12 | (v + 2048) as u64);
-        if name != last.0 {
-            let slot = self.table.slot(name);
-            if slot.number == NONE {
-                slot.number = self.groups.len() as u16;
-                *last = (name, slot.number);
-                self.add_group(elements, key, start, feature.axis());
-            } else {
-                *last = (name, slot.number);
-            }
-        }
-        self.groups_at[padded::<D>(node)] = last.1;
-    }
-
-    /// Collects the elements around a crossing.
-    fn add_group(&mut self, elements: &SurfaceElements<D>, key: BlockKey<D>, start: [i32; D], axis: usize) {
-        let first_cell = key.first_cell();
-        let edge: [i32; D] = std::array::from_fn(|k| first_cell[k] + start[k]);
-        let place = elements.brick(BlockKey::of_cell(edge)).map(|b| b.place[axis][BlockKey::offset(edge)]);
-        let first = self.corners.len();
-        let mut lane = 0;
-        let corners = &mut self.corners;
-        cells_around(edge, axis, place.unwrap_or(0.5), |cell| {
-            let off: [f32; D] = std::array::from_fn(|k| (cell[k] - edge[k]) as f32);
-            for simplex in elements.cell(cell) {
-                if lane % LANES == 0 {
-                    // Lanes that nothing follows for repeat the first.
-                    corners.push(simplex.map(|p| std::array::from_fn(|k| [p[k] + off[k]; LANES])));
-                } else if let Some(block) = corners.last_mut() {
-                    for (i, p) in simplex.iter().enumerate() {
-                        for k in 0..D {
-                            block[i][k][lane % LANES] = p[k] + off[k];
-                        }
-                    }
-                }
-                lane += 1;
-            }
-        });
-        let origin = start.map(|v| v as f32);
-        self.groups.push(Group {
-            origin,
-            first: first as u32,
-            simplices: lane as u32,
-            nodes: 0,
-            packed: 0,
-            packed_end: 0,
-        });
-    }
-}
-
-#[inline(always)]
-fn digit(at: usize, k: usize) -> usize {
-    at >> (3 * k) & 7
-}
-
-/// Place of a node, -1 to 8 along each axis.
-#[inline(always)]
-fn padded<const D: usize>(node: [i32; D]) -> usize {
-    (0..D).rev().fold(0, |at, k| at * PADDED + (node[k] + 1) as usize)
 }
 
 /// Squared distances of the nodes of a cell to each simplex in it.
@@ -309,16 +171,11 @@ fn measure_near<const D: usize>(near: &[Near<D>], lanes: &mut Vec<Lane>) {
 
 /// Squared distances of nodes, packed by groups, to the elements of their groups.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
-fn measure_groups<const D: usize>(
-    corners: &[[[Lane; D]; D]],
-    blocks: &mut Vec<Block<D>>,
-    groups: &[Group<D>],
-    packed: &mut Packed<D>,
-) {
-    for corners in corners {
+fn measure_groups<const D: usize>(groups: &Groups<D>, blocks: &mut Vec<Block<D>>, packed: &mut Packed<D>) {
+    for corners in &groups.corners {
         blocks.push(Block::of(*corners));
     }
-    for group in groups {
+    for group in &groups.list {
         let nodes = group.packed as usize..group.packed_end as usize;
         for at in nodes.step_by(TOGETHER) {
             let mut points = [[0.0; TOGETHER]; D];
@@ -350,48 +207,5 @@ impl<const D: usize> Packed<D> {
         }
         // What fills up may be anywhere.
         self.points.iter_mut().for_each(|list| list.fill(0.0));
-    }
-}
-
-/// Numbers of crossings by their names: open addressing, emptied by counting rounds.
-struct Table {
-    slots: Vec<Slot>,
-    round: u32,
-}
-
-#[derive(Clone, Copy)]
-struct Slot {
-    name: u64,
-    round: u32,
-    number: u16,
-}
-
-impl Table {
-    /// More than twice the nodes in and beside a brick.
-    const SLOTS: usize = 2048;
-
-    fn new() -> Self {
-        Self { slots: vec![Slot { name: 0, round: 0, number: NONE }; Self::SLOTS], round: 0 }
-    }
-
-    fn clear(&mut self) {
-        self.round = self.round.wrapping_add(1);
-        if self.round == 0 {
-            *self = Self::new();
-            self.round = 1;
-        }
-    }
-
-    /// The slot of a name; its number is `NONE` if the name is new.
-    #[inline]
-    fn slot(&mut self, name: u64) -> &mut Slot {
-        let mut at = (name.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 53) as usize;
-        while self.slots[at].round == self.round && self.slots[at].name != name {
-            at = (at + 1) % Self::SLOTS;
-        }
-        if self.slots[at].round != self.round {
-            self.slots[at] = Slot { name, round: self.round, number: NONE };
-        }
-        &mut self.slots[at]
     }
 }
