@@ -1,7 +1,7 @@
 //! Writes a picture of a mesh: `mesh VERTICES.f32 TRIANGLES.u32 OUT.png [x y z ...]`, raw little-endian arrays of
 //! three numbers a row; further numbers are positions of sensors inside.
 
-#![allow(clippy::print_stderr, reason = "a program says how long it took")]
+#![allow(clippy::print_stderr, reason = "an example prints its time")]
 
 use portolan_draw::{MeshView, Preview, Sensor, preview};
 

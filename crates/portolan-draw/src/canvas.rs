@@ -6,7 +6,7 @@ use tiny_skia::{
 
 use crate::{Color, PixelRect, View, color};
 
-/// How a line is drawn: color, width in pixels, dashes.
+/// The style of a line: color, width in pixels, dashes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pen {
     /// Color of the line.
@@ -41,7 +41,7 @@ impl Canvas {
     /// A blank picture; each side is clamped to 1 ..= [`Canvas::MAX_SIZE`].
     ///
     /// # Panics
-    /// When the memory for the pixels cannot be had.
+    /// Where the memory for the pixels cannot be allocated.
     pub fn new(width: u32, height: u32) -> Self {
         let (width, height) = (width.clamp(1, Self::MAX_SIZE), height.clamp(1, Self::MAX_SIZE));
         let mut pixels = Pixmap::new(width, height).expect("sizes are within the limits of the pixel buffer");
@@ -64,7 +64,7 @@ impl Canvas {
         PixelRect::new(0.0, 0.0, f64::from(self.width()), f64::from(self.height()))
     }
 
-    /// The color of a pixel; paper outside of the picture.
+    /// The color of a pixel; [`color::PAPER`] outside the picture.
     pub fn pixel(&self, x: u32, y: u32) -> Color {
         self.pixels.pixel(x, y).map_or(color::PAPER, |p| Color {
             r: p.red(),
@@ -74,7 +74,7 @@ impl Canvas {
         })
     }
 
-    /// Lays `color` over one pixel; outside of the picture nothing happens.
+    /// Blends `color` over one pixel; no effect outside the picture.
     pub(crate) fn blend(&mut self, x: i64, y: i64, color: Color) {
         if x < 0 || y < 0 || x >= i64::from(self.width()) || y >= i64::from(self.height()) {
             return;
@@ -85,7 +85,7 @@ impl Canvas {
         data[..3].copy_from_slice(&[mixed.r, mixed.g, mixed.b]);
     }
 
-    /// Puts rows of pixels, `width` each, with their upper left corner at `(x, y)`; what does not fit is left out.
+    /// Copies rows of pixels, `width` each, with their upper left corner at `(x, y)`, clipped to the picture.
     pub(crate) fn paste(&mut self, x: usize, y: usize, width: usize, pixels: &[[u8; 3]]) {
         let (columns, rows) = (self.width() as usize, self.height() as usize);
         let fits = width.min(columns.saturating_sub(x));
@@ -98,17 +98,17 @@ impl Canvas {
         }
     }
 
-    /// Lays another picture over this one, its upper left corner at `(x, y)`.
+    /// Copies another picture, with its upper left corner at `(x, y)`.
     pub fn paste_canvas(&mut self, x: usize, y: usize, other: &Self) {
         let pixels: Vec<[u8; 3]> = other.pixels.data().chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
         self.paste(x, y, other.width() as usize, &pixels);
     }
 
     /// A raster of `shape[0] × shape[1]` cells of `resolution` meters whose cell (0, 0) has its lower left
-    /// corner at `origin`; `color` is asked for the cells by index and its answer laid over the picture.
+    /// corner at `origin`; `color` returns the color of a cell by index, which is blended over the picture.
     ///
-    /// Every pixel looks up the cell under it, so any scale works: enlarged cells are crisp squares, and
-    /// where cells are smaller than pixels up to 4 × 4 of them are averaged. O(pixels of the view).
+    /// Every pixel looks up the cell under it at any scale: enlarged cells are crisp squares, and of cells smaller than a
+    /// pixel up to 4 × 4 are averaged. O(pixels of the view).
     pub fn raster(
         &mut self,
         view: &View,
@@ -128,26 +128,14 @@ impl Canvas {
             (rect.y.max(0.0) as i64, rect.bottom().min(f64::from(self.height())).ceil() as i64);
         for y in top..bottom {
             for x in left..right {
-                let mut sum = [0.0; 4];
-                for sub in 0..samples * samples {
-                    let fraction = |i: usize| (i as f64 + 0.5) / samples as f64;
-                    let pixel = [x as f64 + fraction(sub % samples), y as f64 + fraction(sub / samples)];
-                    let world = view.world_from_pixel(pixel);
+                let mean = mean_color(samples, |offset| {
+                    let world = view.world_from_pixel([x as f64 + offset[0], y as f64 + offset[1]]);
                     let cell = [0, 1].map(|a| ((world[a] - origin[a]) / resolution).floor());
-                    if (0..2).all(|a| cell[a] >= 0.0 && cell[a] < shape[a] as f64) {
-                        let c = color([cell[0] as usize, cell[1] as usize]);
-                        let alpha = f64::from(c.a);
-                        for (total, channel) in sum.iter_mut().zip([c.r, c.g, c.b]) {
-                            *total += alpha * f64::from(channel);
-                        }
-                        sum[3] += alpha;
-                    }
-                }
-                if sum[3] > 0.0 {
-                    let channel = |i: usize| (sum[i] / sum[3]).round() as u8;
-                    let alpha = sum[3] / (255 * samples * samples) as f64;
-                    let mean = Color { r: channel(0), g: channel(1), b: channel(2), a: 255 };
-                    self.blend(x, y, mean.with_alpha(alpha));
+                    let inside = (0..2).all(|a| cell[a] >= 0.0 && cell[a] < shape[a] as f64);
+                    inside.then(|| color([cell[0] as usize, cell[1] as usize]))
+                });
+                if let Some(mean) = mean {
+                    self.blend(x, y, mean);
                 }
             }
         }
@@ -195,7 +183,7 @@ impl Canvas {
         self.fill(path.finish(), color);
     }
 
-    /// A line from `from` to `to` (world) with a head at `to`; nothing when either lies outside the view.
+    /// A line from `from` to `to` (world) with a head at `to`; not drawn when either end lies outside the view.
     pub fn arrow(&mut self, view: &View, from: [f64; 2], to: [f64; 2], pen: Pen) {
         let (Some(a), Some(b)) = (view.inside(from), view.inside(to)) else { return };
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
@@ -261,7 +249,7 @@ impl Canvas {
         }
     }
 
-    /// The outline of a rectangle, moved to the nearest middles of pixels, where thin lines are crisp.
+    /// The outline of a rectangle, snapped to pixel centers, so that thin lines are crisp.
     pub fn stroke_rect(&mut self, rect: PixelRect, pen: Pen) {
         let snap = |v: f64| v.round() + 0.5;
         let (x, y) = (snap(rect.x - 0.5), snap(rect.y - 0.5));
@@ -286,7 +274,7 @@ impl Canvas {
     /// The picture as the bytes of a PNG file (8-bit RGB).
     ///
     /// # Panics
-    /// Never in practice: an encoder that writes to memory has nothing to fail on.
+    /// Never in practice: encoding to memory does not fail.
     pub fn encode_png(&self) -> Vec<u8> {
         let rgb: Vec<u8> = self.pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
         let mut bytes = Vec::new();
@@ -314,6 +302,24 @@ impl Canvas {
             self.pixels.fill_path(&path, &paint(color), FillRule::Winding, Transform::identity(), None);
         }
     }
+}
+
+/// The mean of `samples * samples` colors in a pixel, weighted by opacity; `color` takes offsets within the pixel. `None`
+/// where all are transparent or missing.
+fn mean_color(samples: usize, color: impl Fn([f64; 2]) -> Option<Color>) -> Option<Color> {
+    let mut sum = [0.0; 4];
+    for sub in 0..samples * samples {
+        let fraction = |i: usize| (i as f64 + 0.5) / samples as f64;
+        let Some(c) = color([fraction(sub % samples), fraction(sub / samples)]) else { continue };
+        let alpha = f64::from(c.a);
+        for (total, channel) in sum.iter_mut().zip([c.r, c.g, c.b]) {
+            *total += alpha * f64::from(channel);
+        }
+        sum[3] += alpha;
+    }
+    let channel = |i: usize| (sum[i] / sum[3]).round() as u8;
+    let mean = || Color { r: channel(0), g: channel(1), b: channel(2), a: 255 };
+    (sum[3] > 0.0).then(|| mean().with_alpha(sum[3] / (255 * samples * samples) as f64))
 }
 
 fn skia(color: Color) -> tiny_skia::Color {

@@ -1,34 +1,34 @@
-//! What a chart says: axes, series, marks. How it is drawn is in `plot`.
+//! The content of a chart: axes, series, marks. It is drawn in `plot`.
 
 use crate::{Canvas, Color};
 
-/// How values become lengths along an axis.
+/// The scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// In proportion.
+    /// Linear.
     #[default]
     Linear,
-    /// In proportion to the logarithm; values that are not positive are left out.
+    /// Logarithmic; values that are not positive are omitted.
     Log,
 }
 
 /// One axis of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
-    /// What is measured, with its unit.
+    /// The quantity, with its unit.
     pub label: String,
     /// Linear or logarithmic.
     pub scale: Scale,
-    /// Lower and upper limit; `None` is taken from the data.
+    /// Lower and upper limit; `None` for the range of the data.
     pub range: Option<[f64; 2]>,
 }
 
-/// How a series is drawn.
+/// The style of a series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Line {
     /// Straight lines between the points; breaks at points that are not finite.
     Straight,
-    /// Each value holds from its x to the next one's.
+    /// A staircase: each value holds until the next x.
     Step,
     /// As `Step`, filled down to zero (on a log axis: to the lower limit).
     FilledStep,
@@ -48,7 +48,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// Points `[x, y]` joined by straight lines. An empty name keeps a series out of the legend.
+    /// Points `[x, y]` joined by straight lines. A series with an empty name has no legend entry.
     pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = [f64; 2]>, color: Color) -> Self {
         let points = points.into_iter().collect();
         Self { name: name.into(), points, line: Line::Straight, color, width: 2.0, dashed: false }
@@ -84,7 +84,7 @@ impl Series {
     }
 }
 
-/// Something at a place of an axis rather than in the data.
+/// A mark at a fixed place of the axes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mark {
     /// A dashed line at this x.
@@ -120,7 +120,7 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// An empty chart; an empty title takes no room.
+    /// An empty chart; an empty title takes no space.
     pub fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), ..Self::default() }
     }
@@ -155,13 +155,13 @@ impl Chart {
         self
     }
 
-    /// Fixed limits of the x axis; ignored when they cannot be limits.
+    /// Fixed limits of the x axis; ignored when not finite or not in order.
     pub fn x_range(mut self, low: f64, high: f64) -> Self {
         self.x.range = Some([low, high]);
         self
     }
 
-    /// Fixed limits of the y axis; ignored when they cannot be limits.
+    /// Fixed limits of the y axis; ignored when not finite or not in order.
     pub fn y_range(mut self, low: f64, high: f64) -> Self {
         self.y.range = Some([low, high]);
         self

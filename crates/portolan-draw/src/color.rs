@@ -1,4 +1,4 @@
-//! The colors of the chapter, in tones that stay apart for color-blind readers and in print.
+//! The palette of all pictures, distinguishable for color-blind readers and in print.
 //!
 //! Signed distance runs from orange (negative, behind a surface) through transparent at zero to blue
 //! (positive, free space); measurements are green, extracted surfaces purple, ground truth gray and dashed.
@@ -39,14 +39,14 @@ impl Color {
         }
     }
 
-    /// What is seen where `self` lies over the opaque color `below`.
+    /// `self` blended over the opaque color `below`.
     pub fn over(self, below: Self) -> Self {
         let opaque = Self { a: 255, ..self };
         below.mix(opaque, f64::from(self.a) / 255.0)
     }
 }
 
-/// Nothing at all.
+/// Fully transparent.
 pub const TRANSPARENT: Color = Color { r: 255, g: 255, b: 255, a: 0 };
 /// The paper: background of every picture.
 pub const PAPER: Color = Color::hex(0xFFFFFF);
@@ -56,7 +56,7 @@ pub const INK: Color = Color::hex(0x1F2933);
 pub const MUTED: Color = Color::hex(0x5F6B76);
 /// Grid lines and frames.
 pub const GRID: Color = Color::hex(0xDDE1E6);
-/// Measurements: beams, hits, what a sensor said.
+/// Measurements: beams, hits.
 pub const MEASUREMENT: Color = Color::hex(0x159A6C);
 /// Extracted surfaces: contour, mesh, the estimate's zero set.
 pub const SURFACE: Color = Color::hex(0x7A3E9D);
@@ -68,9 +68,9 @@ pub const UNKNOWN: Color = Color::hex(0xDCD9D3);
 pub const POSITIVE: Color = Color::hex(0x1F6FB5);
 /// Behind a surface, negative distance.
 pub const NEGATIVE: Color = Color::hex(0xDE6B0E);
-/// Surely occupied.
+/// Occupied, at probability 1.
 pub const OCCUPIED: Color = Color::hex(0x1B2733);
-/// Surely free.
+/// Free, at probability 0.
 pub const FREE: Color = Color::hex(0xF7FBFE);
 
 /// Colors for the series of a chart, in the order in which to use them.
@@ -91,7 +91,7 @@ pub fn signed_distance(d: f64, limit: f64) -> Color {
 
 /// The occupancy probability `p`: white where free, dark where occupied; NaN is [`UNKNOWN`].
 ///
-/// The ramp is steepest at 0.5, so that cells at a clamp (0.12, 0.97) look as decided as they are.
+/// The ramp is steepest at 0.5, so that cells clamped to 0.12 or 0.97 are nearly as light or dark as possible.
 pub fn occupancy(p: f64) -> Color {
     if p.is_nan() {
         return UNKNOWN;

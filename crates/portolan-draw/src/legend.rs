@@ -1,8 +1,8 @@
-//! What explains a picture: legend and scale bar.
+//! Legend and scale bar.
 
 use crate::{Anchor, Canvas, Color, Font, Pen, PixelRect, View, color};
 
-/// How an entry of a legend looks.
+/// The symbol of a legend entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Swatch {
     /// A short line.
@@ -16,9 +16,9 @@ pub enum Swatch {
 /// One line of a legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// What it looks like.
+    /// The symbol.
     pub swatch: Swatch,
-    /// What it is.
+    /// The text.
     pub label: String,
 }
 
@@ -33,8 +33,7 @@ const SWATCH: f64 = 26.0;
 const GAP: f64 = 22.0;
 
 impl Canvas {
-    /// Entries in rows from the top left of `rect`, wrapped at its right edge; returns the height that was
-    /// used.
+    /// Draws entries in rows from the top left of `rect`, wrapped at its right edge; returns the height used.
     pub fn legend(&mut self, rect: PixelRect, entries: &[Entry], font: Font) -> f64 {
         let places = legend_places(rect.width, entries, font);
         for (entry, place) in entries.iter().zip(&places) {
@@ -58,7 +57,7 @@ impl Canvas {
         legend_height(rect.width, entries, font)
     }
 
-    /// A bar of a round number of meters at the lower right of the view, with its length written above it.
+    /// Draws a bar of a round number of meters at the lower right of the view, with its length above it.
     pub fn scale_bar(&mut self, view: &View) {
         let rect = view.rect();
         let metres = round_down(0.25 * rect.width / view.scale()[0]);

@@ -1,9 +1,9 @@
 //! Maps and charts as PNG bytes in memory.
 //!
-//! Not a plotting library: it has the few shapes that portolan's own pictures need, in the colors of the
-//! chapter, and it opens no files. A picture is a [`Canvas`]; a [`View`] says which box of the world, in
-//! meters, lies on which rectangle of pixels; [`Panels`] puts several views side by side; a [`Chart`] has
-//! axes. Nothing here panics on empty, constant or non-finite data: such points are left out.
+//! Not a plotting library: it has the few shapes that the pictures of this project need, in one palette, and it opens no
+//! files. A picture is a [`Canvas`]; a [`View`] maps a box of the world, in meters, to a rectangle of pixels; [`Panels`]
+//! places several views side by side; a [`Chart`] has axes. Nothing here panics on empty, constant or non-finite data:
+//! such points are omitted.
 //!
 //! ```
 //! use portolan_draw::{Canvas, Pen, PixelRect, View, color};

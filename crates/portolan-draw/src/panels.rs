@@ -5,13 +5,13 @@ use crate::{Anchor, Canvas, Entry, Font, Pen, PixelRect, View, color, legend::le
 /// Heading of one panel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
-    /// What is shown.
+    /// The title.
     pub title: String,
     /// Lines of detail below the title: memory, time, error.
     pub lines: Vec<String>,
 }
 
-/// A grid of panels that is laid out once its world box is known.
+/// A grid of panels, laid out for a given box of the world.
 ///
 /// ```
 /// use portolan_draw::{Panels, Pen, color};
@@ -47,13 +47,13 @@ impl Panels {
         self
     }
 
-    /// Number of panels in a row; without it the sheet is about as wide as high.
+    /// Number of panels in a row; by default the sheet is nearly square.
     pub fn columns(mut self, columns: usize) -> Self {
         self.columns = columns;
         self
     }
 
-    /// Larger letters, for wide panels that are looked at reduced.
+    /// Larger text, for wide panels that are shown reduced.
     pub fn large(mut self) -> Self {
         self.large = true;
         self
@@ -85,8 +85,7 @@ impl Panels {
         (canvas, views)
     }
 
-    /// The same with bare rectangles of `width × height` pixels instead of views: for charts or mixed
-    /// content.
+    /// [`Panels::layout`] with rectangles of `width × height` pixels instead of views: for charts or mixed content.
     pub fn layout_rects(&self, width: f64, height: f64) -> (Canvas, Vec<PixelRect>) {
         let count = self.panels.len().max(1);
         let columns =

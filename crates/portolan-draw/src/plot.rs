@@ -1,4 +1,4 @@
-//! How a chart is drawn: room for text first, then grid, marks, series, axes.
+//! Drawing of charts: space for text first, then grid, marks, series, axes.
 
 use crate::chart::{Axis, Chart, Line, Mark, Scale, Series};
 use crate::legend::legend_height;
@@ -75,7 +75,7 @@ impl Chart {
         let centre = plot.x + 0.5 * plot.width;
         canvas.text([centre, rect.bottom() - small.height()], &x_label, label, Anchor::Centre);
         let y_label = label.fit(&self.y.label, plot.height);
-        canvas.text_upwards([rect.x, plot.y + 0.5 * plot.height], &y_label, label, Anchor::Centre);
+        canvas.text_upward([rect.x, plot.y + 0.5 * plot.height], &y_label, label, Anchor::Centre);
         view
     }
 
@@ -99,8 +99,7 @@ impl Chart {
         series.chain(marks).filter(|entry| !entry.label.is_empty()).collect()
     }
 
-    /// Limits of an axis in its own units (decades on a log axis): as set, or those of the data with some
-    /// air.
+    /// Limits of an axis in its own units (decades on a log axis): as set, or those of the data with a margin.
     fn limits(&self, which: usize) -> [f64; 2] {
         let axis = [&self.x, &self.y][which];
         let set = axis.range.map(|[low, high]| [axis.place(low), axis.place(high)]);

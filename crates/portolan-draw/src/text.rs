@@ -1,13 +1,13 @@
 //! Text from pre-rendered glyphs: monospaced, so that widths are known before anything is drawn.
 //!
-//! Basic Latin and Latin-1 (±, ², ·, ×, °, µ) are present; a few common characters outside are replaced by
-//! their nearest ASCII, the rest by a question mark.
+//! Basic Latin and Latin-1 (±, ², ·, ×, °, µ) are available; a few other common characters are replaced by similar ASCII,
+//! the rest by a question mark.
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 use crate::{Canvas, Color, color};
 
-/// Where the given position lies in a line of text.
+/// The position of the anchor in a line of text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Anchor {
     /// At its left end.
@@ -58,7 +58,7 @@ impl Font {
         (text.chars().count() * get_raster_width(self.weight, self.height)) as f64
     }
 
-    /// `text` cut to at most `width` pixels, with two dots where something was left out.
+    /// `text` cut to at most `width` pixels, with two dots at the cut.
     pub fn fit(&self, text: &str, width: f64) -> String {
         if self.width(text) <= width {
             return text.to_owned();
@@ -93,8 +93,8 @@ impl Canvas {
         self.glyphs(text, font, |along, down| (left + along, top + down));
     }
 
-    /// One line of text that reads upwards; `at` is the pixel of its anchor on the left edge of the line.
-    pub fn text_upwards(&mut self, at: [f64; 2], text: &str, font: Font, anchor: Anchor) {
+    /// One line of text that reads upward; `at` is the pixel of its anchor on the left edge of the line.
+    pub fn text_upward(&mut self, at: [f64; 2], text: &str, font: Font, anchor: Anchor) {
         let start = at[1] + offset(font.width(text), anchor);
         let (left, bottom) = (at[0].round() as i64, start.round() as i64);
         self.glyphs(text, font, |along, down| (left + down, bottom - 1 - along));
@@ -159,7 +159,7 @@ mod tests {
     fn text_is_clipped_and_unknown_characters_are_marked() {
         let mut canvas = Canvas::new(8, 8);
         canvas.text([-20.0, -4.0], "over the edge \u{03c3}\u{4e2d}", Font::new(24), Anchor::Left);
-        canvas.text_upwards([2.0, 100.0], "over the edge", Font::new(24), Anchor::Right);
+        canvas.text_upward([2.0, 100.0], "over the edge", Font::new(24), Anchor::Right);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Where an axis puts its ticks, and what it writes there.
+//! Positions and labels of the ticks of an axis.
 
 /// Ticks within `[low, high]` at steps of 1, 2 or 5 times a power of ten, about `count` of them. Empty when
 /// the limits are not finite or not in order.
@@ -33,8 +33,8 @@ pub fn log_ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     decades.into_iter().step_by(every).collect()
 }
 
-/// What to write at a tick, given the distance to its neighbor: as many decimals as the step needs, and
-/// powers of ten as `1e-6` where plain digits would be long.
+/// The label of a tick, given the distance to its neighbor: with as many decimals as the step needs; powers of ten as
+/// `1e-6` where plain digits would be long.
 pub fn tick_label(value: f64, step: f64) -> String {
     if value == 0.0 || value.abs() < 1e-9 * step.abs() {
         return "0".to_owned();

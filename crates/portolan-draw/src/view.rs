@@ -1,4 +1,4 @@
-//! Which box of the world lies on which rectangle of pixels.
+//! The map from a box of the world to a rectangle of pixels.
 
 /// A rectangle of pixels: x to the right, y down, from the top left corner of the canvas.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +57,8 @@ pub struct View {
 }
 
 impl View {
-    /// The world box as large as it fits into `rect` with equal scales, centred; [`View::rect`] is the part
-    /// that it covers. A box without extent is given a meter.
+    /// The world box scaled to fit into `rect` with equal scales, centered; [`View::rect`] is the part that it covers. An
+    /// extent of 0 counts as 1 m.
     pub fn fit(world_min: [f64; 2], world_max: [f64; 2], rect: PixelRect) -> Self {
         let extent = extent(world_min, world_max);
         let scale = (rect.width / extent[0]).min(rect.height / extent[1]);
@@ -67,7 +67,7 @@ impl View {
         Self { world_min, rect: PixelRect::new(x, y, width, height), scale: [scale; 2] }
     }
 
-    /// The world box over all of `rect`, each axis with its own scale: for charts.
+    /// The world box stretched to `rect`, each axis with its own scale: for charts.
     pub fn stretch(world_min: [f64; 2], world_max: [f64; 2], rect: PixelRect) -> Self {
         let extent = extent(world_min, world_max);
         Self { world_min, rect, scale: [rect.width / extent[0], rect.height / extent[1]] }
@@ -104,8 +104,8 @@ impl View {
         (self.world_min, self.world_from_pixel([self.rect.right(), self.rect.y]))
     }
 
-    /// The part of the segment `a b` (world) inside the view, in pixels; `None` if there is none, or a
-    /// coordinate is not finite (Liang & Barsky 1984).
+    /// The part of the segment `a b` (world) inside the view, in pixels; `None` where it lies outside or a coordinate is not
+    /// finite (Liang & Barsky 1984).
     pub(crate) fn clip(&self, a: [f64; 2], b: [f64; 2]) -> Option<[[f64; 2]; 2]> {
         let (a, b) = (self.pixel_from_world(a), self.pixel_from_world(b));
         if !(a[0].is_finite() && a[1].is_finite() && b[0].is_finite() && b[1].is_finite()) {

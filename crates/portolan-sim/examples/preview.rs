@@ -1,7 +1,7 @@
-//! Fuses a log of space and writes a picture of its surface: `preview lidar|camera|LOG RESOLUTION OUT.png [EVERY]`, where
+//! Fuses a 3-D log and writes a picture of its surface: `preview lidar|camera|LOG RESOLUTION OUT.png [EVERY]`, where
 //! `lidar` and `camera` are walks through the simulated Building.
 
-#![allow(clippy::print_stderr, reason = "a program says how long it took")]
+#![allow(clippy::print_stderr, reason = "an example prints its time")]
 
 use portolan::geom::Pose;
 use portolan::map::{Tsdf3, TsdfConfig};

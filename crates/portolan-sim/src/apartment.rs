@@ -2,16 +2,16 @@
 
 use crate::{Solid, SolidKind, World};
 
-/// The Apartment and how to drive through it.
+/// The Apartment and the path of the robot through it.
 #[derive(Clone, Debug)]
 pub struct Apartment {
-    /// Walls, furniture, and the solid `chair` that can be moved.
+    /// Walls, furniture, and the movable solid `chair`.
     pub world: World,
     /// Corners of the path of one lap (world, meters); the last is the first.
     pub path: Vec<[f64; 2]>,
 }
 
-/// Where the chair goes when it is moved (meters).
+/// Displacement of the chair when it is moved (meters).
 pub const CHAIR_MOVE: [f64; 2] = [1.38, -1.62];
 
 /// Thickness of every wall (meters).
@@ -68,7 +68,7 @@ const ROOMS: [Room; 10] = [
     room(("office", true), (2.1, 1.0, false), ("long desk", 0.0, 1.7, 0.6), ("cabinet", 0.45, [2.2, 3.0])),
 ];
 
-/// Builds the Apartment. Its lower left outer corner is the world's zero; `V` is 108 square meters.
+/// Builds the Apartment. Its lower left outer corner is the origin of the world; its area is 108 square meters.
 pub fn apartment() -> Apartment {
     let wall = |name: &str, min, max| Solid::rectangle(name, SolidKind::Wall, min, max);
     let [width, height] = SIZE;

@@ -6,22 +6,22 @@ use portolan::geom::Pose;
 use portolan::geom::vector::{along, distance, sub, unit};
 use portolan::scan::Scan;
 
-/// The seed of the lap that every figure is measured on.
+/// The seed of the default log.
 pub const SEED: u64 = 0x00C0_FFEE;
 
-/// Scans with the poses they were taken at.
+/// Scans with the poses at which they were taken.
 pub type Lap = Vec<(Pose<2>, Scan<2>)>;
 
-/// One or more laps of scans.
+/// The settings of one lap of scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LapConfig {
-    /// Scans in the lap.
+    /// Number of scans in the lap.
     pub scans: usize,
     /// The sensor.
     pub lidar: Lidar,
-    /// Noise, kinds of beams.
+    /// Seed of the noise and of lost beams.
     pub seed: u64,
-    /// Number of scans taken before: a second lap has other noise than the first.
+    /// Number of scans taken before, so that a second lap has noise of its own.
     pub first_index: u64,
 }
 
@@ -51,7 +51,7 @@ pub fn lap_poses(scans: usize) -> Vec<Pose<2>> {
     poses
 }
 
-/// One lap of scans with their true poses. The world is the Apartment, perhaps with the chair elsewhere.
+/// One lap of scans with their true poses. The world is the Apartment, possibly with the chair moved.
 pub fn lap(world: &World, config: &LapConfig) -> Lap {
     let scan = |(i, pose): (usize, Pose<2>)| {
         let index = config.first_index + i as u64;
@@ -137,7 +137,7 @@ mod tests {
         }
         let other = lap(&world, &LapConfig { first_index: 200, ..Default::default() });
         assert_ne!(fingerprint(&other), fingerprint(&whole));
-        // Every figure in the documentation is measured on these bytes.
+        // The default lap: every figure in the documentation is measured on these bytes.
         assert_eq!(fingerprint(&whole), 0xd73c_713a_6321_6ae4);
     }
 }

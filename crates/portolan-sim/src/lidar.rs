@@ -1,21 +1,21 @@
-//! A planar lidar.
+//! A 2-D lidar.
 
 use crate::{Random, World};
 use portolan::geom::Pose;
 use portolan::scan::{Beam, BeamKind, Scan};
 
-/// A lidar that looks all the way round.
+/// A 2-D lidar with a full turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lidar {
-    /// Beams over the full turn.
+    /// Number of beams over the full turn.
     pub beams: usize,
     /// Standard deviation of the range (meters).
     pub noise: f64,
-    /// Beams that meet nothing up to here become [`BeamKind::MaxRange`] (meters).
+    /// Maximum range (meters); beams without a hit within it become [`BeamKind::MaxRange`].
     pub max_range: f64,
-    /// Share of beams that come back without echo, whatever is there; nothing is known to be free then.
+    /// Share of beams without an echo, at random; they give no evidence of free space.
     pub no_return_rate: f64,
-    /// Share of beams that are lost.
+    /// Share of beams that are lost, at random.
     pub dropped_rate: f64,
 }
 
@@ -26,14 +26,14 @@ impl Default for Lidar {
     }
 }
 
-/// What the lidar sees from a pose. The noise is that of the stream `(seed, index)` alone.
+/// The scan of the lidar from a pose. The noise depends on the stream `(seed, index)` alone.
 pub fn scan_at(world: &World, world_from_sensor: &Pose<2>, lidar: &Lidar, seed: u64, index: u64) -> Scan<2> {
     let mut random = Random::stream(seed, index);
     let bearings: Vec<f64> =
         (0..lidar.beams).map(|i| (i as f64 / lidar.beams as f64 - 0.5) * std::f64::consts::TAU).collect();
     let beams = bearings.iter().map(|&bearing| {
         let direction = [libm::cos(bearing), libm::sin(bearing)];
-        // Drawn for every beam, so that what one beam meets does not change the noise of the next.
+        // Drawn for every beam, so that the result of one beam does not change the noise of the next.
         let (fate, noise) = (random.uniform(), random.normal());
         let hit = world.cast_ray(world_from_sensor.translation, world_from_sensor.rotate(direction));
         let (kind, range) = if fate < lidar.dropped_rate {

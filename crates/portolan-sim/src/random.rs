@@ -1,4 +1,4 @@
-//! Random numbers that are the same everywhere.
+//! Random numbers that are the same on every platform.
 
 /// SplitMix64 (Steele, Lea & Flood 2014): small, fast, and any two seeds give independent streams.
 #[derive(Clone, Debug)]

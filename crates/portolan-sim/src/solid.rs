@@ -2,23 +2,23 @@
 
 use portolan::geom::Aabb;
 
-/// What a solid is, for pictures and for statistics.
+/// The kind of a solid, for pictures and statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SolidKind {
     /// Part of the building.
     Wall,
-    /// Stays where it is.
+    /// Fixed furniture.
     Furniture,
-    /// Can be moved.
+    /// Movable.
     Movable,
 }
 
-/// A simple polygon that no beam passes.
+/// An opaque simple polygon.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid {
-    /// What it is called.
+    /// The name.
     pub name: String,
-    /// What it is.
+    /// The kind.
     pub kind: SolidKind,
     /// Corners counter-clockwise (world, meters).
     pub corners: Vec<[f64; 2]>,
@@ -36,7 +36,7 @@ impl Solid {
         (0..self.corners.len()).map(|i| [self.corners[i], self.corners[(i + 1) % self.corners.len()]])
     }
 
-    /// The smallest box around it.
+    /// The bounding box.
     pub fn aabb(&self) -> Aabb<2> {
         let mut b = Aabb::EMPTY;
         self.corners.iter().for_each(|&c| b.include(c));
@@ -51,7 +51,7 @@ impl Solid {
         crossings.count() % 2 == 1
     }
 
-    /// The same solid elsewhere.
+    /// The solid moved by an offset (meters).
     pub fn moved(&self, offset: [f64; 2]) -> Self {
         let corners = self.corners.iter().map(|c| [c[0] + offset[0], c[1] + offset[1]]).collect();
         Self { corners, ..self.clone() }

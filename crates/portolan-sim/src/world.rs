@@ -1,4 +1,4 @@
-//! A world of solids, and the truth about it.
+//! A 2-D world of solids, and its ground truth.
 
 use crate::{Solid, SolidKind, Truth};
 use portolan::geom::Aabb;
@@ -12,23 +12,22 @@ pub struct BoundarySegment {
     pub a: [f64; 2],
     /// End.
     pub b: [f64; 2],
-    /// Index of the solid that it belongs to.
+    /// Index of its solid.
     pub solid: usize,
 }
 
-/// What a ray meets.
+/// The hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Arc length (meters).
     pub range: f64,
-    /// Unit normal of the surface, towards free space.
+    /// Unit normal of the surface, toward free space.
     pub normal: [f64; 2],
     /// Index of the solid.
     pub solid: usize,
 }
 
-/// Solids in the plane. Solids that touch or overlap act as their union: there is no surface inside another
-/// solid.
+/// A 2-D world of solids. Solids that touch or overlap act as their union, without surfaces inside.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World {
     solids: Vec<Solid>,
@@ -39,12 +38,12 @@ pub struct World {
 /// Points this far to either side of a boundary decide what it separates (meters).
 const ASIDE: f64 = 1e-7;
 
-/// How far a ray may pass beyond the ends of a segment and still meet it, as a share of its length: a ray into
-/// the corner of a room must not slip between the two faces that meet there.
+/// How far beyond the ends of a segment a ray still meets it, as a share of its length: a ray into the corner of a room must
+/// not pass between the two faces that meet there.
 const END_SLACK: f64 = 1e-9;
 
 impl World {
-    /// A world of these solids. Corners that run clockwise are turned round.
+    /// A world of these solids. Clockwise corners are reversed.
     ///
     /// # Panics
     /// Where a corner is not finite.
@@ -52,7 +51,7 @@ impl World {
         for solid in &mut solids {
             assert!(
                 solid.corners.iter().flatten().all(|v| v.is_finite()),
-                "solid {} has no place",
+                "solid {} has a corner that is not finite",
                 solid.name
             );
             if solid.edges().map(|[a, b]| cross(a, b)).sum::<f64>() < 0.0 {
@@ -74,24 +73,24 @@ impl World {
         &self.boundary
     }
 
-    /// Length of the boundary of the walls alone, all faces, without furniture (meters).
+    /// Length of the boundary of the walls, all faces, without furniture (meters).
     pub fn wall_length(&self) -> f64 {
         let walls: Vec<_> = self.solids.iter().filter(|s| s.kind == SolidKind::Wall).cloned().collect();
         Self::new(walls).boundary.iter().map(|s| portolan::geom::vector::distance(s.a, s.b)).sum()
     }
 
-    /// The same world with one solid moved by an offset (meters).
+    /// The world with one solid moved by an offset (meters).
     ///
     /// # Panics
-    /// Where no solid has that name.
+    /// Where no solid has this name.
     pub fn with_moved(&self, name: &str, offset: [f64; 2]) -> Self {
-        assert!(self.solids.iter().any(|s| s.name == name), "no solid is called {name}");
+        assert!(self.solids.iter().any(|s| s.name == name), "no solid has the name {name}");
         Self::new(
             self.solids.iter().map(|s| if s.name == name { s.moved(offset) } else { s.clone() }).collect(),
         )
     }
 
-    /// The smallest box around all solids.
+    /// The bounding box of all solids.
     pub fn aabb(&self) -> Aabb<2> {
         self.solids.iter().fold(Aabb::EMPTY, |b, s| b.union(s.aabb()))
     }
@@ -139,35 +138,42 @@ impl Truth<2> for World {
     }
 }
 
-/// Cuts every edge where another solid begins or ends and keeps the pieces with free space outside.
+/// Fractions of the edge from `a` of solid `i` at which edges of other solids cross or touch its line, ascending, both ends
+/// included.
+fn cuts(solids: &[Solid], i: usize, a: [f64; 2], edge: [f64; 2]) -> Vec<f64> {
+    let length_sq = dot(edge, edge);
+    let mut cuts = vec![0.0, 1.0];
+    for [c, d] in solids.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, s)| s.edges()) {
+        let other = sub(d, c);
+        let turn = cross(edge, other);
+        if turn.abs() > 1e-12 {
+            cuts.push(cross(sub(c, a), other) / turn);
+        } else {
+            cuts.extend([c, d].map(|p| dot(sub(p, a), edge) / length_sq));
+        }
+    }
+    cuts.retain(|t| (0.0..=1.0).contains(t));
+    cuts.sort_by(f64::total_cmp);
+    cuts.dedup_by(|p, q| (*p - *q).abs() * length_sq.sqrt() < 10.0 * ASIDE);
+    cuts
+}
+
+/// Cuts every edge where it enters or leaves another solid and keeps the pieces with free space outside.
 fn boundary(solids: &[Solid], boxes: &[Aabb<2>]) -> Vec<BoundarySegment> {
     let mut pieces = Vec::new();
     for (i, solid) in solids.iter().enumerate() {
         for [a, b] in solid.edges() {
             let edge = sub(b, a);
-            let length_sq = dot(edge, edge);
             let Some([x, y]) = unit(edge) else { continue };
             let outward = [y, -x];
-            let mut cuts = vec![0.0, 1.0];
-            for [c, d] in solids.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, s)| s.edges()) {
-                let other = sub(d, c);
-                let turn = cross(edge, other);
-                if turn.abs() > 1e-12 {
-                    cuts.push(cross(sub(c, a), other) / turn);
-                } else {
-                    cuts.extend([c, d].map(|p| dot(sub(p, a), edge) / length_sq));
-                }
-            }
-            cuts.retain(|t| (0.0..=1.0).contains(t));
-            cuts.sort_by(f64::total_cmp);
-            cuts.dedup_by(|p, q| (*p - *q).abs() * length_sq.sqrt() < 10.0 * ASIDE);
+            let cuts = cuts(solids, i, a, edge);
             let mut open: Option<[f64; 2]> = None;
             for w in cuts.windows(2) {
                 let middle = along(a, edge, 0.5 * (w[0] + w[1]));
                 let (outside, inside) = (along(middle, outward, ASIDE), along(middle, outward, -ASIDE));
                 let covered = |p: [f64; 2], j: usize| boxes[j].contains(p) && solids[j].contains(p);
                 let hidden = (0..solids.len()).any(|j| j != i && covered(outside, j));
-                // Two solids may share a stretch of border; the first of them owns it.
+                // Two solids may share a part of their border; it belongs to the first of them.
                 let owned_by_another = (0..i).any(|j| {
                     covered(inside, j) && !covered(outside, j) && {
                         solids[j].edges().any(|[c, d]| point_segment(middle, c, d).0 < ASIDE)
@@ -224,7 +230,7 @@ mod tests {
             let p = [12.0 * random.uniform(), 9.0 * random.uniform()];
             let d = world.signed_distance(p);
             assert_eq!(d < 0.0, world.is_inside(p));
-            // No point of another sign is nearer than the distance says.
+            // No point of the other sign is nearer than the distance.
             for k in 0..64 {
                 let angle = std::f64::consts::TAU * f64::from(k) / 64.0;
                 let q = along(p, [angle.cos(), angle.sin()], 0.999 * d.abs());

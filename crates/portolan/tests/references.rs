@@ -1,4 +1,5 @@
 //! Every citation in code and documents is in `docs/REFERENCES.md`, and every work listed there is cited.
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

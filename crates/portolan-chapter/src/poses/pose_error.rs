@@ -1,4 +1,4 @@
-//! How far poses are from the truth.
+//! Errors of poses relative to ground truth.
 
 use portolan::geom::Pose;
 use portolan::geom::vector::norm;
@@ -18,7 +18,7 @@ pub struct ErrorMeasures {
 }
 
 impl ErrorMeasures {
-    /// Measures of sizes; zeros without any.
+    /// The measures of error sizes; zeros for an empty list.
     pub fn of(mut sizes: Vec<f64>) -> Self {
         if sizes.is_empty() {
             return Self::default();
@@ -37,7 +37,7 @@ impl ErrorMeasures {
 /// Errors of many poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PoseErrors {
-    /// Poses (or pairs) compared.
+    /// Number of poses (or pairs) compared.
     pub count: usize,
     /// Of the position (meters).
     pub translation: ErrorMeasures,
@@ -46,14 +46,13 @@ pub struct PoseErrors {
 }
 
 impl PoseErrors {
-    /// Each pose against the true one. No alignment: both must be of one world. What is left over in the longer
-    /// slice is ignored.
+    /// The error of each pose. No alignment: both must have the same world frame. The surplus of the longer slice is ignored.
     pub fn absolute(world_from_robot: &[Pose<2>], truth: &[Pose<2>]) -> Self {
         Self::of(world_from_robot.iter().zip(truth).map(|(a, b)| b.inverse() * *a))
     }
 
-    /// Each motion from one pose to the `step`-th next against the true motion (Sturm et al. 2012, the relative pose
-    /// error): how much the drift is, wherever the world's zero is.
+    /// The error of each motion from one pose to the `step`-th next (Sturm et al. 2012, the relative pose error): the drift,
+    /// independent of the world frame.
     pub fn relative(world_from_robot: &[Pose<2>], truth: &[Pose<2>], step: usize) -> Self {
         let n = world_from_robot.len().min(truth.len());
         let motion = |poses: &[Pose<2>], i: usize| poses[i].inverse() * poses[i + step];
@@ -61,7 +60,7 @@ impl PoseErrors {
         Self::of(pairs.map(|i| motion(truth, i).inverse() * motion(world_from_robot, i)))
     }
 
-    /// Measures of error poses.
+    /// The measures of error poses.
     pub fn of(errors: impl IntoIterator<Item = Pose<2>>) -> Self {
         let (metres, radians): (Vec<f64>, Vec<f64>) =
             errors.into_iter().map(|e| (norm(e.translation), heading(&e).abs())).unzip();

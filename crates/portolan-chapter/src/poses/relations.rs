@@ -1,4 +1,4 @@
-//! Relations: relative poses that people verified by hand, and how well poses agree with them.
+//! Relations: relative poses verified by hand, and the errors of poses against them.
 
 use super::PoseErrors;
 use portolan::geom::Pose;
@@ -7,29 +7,29 @@ use portolan_sim::planar;
 /// A verified relative pose between the robot at two times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relation {
-    /// When the robot was at the first pose (seconds, in the log's clock).
+    /// Time of the first pose (seconds, clock of the log).
     pub first_time: f64,
-    /// When it was at the second.
+    /// Time of the second pose.
     pub second_time: f64,
     /// The second pose in the frame of the first.
     pub first_from_second: Pose<2>,
 }
 
-/// A line of a relations file that is none.
+/// A line of a relations file that is not a relation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: a relation is eight finite numbers, `t1 t2 x y z roll pitch yaw`, found {found:?}")]
 pub struct RelationError {
     /// Number of the line, from 1.
     pub line: usize,
-    /// Its beginning.
+    /// The beginning of the line.
     pub found: String,
 }
 
 /// Reads the text of a relations file (Kümmerle et al. 2009): `t1 t2 x y z roll pitch yaw` on a line, seconds,
-/// meters and radians; `#` starts a comment. `z`, `roll` and `pitch` are left out: the robot drives in the plane.
+/// meters and radians; `#` starts a comment. `z`, `roll` and `pitch` are ignored: poses are 2-D.
 ///
 /// # Errors
-/// [`RelationError`], the first line that is no relation.
+/// [`RelationError`] for the first line that is not a relation.
 pub fn parse_relations(text: &str) -> Result<Vec<Relation>, RelationError> {
     let mut relations = Vec::new();
     for (k, line) in text.lines().enumerate() {
@@ -51,9 +51,9 @@ pub fn parse_relations(text: &str) -> Result<Vec<Relation>, RelationError> {
     Ok(relations)
 }
 
-/// Scores poses `(seconds, world_from_robot)` against relations: of each relation both of whose ends have a pose
-/// within `tolerance` seconds, the nearest in time, the error of the pose between them. `count` of the result says how
-/// many those were. The measures do not depend on where the world's zero is. O((poses + relations) log poses).
+/// Scores poses `(seconds, world_from_robot)` against relations: for each relation with a pose within `tolerance` seconds of
+/// both ends, the error of the relative pose between the poses nearest in time. `count` is the number of these relations.
+/// The result is independent of the world frame. O((poses + relations) log poses).
 pub fn score_relations(relations: &[Relation], poses: &[(f64, Pose<2>)], tolerance: f64) -> PoseErrors {
     let mut sorted: Vec<_> = poses.iter().filter(|p| p.0.is_finite()).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));

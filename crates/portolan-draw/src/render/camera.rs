@@ -1,28 +1,28 @@
-//! Where a picture is taken from.
+//! The camera of a rendered picture.
 
 use super::vector::{cross, dot, sub, unit_or};
 
-/// A perspective camera, and what it leaves out.
+/// A perspective camera with clipping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it is (the mesh's coordinates, meters).
+    /// Position (coordinates of the mesh, meters).
     pub eye: [f32; 3],
-    /// What is in the middle of the picture.
+    /// The point at the center of the picture.
     pub target: [f32; 3],
-    /// What points upwards in the picture, as far as it can; height is measured along it.
+    /// The direction that points up in the picture, as far as possible; height is measured along it.
     pub up: [f32; 3],
     /// Angle between the upper and the lower edge of the picture (radians).
     pub field_of_view: f32,
-    /// Nothing nearer than this is drawn (meters, along the view).
+    /// Near plane (meters, along the view).
     pub near: f32,
-    /// Nothing above this height along `up` is drawn (meters): takes ceilings away.
+    /// Height along `up` above which surfaces are cut away, such as ceilings (meters).
     pub cut: Option<f32>,
-    /// Whether triangles seen from behind are left out: looks into rooms from outside.
+    /// Whether triangles are culled from behind, to look into rooms from outside.
     pub cull_back: bool,
 }
 
 impl Camera {
-    /// A camera at a place that looks at another, upwards along z, with a field of view of 50 degrees.
+    /// A camera at `eye` that looks at `target`, z up, with a field of view of 50 degrees.
     pub fn new(eye: [f32; 3], target: [f32; 3]) -> Self {
         Self {
             eye,
@@ -45,13 +45,13 @@ impl Camera {
         [right, cross(forward, right), forward]
     }
 
-    /// Unit vector upwards.
+    /// Unit vector upward.
     pub(super) fn upwards(&self) -> [f32; 3] {
         unit_or(self.up, [0.0, 0.0, 1.0])
     }
 }
 
-/// A camera with its picture: from the mesh's coordinates to pixels.
+/// The projection of a camera: from coordinates of the mesh to pixels.
 #[derive(Clone, Copy)]
 pub(super) struct Projection {
     pub(super) axes: [[f32; 3]; 3],

@@ -1,35 +1,35 @@
-//! The mesh to be shown.
+//! The mesh to render.
 
 use super::vector::{cross, sub, unit_or};
 
-/// Triangles over shared vertices, borrowed from whoever has them.
+/// Triangles over shared vertices, borrowed.
 ///
-/// Triangles run counter-clockwise as seen from free space. Coordinates are relative to a point nearby, which all of a
-/// picture shares: far from zero an `f32` loses millimeters. Triangles with an index or a coordinate that is no good are
-/// not drawn.
+/// Triangles are counter-clockwise as seen from free space. Coordinates are relative to a nearby point, common to the whole
+/// picture: far from zero an `f32` loses millimeters. Triangles with an index out of range or a coordinate that is not
+/// finite are skipped.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshView<'a> {
-    /// Meters.
+    /// Positions (meters).
     pub vertices: &'a [[f32; 3]],
-    /// Indices of vertices.
+    /// Vertex indices.
     pub triangles: &'a [[u32; 3]],
-    /// Towards free space, one per vertex. Empty: the mean of the triangles around a vertex.
+    /// Normals toward free space, one per vertex. Empty: the mean of the triangles around a vertex.
     pub normals: &'a [[f32; 3]],
-    /// Red, green, blue, one per vertex. Empty, or one color for all, which says nothing: tinted by height.
+    /// Red, green, blue, one per vertex. Empty, or the same for all: colored by height.
     pub colors: &'a [[u8; 3]],
 }
 
 impl MeshView<'_> {
-    /// The corners of a triangle, if its indices are good.
+    /// The corners of a triangle, if its indices are in range.
     pub(super) fn corners(&self, triangle: usize) -> Option<[[f32; 3]; 3]> {
         let [a, b, c] = self.triangles[triangle].map(|i| self.vertices.get(i as usize).copied());
         Some([a?, b?, c?])
     }
 
-    /// The same without colors that say nothing.
-    pub(super) fn with_telling_colors(self) -> Self {
-        let told = self.colors.len() == self.vertices.len() && self.colors.windows(2).any(|w| w[0] != w[1]);
-        if told { self } else { Self { colors: &[], ..self } }
+    /// The mesh without colors if they are all the same.
+    pub(super) fn without_constant_color(self) -> Self {
+        let vary = self.colors.len() == self.vertices.len() && self.colors.windows(2).any(|w| w[0] != w[1]);
+        if vary { self } else { Self { colors: &[], ..self } }
     }
 
     /// Unit normals of vertices, weighted by the areas of the triangles around them. O(triangles).

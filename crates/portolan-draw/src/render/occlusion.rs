@@ -1,19 +1,19 @@
-//! Darker where little light comes in, and along outlines: what makes a shape readable without shadows.
+//! Ambient occlusion and outlines, which make shapes readable without shadows.
 
 use super::camera::Projection;
 use super::parallel;
 use super::raster::Visible;
 use super::vector::{dot, sub};
 
-/// Places around a pixel that are looked at.
+/// Number of samples around a pixel.
 const SAMPLES: usize = 14;
-/// Surfaces nearer than this to each other's edge darken each other: share of the median depth.
+/// Distance within which surfaces occlude each other, as a share of the median depth.
 const REACH: f32 = 0.045;
-/// Reach in the picture, at most (pixels).
+/// Largest distance in the picture (pixels).
 const WIDEST: f32 = 48.0;
 /// Half the side of the window over which noise is averaged (pixels).
 const BLUR: i64 = 2;
-/// Pixels whose nearness differs by this share are not of one surface.
+/// Relative difference of nearness above which pixels belong to different surfaces.
 const STEP: f32 = 0.03;
 
 /// The nearest thing at every whole pixel.
@@ -22,11 +22,11 @@ pub(super) struct Surface {
     pub(super) height: usize,
     /// One over the depth; 0: nothing.
     pub(super) nearness: Vec<f32>,
-    /// Towards the viewer, in the camera's axes.
+    /// Toward the viewer, in the camera's axes.
     pub(super) normals: Vec<[f32; 3]>,
 }
 
-/// How much light reaches every pixel, 0 to 1 (after the screen-space ambient occlusion of Filion & McNaughton 2008).
+/// The light that reaches every pixel, 0 to 1 (screen-space ambient occlusion, after Filion & McNaughton 2008).
 pub(super) fn openness(surface: &Surface, projection: &Projection) -> Vec<f32> {
     let reach = REACH * median_depth(&surface.nearness);
     let raw = by_rows(surface, |x, y| sample(surface, projection, x, y, reach));
@@ -78,7 +78,7 @@ fn sample(surface: &Surface, projection: &Projection, x: usize, y: usize, reach:
     let Some(p) = surface.place(projection, x, y) else { return 1.0 };
     let normal = surface.normals[y * surface.width + x];
     let radius = (reach * projection.focal / p[2]).clamp(3.0, WIDEST);
-    // Another turn for every pixel of a small tile: what would be bands becomes noise, which the blur takes away.
+    // A different rotation for every pixel of a small tile turns bands into noise, which the blur removes.
     let turn = (52.982_918 * (0.067_110_56 * x as f32 + 0.005_837_15 * y as f32).fract()).fract();
     let mut dark = 0.0;
     for k in 0..SAMPLES {
@@ -98,8 +98,8 @@ fn sample(surface: &Surface, projection: &Projection, x: usize, y: usize, reach:
     (1.0 - 2.2 * dark / SAMPLES as f32).clamp(0.25, 1.0)
 }
 
-/// How strongly a point of the picture lies on the near side of an outline, 0 to 1: nearer than the line through its two
-/// neighbors would have it, which on a plane it never is.
+/// How strongly a pixel lies on the near side of an outline, 0 to 1: how much nearer it is than the line through its two
+/// neighbors, which on a plane is 0.
 pub(super) fn outline(visible: &Visible, x: usize, y: usize) -> f32 {
     let own = visible.nearness[y * visible.width + x];
     let at = |x: usize, y: usize| visible.nearness[y * visible.width + x];

@@ -1,16 +1,16 @@
-//! One sheet that tells whether a map is good.
+//! One sheet to judge a map at a glance.
 
 use super::mesh::MeshView;
 use super::scene::{MeshScene, Sensor};
 use super::shade::render_mesh;
 use crate::{Anchor, Canvas, Font, color};
 
-/// What goes on the sheet.
+/// The content of the sheet.
 #[derive(Clone, Copy, Debug)]
 pub struct Preview<'a> {
     /// The surface.
     pub mesh: MeshView<'a>,
-    /// Where its sensors stood; may be empty.
+    /// The poses of its sensors; may be empty.
     pub sensors: &'a [Sensor],
     /// First line.
     pub title: &'a str,
@@ -24,8 +24,8 @@ const LARGE: [u32; 2] = [1200, 900];
 const SMALL: [u32; 2] = [592, 438];
 const GAP: usize = 24;
 
-/// The sheet: a large view, and beside it two smaller ones. Of rooms: from above with the ceiling taken away, and from
-/// where the sensor stood. Of an object: from where the sensors stood, from its other side, and from above.
+/// The sheet: a large view, and beside it two smaller ones. Of rooms: from above with the ceiling removed, and from poses
+/// of the sensor. Of an object: from the side of the sensors, from the opposite side, and from above.
 pub fn preview(what: &Preview<'_>) -> Canvas {
     let normals = if what.mesh.normals.is_empty() { what.mesh.smooth_normals() } else { Vec::new() };
     let mesh = if normals.is_empty() { what.mesh } else { MeshView { normals: &normals, ..what.mesh } };

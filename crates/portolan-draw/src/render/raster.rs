@@ -1,4 +1,4 @@
-//! Which triangle is seen at every pixel.
+//! Rasterization: the visible triangle at every pixel.
 //!
 //! Corners are rounded to 1/256 of a pixel, and edges are tested in whole numbers (Pineda 1988) with the rule that a pixel
 //! on the edge between two triangles belongs to exactly one of them: no cracks, nothing drawn twice. Bands of rows are
@@ -10,19 +10,19 @@ use super::mesh::MeshView;
 use super::parallel;
 use super::vector::dot;
 
-/// No triangle is seen.
+/// No triangle.
 pub(super) const NOTHING: u32 = u32::MAX;
 
 /// Rows of a band.
 const BAND: usize = 32;
-/// Triangles that are sorted into bands together.
+/// Triangles sorted into bands in one task.
 const CHUNK: usize = 1 << 15;
 /// Parts of a pixel.
 const PARTS: f32 = 256.0;
-/// Corners further out than this are not told apart (pixels): products of coordinates must fit into 64 bits.
+/// Coordinates are clamped to this (pixels), so that their products fit into 64 bits.
 const FAR_OUT: f32 = 4e6;
 
-/// What is seen, row by row.
+/// The visible triangles, row by row.
 pub(super) struct Visible {
     pub(super) width: usize,
     pub(super) height: usize,
@@ -40,7 +40,7 @@ struct Corner {
     w: f32,
 }
 
-/// A triangle that is drawn, counter-clockwise in a picture whose y runs downwards or not.
+/// A triangle to draw, counter-clockwise or clockwise in the picture, whose y axis points down.
 struct Piece {
     corners: [Corner; 3],
     triangle: u32,
@@ -130,7 +130,7 @@ fn push(
     });
     let [a, b, c] = corners;
     let turn = edge(a, b, c.x, c.y);
-    // y runs downwards, so what is counter-clockwise in space is clockwise here: the edge function is negative.
+    // y points down, so that counter-clockwise triangles are clockwise here: the edge function is negative.
     if turn == 0 || (turn > 0 && camera.cull_back) {
         return;
     }
@@ -163,7 +163,7 @@ fn last_centre(v: i32) -> i32 {
     (v - 128) >> 8
 }
 
-/// Twice the area of the triangle `a`, `b`, `(x, y)`: positive where the point lies to the right of the way down.
+/// Twice the area of the triangle `a`, `b`, `(x, y)`: positive where the point lies to the right of a descending edge.
 fn edge(a: Corner, b: Corner, x: i32, y: i32) -> i64 {
     let d = |u: i32, v: i32| i64::from(u) - i64::from(v);
     d(b.x, a.x) * d(y, a.y) - d(b.y, a.y) * d(x, a.x)

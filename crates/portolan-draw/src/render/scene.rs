@@ -1,33 +1,33 @@
-//! What kind of place a mesh shows, and views of it that tell at once whether it is good.
+//! The kind of scene that a mesh shows, and informative views of it.
 
 use super::camera::{Camera, Projection};
 use super::mesh::MeshView;
 use super::vector::{along, cross, dot, sub, unit_or};
 
-/// Where a sensor stood. Of a camera with x right, y down, z forward: forward is z, up is -y. Of a turning lidar: forward is x,
-/// up is z. Of a scanner with parallel rays along -z: forward is -z, up is y.
+/// The pose of a sensor. Of a camera with x right, y down, z forward: forward is z, up is -y. Of a spinning lidar: forward is
+/// x, up is z. Of a scanner with parallel rays along -z: forward is -z, up is y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensor {
-    /// In the mesh's coordinates (meters).
+    /// Position (coordinates of the mesh, meters).
     pub position: [f32; 3],
-    /// The direction it looked in.
+    /// Viewing direction.
     pub forward: [f32; 3],
-    /// What was above it.
+    /// Up direction.
     pub up: [f32; 3],
 }
 
-/// A mesh as a place: which way is up, what is inside, how far it reaches.
+/// A mesh as a scene: its up direction, whether it surrounds the sensors, its extent.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct MeshScene {
-    /// Unit vector upwards.
+    /// Unit vector upward.
     pub(super) up: [f32; 3],
-    /// Whether the sensors stood among the surfaces, and not around them.
+    /// Whether surfaces surround the sensors, as in rooms, and not the sensors an object.
     pub(super) inside: bool,
-    /// Height of a ceiling along `up` (meters), if there is one over the sensors.
+    /// Height of the ceiling above the sensors along `up` (meters); `None` without a ceiling.
     pub(super) ceiling: Option<f32>,
-    /// Vertices, thinned, without the farthest: what a view should hold.
+    /// A subset of the vertices, without outliers: what a view should contain.
     sample: Vec<[f32; 3]>,
-    /// Their middles, normals and areas, for triangles, thinned.
+    /// Centers, normals and areas of a subset of the triangles.
     faces: Vec<Face>,
     sensors: Vec<Sensor>,
 }
@@ -39,13 +39,13 @@ struct Face {
     area: f32,
 }
 
-/// Triangles and vertices that are looked at.
+/// Size of the subsets of triangles and vertices.
 const THINNED: usize = 60_000;
-/// Share of vertices at either end of every axis that a view need not hold: what was seen through windows.
+/// Share of vertices at either end of every axis that a view need not contain, such as surfaces seen through windows.
 const STRAYS: f32 = 0.015;
 
 impl MeshScene {
-    /// Looks at a mesh and at where its sensors stood. O(triangles / thinning + sensors).
+    /// Analyzes a mesh and the poses of its sensors. O(size of the subsets + sensors).
     pub(super) fn of(mesh: &MeshView<'_>, sensors: &[Sensor]) -> Self {
         let every = mesh.triangles.len().div_ceil(THINNED).max(1);
         let faces: Vec<Face> = (0..mesh.triangles.len())
@@ -67,7 +67,7 @@ impl MeshScene {
         scene
     }
 
-    /// Axes of the place: two level ones, the first along its length, and up.
+    /// Axes of the scene: two level ones, the first along its length, and up.
     fn axes(&self) -> [[f32; 3]; 3] {
         let aside = if self.up[0].abs() < 0.8 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let x = unit_or(cross(aside, self.up), [0.0, 1.0, 0.0]);
@@ -107,7 +107,7 @@ impl MeshScene {
             along.sort_by(f32::total_cmp);
             let strays = (STRAYS * along.len() as f32) as usize;
             let Some((&low, &high)) = along.get(strays).zip(along.iter().rev().nth(strays)) else { continue };
-            // Some room for what is only a little further out.
+            // A margin for surfaces only slightly farther out.
             let room = 0.06 * (high - low);
             for (k, v) in keep.iter_mut().zip(places) {
                 *k &= low - room <= v && v <= high + room;
@@ -130,7 +130,7 @@ impl MeshScene {
         2 * some.iter().filter(|s| among(s)).count() > some.len()
     }
 
-    /// The height that most of the surface looking down from above the sensors has.
+    /// The height of most of the surface that faces down above the sensors.
     fn find_ceiling(&self) -> Option<f32> {
         let (_, sensors_high) = range(self.sensors.iter().map(|s| dot(s.position, self.up)));
         let mut down: Vec<(f32, f32)> = Vec::new();
@@ -148,7 +148,7 @@ impl MeshScene {
         if whole < 0.15 * floor || down.is_empty() {
             return None;
         }
-        // Lower than a tenth of it: beams hang below ceilings.
+        // The lowest tenth of it: beams hang below ceilings.
         let mut sum = 0.0;
         down.iter()
             .find(|d| {
@@ -158,8 +158,8 @@ impl MeshScene {
             .map(|d| d.0)
     }
 
-    /// From above at about 45 degrees, along the longer side, with the ceiling taken away: of rooms. Of an object, from where
-    /// its sensors stood. `aspect` is the picture's width over its height.
+    /// Of rooms: from above at about 45 degrees, along the longer side, with the ceiling removed. Of an object: from the side
+    /// of its sensors. `aspect` is the width of the picture over its height.
     pub(super) fn overview(&self, aspect: f32) -> Camera {
         let back = if self.inside {
             // The side from which more of the surfaces face the viewer.
@@ -174,7 +174,7 @@ impl MeshScene {
         self.seen_from(back, aspect)
     }
 
-    /// Of an object: from its other side, if it has one that was seen, else as one of the sensors saw it; and from above.
+    /// Of an object: from its opposite side if that was observed, else from the pose of a sensor; and from above.
     pub(super) fn other_sides(&self, aspect: f32) -> Vec<Camera> {
         let front = self.sensors_side();
         let rise = dot(front, self.up);
@@ -194,7 +194,7 @@ impl MeshScene {
         vec![second, self.seen_from(above, aspect)]
     }
 
-    /// Towards a viewer, from turn and rise (degrees) from straight before the longer side.
+    /// Toward a viewer, from turn and rise (degrees) from straight before the longer side.
     fn direction(&self, turn: f32, rise: f32) -> [f32; 3] {
         let [length, width, up] = self.axes();
         let (sin, cos) = turn.to_radians().sin_cos();
@@ -203,7 +203,7 @@ impl MeshScene {
         unit_or(along(level.map(|v| v * cos), up, sin), up)
     }
 
-    /// Towards where the sensors stood around an object, a little from above.
+    /// Toward the sensors around an object, slightly from above.
     fn sensors_side(&self) -> [f32; 3] {
         let share = -1.0 / self.sensors.len().max(1) as f32;
         let mean = self.sensors.iter().fold([0.0; 3], |m, s| along(m, s.forward, share));
@@ -232,7 +232,7 @@ impl MeshScene {
         range(self.sample.iter().map(|p| dot(*p, self.up))).0
     }
 
-    /// Moves a camera back along its view until all is in the picture, which it fills.
+    /// Moves a camera back along its view until the scene fits the picture.
     fn fitted(&self, camera: Camera, back: [f32; 3], aspect: f32) -> Camera {
         let shown: Vec<[f32; 3]> = self
             .sample
@@ -266,7 +266,7 @@ impl MeshScene {
         Camera { eye: place(depth), target: place(middle_depth), near, ..camera }
     }
 
-    /// From sensors inside: up to `count` views that show much, far from each other. Empty where sensors stood outside.
+    /// Of rooms: up to `count` views from sensors, far from each other, that show most of the surface. Empty for objects.
     pub(super) fn inside_views(&self, count: usize) -> Vec<Camera> {
         let mut scored: Vec<(f32, Camera)> = Vec::new();
         if !self.inside {
@@ -304,7 +304,7 @@ impl MeshScene {
         chosen
     }
 
-    /// How much a view shows: the share of a coarse picture with surfaces facing it, near ones counting less.
+    /// A score of a view: the share of a coarse picture with surfaces that face it, near ones with less weight.
     fn worth(&self, camera: &Camera) -> f32 {
         const SIZE: [usize; 2] = [32, 22];
         let projection = Projection::new(camera, SIZE[0], SIZE[1]);
@@ -328,7 +328,7 @@ impl MeshScene {
     }
 }
 
-/// What the sensors call up, corrected by the floor: the mean normal of what lies level within 35 degrees.
+/// The up direction of the sensors, corrected by the floor: the mean normal of surfaces level within 35 degrees.
 fn upwards(faces: &[Face], sensors: &[Sensor]) -> [f32; 3] {
     let sum = sensors.iter().fold([0.0; 3], |m, s| along(m, s.up, 1.0));
     let mut up = unit_or(sum, [0.0, 0.0, 1.0]);

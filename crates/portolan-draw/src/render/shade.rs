@@ -1,4 +1,4 @@
-//! Light on what is seen.
+//! Lighting of the visible triangles.
 
 use super::camera::{Camera, Projection};
 use super::mesh::MeshView;
@@ -13,12 +13,12 @@ const SUPER: usize = 2;
 /// Paint of surfaces seen from behind (linear).
 const BEHIND: [f32; 3] = [0.36, 0.19, 0.14];
 
-/// A picture of a mesh on paper: light from the viewer's upper left and a weaker one from the right, a bright sky, dark
-/// corners and outlines. Surfaces seen from behind are brownish. Pixels do not depend on the number of threads.
+/// Renders a mesh on white: a light from the upper left and a weaker one from the right, ambient light from above, ambient
+/// occlusion and outlines. Back faces are brownish. Pixels do not depend on the number of threads.
 ///
 /// O(triangles + pixels); a million triangles on 1600 x 1000 pixels take about half a second on two cores.
 pub fn render_mesh(mesh: &MeshView<'_>, camera: &Camera, width: u32, height: u32) -> Canvas {
-    let mesh = &mesh.with_telling_colors();
+    let mesh = &mesh.without_constant_color();
     let mut canvas = Canvas::new(width, height);
     let (columns, rows) = (canvas.width() as usize, canvas.height() as usize);
     let smooth = if mesh.normals.len() == mesh.vertices.len() { Vec::new() } else { mesh.smooth_normals() };
@@ -58,18 +58,18 @@ struct Shading<'a> {
     up: [f32; 3],
 }
 
-/// What a ray meets on a triangle.
+/// The hit of a ray on a triangle.
 struct Hit {
-    /// Shares of the corners.
+    /// Barycentric coordinates.
     shares: [f32; 3],
-    /// Unit normal towards the viewer.
+    /// Unit normal toward the viewer.
     normal: [f32; 3],
     behind: bool,
     ray: [f32; 3],
 }
 
 impl Shading<'_> {
-    /// Where the ray of a sample meets the plane of a triangle (Moeller & Trumbore 1997).
+    /// The intersection of the ray of a sample with the plane of a triangle (Moeller & Trumbore 1997).
     fn meet(&self, triangle: usize, x: usize, y: usize) -> Option<Hit> {
         let [a, b, c] = self.mesh.corners(triangle)?;
         let ray = self.projection.ray([x as f32 + 0.5, y as f32 + 0.5]);
@@ -212,7 +212,7 @@ mod tests {
     #[test]
     fn light_comes_from_the_upper_left_and_colours_stay() {
         let (vertices, triangles) = ball(60, 40);
-        // Not all the same: that would say nothing.
+        // Not all the same: a constant color is ignored.
         let red: Vec<_> = (0..vertices.len()).map(|i| [200 + (i % 2) as u8, 40, 40]).collect();
         let mesh = MeshView { vertices: &vertices, triangles: &triangles, normals: &[], colors: &red };
         let picture = render_mesh(&mesh, &Camera::new([0.0, -4.0, 0.0], [0.0; 3]), 100, 100);

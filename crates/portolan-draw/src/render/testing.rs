@@ -42,7 +42,7 @@ pub(super) fn room(size: [f32; 3]) -> Mesh {
             for k in 0..20 * 20 {
                 let a = first + k / 20 * 21 + k % 20;
                 let (b, c, d) = (a + 21, a + 1, a + 22);
-                // Towards the inside.
+                // Toward the inside.
                 let both = if far { [[a, c, d], [a, d, b]] } else { [[a, d, c], [a, b, d]] };
                 triangles.extend(both);
             }

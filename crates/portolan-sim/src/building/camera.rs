@@ -1,4 +1,4 @@
-//! A depth camera that sees color.
+//! A depth camera with color.
 
 use super::world::World3;
 use crate::Random;
@@ -6,34 +6,34 @@ use portolan::geom::Pose;
 use portolan::geom::vector::{along, norm, scale};
 use portolan::scan::{Frame, Pinhole, RangeImage};
 
-/// A depth camera; depth and color come from one place.
+/// A depth camera; depth and color have the same viewpoint.
 ///
-/// The depth's noise is independent, normal and without bias, with a standard deviation of
-/// `noise + noise_quadratic (z - 0.4 m)^2`. Directions, colors and poses are exact: no distortion, no mixed pixel at
+/// The noise of the depth is independent, normal and without bias, with a standard deviation of
+/// `noise + noise_quadratic (z - 0.4 m)^2`. Directions, colors and poses are exact: no distortion, no mixed pixels at
 /// edges, no shadow of a projector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthCamera {
-    /// Where pixels look.
+    /// The projection.
     pub pinhole: Pinhole,
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub columns: usize,
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Depths outside of these are no readings (meters).
+    /// Least and greatest depth measured (meters).
     pub depth: [f64; 2],
     /// Standard deviation of a depth at 0.4 m (meters).
     pub noise: f64,
-    /// How it grows with the squared distance (per meter).
+    /// Its increase with the squared distance (per meter).
     pub noise_quadratic: f64,
-    /// Depths are rounded to multiples of this (meters); 0: not at all.
+    /// Depths are rounded to multiples of this (meters); 0 for no rounding.
     pub step: f64,
-    /// Share of pixels without a reading, whatever is there.
+    /// Share of pixels without a reading, at random.
     pub dropped_rate: f64,
 }
 
 impl Default for DepthCamera {
-    /// 640 x 480 pixels, 525 pixels focal length, 0.3 m to 8 m, in millimeters, one pixel in 200 lost; noise as of a
-    /// Kinect: 1.2 mm at 0.4 m, 14 mm at 3 m (Nguyen, Izadi & Lovell 2012, doi:10.1109/3DIMPVT.2012.84).
+    /// 640 x 480 pixels, a focal length of 525 pixels, 0.3 m to 8 m, rounded to millimeters, one pixel in 200 lost; the noise
+    /// of a Kinect: 1.2 mm at 0.4 m, 14 mm at 3 m (Nguyen, Izadi & Lovell 2012, doi:10.1109/3DIMPVT.2012.84).
     fn default() -> Self {
         Self {
             pinhole: Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 },
@@ -49,12 +49,12 @@ impl Default for DepthCamera {
 }
 
 impl DepthCamera {
-    /// The same view with other noise: constant, as of a lidar.
+    /// The camera with constant noise (meters), like that of a lidar.
     pub fn with_noise(self, noise: f64) -> Self {
         Self { noise, noise_quadratic: 0.0, ..self }
     }
 
-    /// The same field of view with a share of the pixels along each side.
+    /// The camera with a share of the pixels along each side and the same field of view.
     pub fn scaled(self, share: f64) -> Self {
         let c = self.pinhole;
         let centre = |v: f64| (v + 0.5) * share - 0.5;
@@ -69,7 +69,7 @@ impl DepthCamera {
     }
 }
 
-/// What the camera sees from a pose (x right, y down, z forward). The noise is that of the stream `(seed, index)` alone.
+/// The image of the camera from a pose (x right, y down, z forward). The noise depends on the stream `(seed, index)` alone.
 pub fn camera_frame(
     world: &World3,
     world_from_camera: &Pose<3>,

@@ -1,4 +1,4 @@
-//! The Building: four rooms in a ring, furnished, with open windows.
+//! The building: four furnished rooms in a ring, with open windows.
 
 use super::furniture::{Furnisher, STONE, WALL};
 use super::shape::Shape;
@@ -6,16 +6,16 @@ use super::world::{Body, World3};
 use crate::Random;
 use std::f64::consts::FRAC_PI_2;
 
-/// The Building and how to walk through it.
+/// The building and the path of the sensor through it.
 #[derive(Clone, Debug)]
 pub struct Building {
     /// Walls and furniture.
     pub world: World3,
-    /// Corners of a closed path through all rooms (x and y, meters); the last is not the first again.
+    /// Corners of a closed path through all rooms (x and y, meters), without a repeated first corner.
     pub path: Vec<[f64; 2]>,
 }
 
-/// Everything is moved by so much (meters): no face lies on a lattice of centimeters.
+/// Offset of the whole building (meters), so that no face lies on a lattice of centimeters.
 const SHIFT: [f64; 3] = [0.0137, 0.0219, 0.0173];
 /// Inner size and clear height (meters).
 const SIZE: [f64; 3] = [11.373, 8.231, 2.687];
@@ -24,7 +24,7 @@ const OUTER: f64 = 0.233;
 const ALONG: [f64; 2] = [4.303, 4.464];
 const ACROSS_LOW: [f64; 2] = [6.107, 6.258];
 const ACROSS_HIGH: [f64; 2] = [3.911, 4.059];
-/// How far bodies that belong together reach into each other (meters).
+/// Overlap of bodies that belong together (meters).
 const SINK: f64 = 0.07;
 const DOOR_HEAD: f64 = 2.087;
 
@@ -42,7 +42,7 @@ const fn window(from: f64, to: f64) -> Opening {
     Opening { along: [from, to], height: [0.917, 2.143] }
 }
 
-/// The Building of a seed: the walls are always the same, furniture stands a little elsewhere and turned.
+/// The building of a seed: the walls are always the same, furniture is shifted and turned at random.
 ///
 /// 11.4 m x 8.2 m x 2.7 m inside: living room, kitchen, hall and study, joined by four doors in a ring; a window in each
 /// room, open, through which rays escape. 147 bodies: tables with tops of 3 cm and legs of 4 cm, shelves, pillars

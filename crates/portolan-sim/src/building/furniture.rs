@@ -1,4 +1,4 @@
-//! What stands in the Building, in its own measures.
+//! The furniture of the building, each piece in a frame of its own.
 
 use super::shape::Shape;
 use super::world::Body;
@@ -18,7 +18,7 @@ const WHITE: [u8; 3] = [240, 240, 236];
 /// Legs begin so far below the floor (meters), so that they and the floor are one solid.
 const SINK: f64 = -0.06;
 
-/// Puts furniture into a building, each piece a little off its place.
+/// Places furniture in a building, each piece at a small random offset.
 pub(super) struct Furnisher<'a> {
     pub(super) random: Random,
     pub(super) bodies: &'a mut Vec<Body>,
@@ -115,7 +115,7 @@ impl Furnisher<'_> {
         for k in 0..boards {
             let z = 0.087 + (high - 0.087) * k as f64 / (boards - 1) as f64;
             p.block([-x + 0.004, -y + 0.005, z - 0.023], [x - 0.004, y - 0.003, z - 0.002], WOOD);
-            // Something on every board but the highest.
+            // An object on every board except the highest.
             if k + 1 < boards {
                 let (from, wide) = (-0.8 * x + 0.23 * x * k as f64, 0.41 * x);
                 let color = [RED, BLUE, YELLOW, GREEN][k % 4];
@@ -206,7 +206,7 @@ impl Furnisher<'_> {
         p.round([0.0, 0.0], [SINK, 0.397], 0.151, GREEN);
     }
 
-    /// A board that leans backwards, towards +y, by 15 degrees.
+    /// A board that leans backward, toward +y, by 15 degrees.
     pub(super) fn leaning_board(&mut self, at: [f64; 2]) {
         let p = self.turned_piece("leaning board", at, 0.0);
         let (sin, cos) = (libm::sin(-0.26), libm::cos(-0.26));

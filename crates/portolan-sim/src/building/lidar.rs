@@ -1,4 +1,4 @@
-//! A turning lidar with rings.
+//! A spinning 3-D lidar.
 
 use super::world::World3;
 use crate::Random;
@@ -8,25 +8,25 @@ use portolan::scan::{Frame, PointScan, RangeImage, Spherical};
 
 /// A lidar that turns about its z axis: rings of one elevation, columns of one azimuth.
 ///
-/// The noise is that of the range alone: independent, normal, without bias. Directions are exact, and so are poses. There
-/// is no mixed pixel at edges, no motion during a turn and no dependence on the angle of incidence.
+/// The noise of the range is independent, normal and without bias. Directions and poses are exact: no mixed pixels at edges,
+/// no motion during a turn, no dependence on the angle of incidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpinningLidar {
-    /// Rings, at equal angles from the highest to the lowest elevation.
+    /// Number of rings, at equal angles from the highest to the lowest elevation.
     pub rings: usize,
-    /// Readings in a turn; the first looks along x, the turn is counter-clockwise.
+    /// Number of readings in a turn, counter-clockwise from x.
     pub columns: usize,
     /// Lowest and highest elevation (radians).
     pub elevation: [f64; 2],
-    /// Rays that meet nothing up to here come back empty (meters).
+    /// Maximum range (meters); rays without a hit within it are empty.
     pub max_range: f64,
     /// Standard deviation of the range (meters).
     pub noise: f64,
-    /// Share of rays that are lost, whatever is there; nothing is known of them.
+    /// Share of rays that are lost, at random.
     pub dropped_rate: f64,
-    /// Whether rays that met nothing are told apart from lost ones: then they are free up to the maximum range.
+    /// Whether rays without a hit are distinguished from lost ones, so that they are free up to the maximum range.
     pub misses_known: bool,
-    /// Whether the rows and columns are delivered beside the points.
+    /// Whether the frame has a range image, with rows and columns, beside its points.
     pub organized: bool,
 }
 
@@ -48,7 +48,7 @@ impl Default for SpinningLidar {
 }
 
 impl SpinningLidar {
-    /// Where rows and columns look.
+    /// The projection of rows and columns.
     pub fn projection(&self) -> Spherical {
         let [low, high] = self.elevation;
         let last = self.rings.saturating_sub(1).max(1) as f64;
@@ -74,7 +74,7 @@ impl SpinningLidar {
     }
 }
 
-/// What the lidar sees from a pose, with `directions` of [`SpinningLidar::directions`]. The noise is that of the stream
+/// The frame of the lidar from a pose, with `directions` from [`SpinningLidar::directions`]. The noise depends on the stream
 /// `(seed, index)` alone.
 pub fn lidar_frame(
     world: &World3,
@@ -87,7 +87,7 @@ pub fn lidar_frame(
     let mut scan = PointScan::new([], [0.0; 3]);
     let mut values = Vec::with_capacity(directions.len());
     for &direction in directions {
-        // Drawn for every ray, so that what one ray meets does not change the noise of the next.
+        // Drawn for every ray, so that the result of one ray does not change the noise of the next.
         let (fate, noise) = (random.uniform(), lidar.noise * random.normal());
         let hit = world.cast_ray(world_from_sensor.translation, world_from_sensor.rotate(direction));
         let end = |range: f64| scale(direction, range).map(|v| v as f32);
@@ -97,7 +97,7 @@ pub fn lidar_frame(
                 scan.points.push(end(range));
                 range
             }
-            // A reading that noise pushed below zero.
+            // A reading below zero because of its noise.
             Some((truth, _)) if truth <= lidar.max_range => 0.0,
             _ if lidar.misses_known => {
                 scan.free_ends.push(end(lidar.max_range));

@@ -1,4 +1,4 @@
-//! A walk through the Building with a sensor.
+//! A walk through the building with a sensor.
 
 use super::camera::{DepthCamera, camera_frame};
 use super::floor_plan::{Building, building_world};
@@ -9,23 +9,23 @@ use crate::SEED;
 use portolan::geom::Pose;
 use portolan::scan::Frame;
 
-/// What is carried through the Building.
+/// The sensor carried through the building.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BuildingSensor {
     /// Upright, at 1.15 m.
     Lidar(SpinningLidar),
-    /// At 1.4 m, looking around and a little down.
+    /// At 1.4 m, panning and pitched slightly down.
     Camera(DepthCamera),
 }
 
-/// A walk.
+/// The settings of a walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BuildingConfig {
-    /// Scans, at equal distances along the closed path through all rooms.
+    /// Number of scans, at equal distances along the closed path through all rooms.
     pub scans: usize,
     /// The sensor.
     pub sensor: BuildingSensor,
-    /// Furniture, noise.
+    /// Seed of the furniture and of the noise.
     pub seed: u64,
 }
 
@@ -36,18 +36,18 @@ impl Default for BuildingConfig {
     }
 }
 
-/// Scans with the true poses they were taken at, and the world they show.
+/// Scans with their true poses, and the world.
 #[derive(Clone, Debug)]
 pub struct BuildingLog {
-    /// The truth.
+    /// The world.
     pub world: World3,
-    /// `world_from_sensor` and what was seen.
+    /// `world_from_sensor` and the frame of each scan.
     pub scans: Vec<(Pose<3>, Frame)>,
-    /// When each was taken (seconds): ten a second.
+    /// Time of each scan (seconds), at 10 Hz.
     pub times: Vec<f64>,
 }
 
-/// One walk through the Building: everything that a demonstration in space needs.
+/// One walk through the building: a 3-D log with ground truth.
 ///
 /// ```
 /// use portolan_sim::building::{BuildingConfig, SpinningLidar, BuildingSensor, building_log};
@@ -79,7 +79,7 @@ pub fn building_log(config: &BuildingConfig) -> BuildingLog {
     BuildingLog { world, scans, times }
 }
 
-/// True poses of a walk, `world_from_sensor`: a carried sensor sways, nods, and goes up and down a little.
+/// True poses of a walk, `world_from_sensor`, with the small roll, pitch and vertical motion of a carried sensor.
 pub fn building_poses(building: &Building, config: &BuildingConfig) -> Vec<Pose<3>> {
     let walk = Walk::new(&building.path);
     let pose = |i: usize| {
@@ -133,7 +133,7 @@ mod tests {
         assert_ne!(lidar_bytes, of(BuildingSensor::Lidar(lidar), SEED + 1));
         let camera_bytes = of(BuildingSensor::Camera(camera), SEED);
         println!("{lidar_bytes:#x} {camera_bytes:#x}");
-        // The walk that figures in the documentation are measured on.
+        // The figures in the documentation are measured on this walk.
         assert_eq!((lidar_bytes, camera_bytes), (0xfd65_8d01_0a43_3e2d, 0xe114_bace_f211_ed3e));
     }
 

@@ -4,9 +4,9 @@
 //! | question | start at |
 //! |---|---|
 //! | scans with poses, in one call | [`building_log`] |
-//! | what is there | [`building_world`], [`World3`], [`Body`], [`Shape`] |
-//! | what does a sensor see, and with which noise | [`SpinningLidar`], [`DepthCamera`] |
-//! | is a map right | [`surface_points`], [`free_points`]; [`score_free`], [`score_surface`], [`surface_errors`] |
+//! | the world | [`building_world`], [`World3`], [`Body`], [`Shape`] |
+//! | sensors and their noise | [`SpinningLidar`], [`DepthCamera`] |
+//! | evaluation of maps | [`surface_points`], [`free_points`]; [`score_free`], [`score_surface`], [`surface_errors`] |
 
 mod camera;
 mod floor_plan;

@@ -1,9 +1,9 @@
-//! A tree of boxes over shapes: rays and distances look at few of them.
+//! A tree of bounding boxes over shapes, so that rays and distances evaluate few of them.
 
 use super::shape::{Entry, Shape};
 use portolan::geom::{Aabb, vector};
 
-/// Shapes in a leaf, at most.
+/// Largest number of shapes in a leaf.
 const LEAF: usize = 2;
 /// Boxes are a little larger than what is in them: rounding must not hide an edge (meters).
 const SLACK: f64 = 1e-9;
@@ -20,7 +20,7 @@ struct Node {
     shapes: u32,
 }
 
-/// The tree. It holds indices of shapes; every call is given the same shapes again.
+/// The tree. It stores indices of shapes; every call takes the same shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tree {
     nodes: Vec<Node>,
@@ -28,7 +28,7 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// Cut at the median of the middles along the longest axis. O(n log^2 n).
+    /// Builds the tree, split at the median of the centers along the longest axis. O(n log^2 n).
     pub(super) fn new(shapes: &[Shape]) -> Self {
         let boxes: Vec<_> = shapes.iter().map(|s| s.aabb().grown(SLACK)).collect();
         let mut tree = Self { nodes: Vec::new(), order: Vec::new() };
@@ -56,7 +56,7 @@ impl Tree {
         self.build(boxes, right);
     }
 
-    /// The first shape that a ray enters; of several at one place that of the lowest index.
+    /// The first shape that a ray enters; of several at one place that with the lowest index.
     pub(super) fn cast(
         &self,
         shapes: &[Shape],
@@ -92,7 +92,7 @@ impl Tree {
             }
             let children = [at + 1, node.link];
             let t = children.map(|c| meets(&self.nodes[c as usize].bounds, origin, inverse));
-            // The nearer child is looked at first, so it goes on top.
+            // The nearer child is visited first, so it goes on top of the stack.
             let first = usize::from(t[1].unwrap_or(f64::INFINITY) < t[0].unwrap_or(f64::INFINITY));
             for c in [1 - first, first] {
                 if let Some(from) = t[c].filter(|&from| from <= reach) {
@@ -113,7 +113,7 @@ impl Tree {
         while height > 0 {
             height -= 1;
             let (at, apart) = stack[height];
-            // A box that holds the point may hold a shape that holds it deeper.
+            // A box that contains the point may have a shape that contains it deeper.
             if apart > 0.0 && best.is_some_and(|b| apart > b.1) {
                 continue;
             }
@@ -140,14 +140,14 @@ impl Tree {
     }
 }
 
-/// Arc length at which a ray enters a box, 0 if it begins there.
+/// Arc length at which a ray enters a box, 0 if it starts inside.
 #[inline(always)]
 fn meets(bounds: &Aabb<3>, origin: [f64; 3], inverse: [f64; 3]) -> Option<f64> {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for k in 0..3 {
         let a = (bounds.min[k] - origin[k]) * inverse[k];
         let b = (bounds.max[k] - origin[k]) * inverse[k];
-        // Where the ray runs in the plane of a face, 0 * infinity is NaN, and `min`, `max` pass over it.
+        // Where the ray runs in the plane of a face, 0 * infinity is NaN, which `min` and `max` ignore.
         near = near.max(a.min(b));
         far = far.min(a.max(b));
     }

@@ -1,6 +1,6 @@
-//! True surface, true free space, and what a map says about them.
+//! True surface and true free space, and scores of maps against them.
 //!
-//! The scores take closures, so that they fit any map.
+//! The scores take closures, so that they work with any map.
 
 use super::world::World3;
 use crate::{ErrorSummary, Random, Truth};
@@ -11,16 +11,16 @@ use portolan::scan::Frame;
 /// A point of the true surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// World, meters.
+    /// The point (world, meters).
     pub point: [f64; 3],
-    /// Unit normal, towards free space.
+    /// Unit normal, toward free space.
     pub normal: [f64; 3],
     /// Index of the body.
     pub body: usize,
 }
 
-/// Points of the surface of the union of all bodies within a box, uniform by area. O(tries): faces inside other bodies
-/// and outside of the box are drawn in vain, at most a thousand times as often as points are wanted.
+/// Points of the surface of the union of all bodies within a box, uniform by area. O(tries): points inside other bodies and
+/// outside the box are rejected; at most `1000 * count` are drawn.
 pub fn surface_points(world: &World3, within: &Aabb<3>, count: usize, seed: u64) -> Vec<SurfacePoint> {
     let mut random = Random::stream(seed, 0x5u64);
     let mut sums = Vec::new();
@@ -38,7 +38,7 @@ pub fn surface_points(world: &World3, within: &Aabb<3>, count: usize, seed: u64)
         let body = sums.partition_point(|s| *s <= pick);
         let Some(b) = world.bodies().get(body) else { continue };
         let (point, normal) = b.shape.surface_point(&mut random);
-        // A step off the face is free space, unless another body covers it.
+        // A step off the face lies in free space, unless another body covers it.
         if within.contains(point) && !world.is_inside(along(point, normal, 1e-6)) {
             points.push(SurfacePoint { point, normal, body });
         }
@@ -46,11 +46,11 @@ pub fn surface_points(world: &World3, within: &Aabb<3>, count: usize, seed: u64)
     points
 }
 
-/// Those of the surface points that some scan saw: a ray of it ended within `reach` meters, nothing stands between the
-/// point and the sensor, and the cosine of the angle of incidence is at least `least_cos`.
+/// The surface points observed by at least one scan: a ray ended within `reach` meters, no body occludes the point from the
+/// sensor, and the cosine of the angle of incidence is at least `least_cos`.
 ///
-/// What no scan saw is unknown to any map. What rays only graze is lost to maps of rays where the surface runs through the
-/// lowest part of a cell: rays that end further on pass through the rest of it. O(points x scans + end points).
+/// Points that no scan observed are unknown to any map. Surfaces at grazing incidence can be lost in maps updated ray by
+/// ray, where rays that end beyond pass through the same cells. O(points x scans + end points).
 pub fn seen_surface(
     world: &World3,
     points: &[SurfacePoint],
@@ -86,7 +86,7 @@ pub fn seen_surface(
     points.iter().zip(seen).filter(|(_, seen)| *seen).map(|(s, _)| *s).collect()
 }
 
-/// Surfaces of a frame, in the sensor's frame.
+/// The hits of a frame, in the sensor's frame.
 fn end_points(frame: &Frame) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
     match frame {
         Frame::Points(scan) => Box::new(scan.points.iter().map(|p| p.map(f64::from))),
@@ -94,11 +94,11 @@ fn end_points(frame: &Frame) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
     }
 }
 
-/// Points of free space that at least one ray passed through: each lies on a ray that ended on a surface, `margin` meters
-/// or more before its true end, and `margin` away from every surface. Fewer than `count` where hardly any are found.
+/// Points of free space crossed by at least one ray: each lies on a ray with a hit, at least `margin` meters before its true
+/// end and from every surface. Fewer than `count` where too few are found.
 ///
-/// Scans and rays are drawn evenly, and the place on a ray so that far places are drawn as often as a uniform density in
-/// space would have it (the square of the range), as far as rays go.
+/// Scans and rays are drawn uniformly, the position on a ray with the square of the range, as for a uniform density in
+/// volume.
 pub fn free_points(
     world: &World3,
     scans: &[(Pose<3>, Frame)],
@@ -130,7 +130,7 @@ pub fn free_points(
             continue;
         }
         let direction = scale(sub(end, pose.translation), 1.0 / length);
-        // The noisy end may lie behind the surface: the ray itself ended at the true one.
+        // The noisy end may lie behind the surface; the ray ended at the true one.
         let true_length = world.cast_ray(pose.translation, direction).map_or(0.0, |h| h.range);
         let p = along(pose.translation, direction, reach);
         if reach <= true_length - margin && Truth::signed_distance(world, p) >= margin {
@@ -140,39 +140,39 @@ pub fn free_points(
     points
 }
 
-/// How a map labels points.
+/// Counts of the labels that a map gives to points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Labels {
-    /// Called free.
+    /// Number of free points.
     pub free: usize,
-    /// Called occupied.
+    /// Number of occupied points.
     pub occupied: usize,
-    /// Unknown to the map.
+    /// Number of unknown points.
     pub unknown: usize,
 }
 
 impl Labels {
-    /// Share of all points that are called free.
+    /// Share of free points.
     pub fn free_share(&self) -> f64 {
         self.free as f64 / (self.free + self.occupied + self.unknown).max(1) as f64
     }
 
-    /// Share of all points that are called occupied.
+    /// Share of occupied points.
     pub fn occupied_share(&self) -> f64 {
         self.occupied as f64 / (self.free + self.occupied + self.unknown).max(1) as f64
     }
 }
 
-/// Labels of points of true free space. `is_free`: `None` where the map does not know.
+/// Labels of points of true free space. `is_free` returns `None` where the map is unknown.
 pub fn score_free(points: &[[f64; 3]], mut is_free: impl FnMut([f64; 3]) -> Option<bool>) -> Labels {
     let mut labels = Labels::default();
     points.iter().for_each(|&p| count(&mut labels, is_free(p)));
     labels
 }
 
-/// Labels of points of the true surface: occupied where the map says so at the point or a `voxel` (meters) beside it along
-/// an axis, because noise puts the end points of a surface into either of two cells; free where it calls the point free
-/// and none of those occupied.
+/// Labels of points of the true surface: occupied where the map is occupied at the point or one `voxel` (meters) beside it
+/// along an axis, because noise puts hits of a surface into either of two cells; free where the point is free and all of
+/// those are not occupied.
 pub fn score_surface(
     points: &[SurfacePoint],
     voxel: f64,
@@ -200,8 +200,8 @@ fn count(labels: &mut Labels, is_free: Option<bool>) {
     }
 }
 
-/// Signed distances of a reconstructed surface's points to the true surface (meters): the error of the reconstruction,
-/// positive where it lies in free space. `None` without points.
+/// The error of a reconstructed surface: signed distances of its points to the true surface (meters), positive in free
+/// space. `None` without points.
 pub fn surface_errors(world: &impl Truth<3>, points: impl Iterator<Item = [f64; 3]>) -> Option<ErrorSummary> {
     ErrorSummary::of(points.map(|p| world.signed_distance(p)).collect())
 }
@@ -233,7 +233,7 @@ mod tests {
         let free = free_points(world, &log.scans, 0.2, 3000, 1);
         assert_eq!(free.len(), 3000);
         assert!(free.iter().all(|&p| world.signed_distance(p) >= 0.2));
-        // A perfect map scores perfectly, one that knows nothing knows nothing.
+        // A perfect map scores perfectly, an empty map is unknown everywhere.
         let truth = |p| Some(world.signed_distance(p) > 0.05);
         assert_eq!(score_free(&free, truth).free_share(), 1.0);
         assert_eq!(score_surface(&surface, 0.1, truth).occupied_share(), 1.0);

@@ -3,9 +3,9 @@
 use portolan::geom::Pose;
 use portolan::geom::vector::{along, distance, scale, sub, unit};
 
-/// Corners are rounded over so much of the path (meters).
+/// Length of path over which corners are rounded (meters).
 const ROUNDING: f64 = 0.6;
-/// Places that are averaged for it.
+/// Number of points averaged for it.
 const PLACES: usize = 13;
 
 /// A closed path on the floor, with rounded corners.
@@ -43,7 +43,7 @@ impl Walk {
         scale(sum, 1.0 / PLACES as f64)
     }
 
-    /// Place and unit heading after a share of the path.
+    /// Position and unit heading at a fraction of the path.
     pub(super) fn after(&self, share: f64) -> ([f64; 2], [f64; 2]) {
         let s = share * self.length;
         let heading = unit(sub(self.at(s + 0.15), self.at(s - 0.15))).unwrap_or([1.0, 0.0]);
@@ -51,8 +51,8 @@ impl Walk {
     }
 }
 
-/// A body at a place: x forward, y left, z up; `turn` to the left of the heading, `pitch` down, `roll` to the right
-/// (radians).
+/// The pose of a body (x forward, y left, z up) at a position: `turn` to the left of the heading, `pitch` down, `roll` to
+/// the right (radians).
 pub(super) fn body_pose(place: [f64; 3], heading: [f64; 2], turn: f64, pitch: f64, roll: f64) -> Pose<3> {
     let rotated = |rotation| Pose { rotation, translation: [0.0; 3] };
     let yaw = |[c, s]: [f64; 2]| rotated([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]);

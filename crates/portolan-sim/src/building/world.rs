@@ -1,4 +1,4 @@
-//! Bodies in space, and the truth about them.
+//! A 3-D world of bodies, and its ground truth.
 
 use super::shape::Shape;
 use super::tree::Tree;
@@ -11,29 +11,29 @@ use std::collections::BinaryHeap;
 /// A solid with a name and a color.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
-    /// What it is, for people.
+    /// The name.
     pub name: String,
-    /// Where it is.
+    /// The shape, at its position.
     pub shape: Shape,
     /// Red, green, blue of its light squares; see [`World3::color`].
     pub color: [u8; 3],
 }
 
-/// What a ray meets.
+/// The hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit3 {
     /// Arc length (meters).
     pub range: f64,
-    /// Unit normal of the surface, towards free space.
+    /// Unit normal of the surface, toward free space.
     pub normal: [f64; 3],
     /// Index of the body.
     pub body: usize,
 }
 
-/// Bodies in space. Bodies that overlap act as their union: there is no surface inside another body.
+/// A 3-D world of bodies. Bodies that overlap act as their union, without surfaces inside.
 ///
-/// Bodies that belong together must overlap, by centimeters, and not merely touch: then rays cannot slip between them, and
-/// no hidden face lies near to the visible one.
+/// Bodies that belong together must overlap by centimeters, and not merely touch, so that rays cannot pass between them and
+/// hidden faces lie far from visible ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World3 {
     bodies: Vec<Body>,
@@ -43,11 +43,11 @@ pub struct World3 {
 
 /// Edge of the squares of the painted checkerboard (meters).
 pub const CHECKER: f64 = 0.4;
-/// The checkerboard's lattice passes through here, off any wall (meters).
+/// A point of the lattice of the checkerboard, off any wall (meters).
 const CHECKER_ORIGIN: [f64; 3] = [0.137, 0.171, 0.259];
-/// Depths inside unions are found to this (meters).
+/// Accuracy of depths inside unions (meters).
 pub const DEPTH_TOLERANCE: f64 = 1e-4;
-/// The search for them looks at no more cells than this.
+/// Largest number of cells in the search for them.
 const DEPTH_CELLS: usize = 400_000;
 
 impl World3 {
@@ -59,7 +59,7 @@ impl World3 {
         let shapes: Vec<_> = bodies.iter().map(|b| b.shape).collect();
         for body in &bodies {
             let Aabb { min, max } = body.shape.aabb();
-            assert!(min.iter().chain(&max).all(|v| v.is_finite()), "body {} has no place", body.name);
+            assert!(min.iter().chain(&max).all(|v| v.is_finite()), "body {} is not finite", body.name);
         }
         Self { tree: Tree::new(&shapes), shapes, bodies }
     }
@@ -69,12 +69,12 @@ impl World3 {
         &self.bodies
     }
 
-    /// The smallest box around all bodies.
+    /// The bounding box of all bodies.
     pub fn aabb(&self) -> Aabb<3> {
         self.shapes.iter().fold(Aabb::EMPTY, |b, s| b.union(s.aabb()))
     }
 
-    /// The first surface that a ray from free space meets; the direction has length 1. Exact; O(log bodies) as a rule.
+    /// The first surface hit by a ray (unit direction) from free space. Exact; usually O(log bodies).
     pub fn cast_ray(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<RayHit3> {
         let (body, entry) = self.tree.cast(&self.shapes, origin, direction)?;
         Some(RayHit3 { range: entry.range, normal: entry.normal, body })
@@ -89,15 +89,15 @@ impl World3 {
     /// Infinite in a world without bodies.
     ///
     /// Exact in free space, and inside wherever the nearest face of the body in which the point lies deepest is part of
-    /// the union's surface. Elsewhere (where bodies overlap) it is searched for, to [`DEPTH_TOLERANCE`]: that takes
+    /// the surface of the union. Elsewhere, where bodies overlap, a search finds it to [`DEPTH_TOLERANCE`], which takes
     /// milliseconds instead of less than a microsecond.
     pub fn signed_distance(&self, p: [f64; 3]) -> f64 {
         let Some((body, d)) = self.tree.nearest(&self.shapes, p) else { return f64::INFINITY };
         if d >= 0.0 { d } else { -self.depth(p, body, -d) }
     }
 
-    /// The color of the surface of a body near a point: the body's own, darker on every other square of a checkerboard
-    /// of [`CHECKER`] meters in space.
+    /// The color of the surface of a body near a point: that of the body, darker on every other cube of a 3-D checkerboard
+    /// of [`CHECKER`] meters.
     pub fn color(&self, body: usize, p: [f64; 3]) -> [u8; 3] {
         let square =
             |k: usize| if ((p[k] - CHECKER_ORIGIN[k]) / CHECKER).floor() as i64 & 1 == 0 { 0 } else { 1 };
@@ -106,8 +106,8 @@ impl World3 {
         if odd { light.map(|v| (u16::from(v) * 7 / 10) as u8) } else { light }
     }
 
-    /// The color of the surface nearest to a point of free space, or of the body that a point lies in; black in a
-    /// world without bodies.
+    /// The color of the surface nearest to a point in free space, or of the body that contains the point; black in a world
+    /// without bodies.
     pub fn color_near(&self, p: [f64; 3]) -> [u8; 3] {
         self.tree.nearest(&self.shapes, p).map_or([0; 3], |(body, _)| self.color(body, p))
     }
@@ -117,7 +117,7 @@ impl World3 {
         self.tree.nearest(&self.shapes, p).map_or(f64::INFINITY, |(_, d)| d)
     }
 
-    /// How far it is from a point inside to free space; `body` is that in which it lies deepest, by `deepest`.
+    /// Distance from a point inside to free space; `body` is that in which it lies deepest, by `deepest`.
     fn depth(&self, p: [f64; 3], body: usize, deepest: f64) -> f64 {
         // One step out of this body along its steepest way: in free space, or in another body?
         if let Some(way) = self.way_out(p, body)
@@ -175,7 +175,7 @@ impl World3 {
         found.max(at_least)
     }
 
-    /// Where the way from inside to a point of free space leaves the bodies for the last time (meters from `p`).
+    /// Where the segment from inside to a point of free space leaves the bodies for the last time (meters from `p`).
     fn first_free(&self, p: [f64; 3], free: [f64; 3]) -> f64 {
         let whole = distance(p, free);
         let back = scale(sub(p, free), 1.0 / whole);
@@ -338,7 +338,7 @@ mod tests {
         ] {
             assert!((two.signed_distance(p) + depth).abs() <= 2.0 * DEPTH_TOLERANCE, "{p:?}");
         }
-        // The distance inside is that of the nearest free point, of which there is none nearer in any direction.
+        // The distance inside is that of the nearest free point: all points nearer are inside.
         let world = heap(11, 60);
         let mut random = Random::stream(12, 0);
         let mut inside = 0;

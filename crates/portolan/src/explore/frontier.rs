@@ -123,7 +123,7 @@ impl Sets {
 struct Sum<const D: usize> {
     cells: Vec<[i32; D]>,
     places: [i64; D],
-    /// Faces upwards less faces downwards.
+    /// Faces in positive direction less faces in negative direction, per axis.
     normal: [i64; D],
     faces: usize,
 }

@@ -52,8 +52,8 @@ impl FrontierSettings {
 /// map.update(&store);
 /// let [border] = &map.frontiers()[..] else { panic!("one border") };
 /// assert_eq!((border.cells.len(), border.faces), (20, 22));
-/// let towards = border.normal.expect("the right side is open, the left is not");
-/// assert!((towards[0] - 1.0).abs() < 1e-12);
+/// let toward = border.normal.expect("the right side is open, the left is not");
+/// assert!((toward[0] - 1.0).abs() < 1e-12);
 ///
 /// // More is observed on the right: only the bricks there are processed.
 /// store.insert(BlockKey([1, 0]), DistanceBrick::from_parts(&[0.3; 64], &[1.0; 64]).expect("sane"))?;

@@ -125,7 +125,7 @@ mod tests {
         assert!(all.windows(2).all(|w| w[0] >= w[1]));
     }
 
-    /// Nav2's way, from the centres of obstacle cells in the plane, is never the more careful one.
+    /// Nav2's costs, from the centers of 2-D obstacle cells, are never higher.
     #[test]
     fn never_below_nav2s_own_costs() {
         let (how, r, edge) = (Inflation::default(), 0.05, 12);

@@ -24,26 +24,31 @@ pub(super) fn distance_to_boxes<const D: usize>(
                 continue;
             }
             for q in 0..n {
-                let mut best = line[q];
-                for k in 1..n {
-                    let gap = k as f32 - 0.5;
-                    let cost = gap * gap;
-                    if cost >= best {
-                        break;
-                    }
-                    if q >= k {
-                        best = best.min(line[q - k] + cost);
-                    }
-                    if q + k < n {
-                        best = best.min(line[q + k] + cost);
-                    }
-                }
-                sq[start + q * stride] = best;
+                sq[start + q * stride] = least_along(&line, q);
             }
         }
         stride *= n;
     }
     sq.iter().map(|v| if *v < most_sq { v.sqrt() } else { reach as f32 }).collect()
+}
+
+/// `min over k of line(q + k) + (max(0, |k| - 1/2))^2`.
+fn least_along(line: &[f32], q: usize) -> f32 {
+    let mut best = line[q];
+    for k in 1..line.len() {
+        let gap = k as f32 - 0.5;
+        let cost = gap * gap;
+        if cost >= best {
+            break;
+        }
+        if q >= k {
+            best = best.min(line[q - k] + cost);
+        }
+        if q + k < line.len() {
+            best = best.min(line[q + k] + cost);
+        }
+    }
+    best
 }
 
 /// Replaces every NaN by the least sum of a neighbor's value and the distance to it (meters), at most `most`: sweeps forward

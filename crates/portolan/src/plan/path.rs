@@ -402,7 +402,7 @@ mod tests {
         let far = Waypoints::new(vec![[0.0, 0.0], [1e150, 0.0]]).unwrap();
         let PathCheck::Violated(found) = check_path(&scene, &far, &Demand::new(0.1)) else { panic!() };
         assert_eq!((found.cause, found.to), (Cause::Unknown, 1e150));
-        // No field can say anything of what is no place, and none is asked.
+        // A point that is NaN is refused without a query.
         let lost = SpeedLimited::new(|t: f64| [t, (0.5 - t).sqrt()], 1.0, 2.0).unwrap();
         let near = Scene::<2> { most: 0.3, ..scene };
         let PathCheck::Violated(found) = check_path(&near, &lost, &Demand::new(0.1)) else { panic!() };
