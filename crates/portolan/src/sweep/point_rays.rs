@@ -11,8 +11,8 @@ use crate::scan::PointScan;
 /// Walks the ray of every point through the cells exactly. A cell takes the ray that passes nearest to its center, and
 /// gets that ray's distance at the center; ties go to the earlier ray.
 ///
-/// The cost is that of rays times their length in cells: where the scan has rows and columns, [`super::Projective`] says
-/// the same sooner, and better between rays. Weights by incidence need neighbours; here every ray counts as head-on.
+/// The cost is that of rays times their length in cells: where the scan has rows and columns, [`super::Projective`] is
+/// faster, and better between rays. Weights by incidence need neighbors; here every ray counts as head-on.
 #[derive(Clone, Debug)]
 pub struct PointRays {
     settings: ProjectiveSettings,
@@ -25,12 +25,12 @@ impl PointRays {
     /// Bytes that a touched block takes.
     pub(crate) const BLOCK_BYTES: usize = super::nearest_ray::CELL_BYTES * crate::geom::block_cells::<3>();
 
-    /// A sweep with these settings, which has seen nothing yet.
+    /// A sweep with these settings.
     pub fn new(settings: ProjectiveSettings) -> Self {
         Self { settings, rays: NearestRay::new(), bounds: None, colors: Vec::new() }
     }
 
-    /// Takes a scan in, taken at a rigid pose, and gathers what it says about cells. Only cells whose center lies in the bounds
+    /// Takes a scan in, taken at a rigid pose, and gathers its observations of cells. Only cells whose center lies in the bounds
     /// get anything. O(rays times their length in cells).
     ///
     /// # Errors
@@ -83,12 +83,12 @@ impl PointRays {
                 }
             }
         }
-        let silent =
+        let unused =
             Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0], range: 0.0, hit: false, weight: 0.0 };
         let everywhere = Aabb::new([f64::NEG_INFINITY; 3], [f64::INFINITY; 3]);
         let within = limits.bounds.as_ref().unwrap_or(&everywhere);
         let fits = self.rays.plan_rays(
-            (0..count).map(|i| ray(i).unwrap_or(silent)),
+            (0..count).map(|i| ray(i).unwrap_or(unused)),
             (lattice, within),
             (how.truncation, how.carve_weight),
             limits.most_blocks,

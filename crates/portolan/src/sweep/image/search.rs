@@ -1,9 +1,9 @@
-//! The search for the blocks that an image says something about: from large cubes of blocks to octants of single ones.
+//! The search for the blocks in which an image observes cells: from large cubes of blocks to octants of single ones.
 
 use crate::geom::{BLOCK_EDGE, BlockKey};
 use crate::parallel;
 
-/// What an image says about the cells of a cube.
+/// What an image shows of the cells of a cube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Class {
     /// Nothing: behind all surfaces, or out of sight.
@@ -40,7 +40,7 @@ pub(super) trait Classify: Sync {
     /// What is known at first.
     fn nothing_known(&self) -> Self::Known;
 
-    /// What the image says about those halves of a cube whose bit is set in `asked`; anything about the others.
+    /// The classes of those halves of a cube whose bit is set in `asked`; any class for the others.
     fn classify(&self, cube: Cube, known: Self::Known, asked: u8) -> [(Class, Self::Known); 8];
 }
 
@@ -72,11 +72,18 @@ impl Octants {
 /// Boxes of more blocks along an edge are not searched.
 pub(super) const LONGEST_EDGE: i64 = 1 << 20;
 
-/// Blocks from `first` to `last`, both included, ascending, with what is known of their octants, into `keys` and `octants`;
-/// no more than `most` and some. Returns whether there are no more. The box is at most [`LONGEST_EDGE`] blocks wide.
+/// Blocks from `first` to `last`, both included.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockBox {
+    pub first: [i32; 3],
+    pub last: [i32; 3],
+}
+
+/// The blocks of a box in which the image observes cells, ascending, into `keys`, and their octants; nothing where they are
+/// more than `most`. Returns whether they are not. The box is at most [`LONGEST_EDGE`] blocks wide.
 pub(super) fn find_blocks<C: Classify>(
     image: &C,
-    (first, last): ([i32; 3], [i32; 3]),
+    BlockBox { first, last }: BlockBox,
     most: usize,
     keys: &mut Vec<BlockKey<3>>,
     octants: &mut Vec<Octants>,
@@ -163,7 +170,7 @@ impl<C: Classify> Search<'_, C> {
         all
     }
 
-    /// The halves of a node that reach into the box and of which the image says something.
+    /// The halves of a node that reach into the box, without those of [`Class::Nothing`].
     #[inline(always)]
     fn parts(&self, node: Node, known: C::Known) -> impl Iterator<Item = (Node, Class, C::Known)> {
         let children = node.children().enumerate();

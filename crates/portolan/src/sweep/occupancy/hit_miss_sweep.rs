@@ -56,7 +56,11 @@ struct Rays<F> {
 }
 
 /// An image and the pose of the frame in which its pixels look.
-type View<'a> = (&'a Pose<3>, &'a RangeImage);
+#[derive(Clone, Copy)]
+struct View<'a> {
+    world_from_image: &'a Pose<3>,
+    image: &'a RangeImage,
+}
 
 impl HitMissSweep {
     /// A sweep of this kind.
@@ -149,7 +153,7 @@ impl HitMissSweep {
             Origin::PerPoint(_) => (world_from_sensor.translation, None),
         };
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
-        let view = image.as_deref().map(|image| (&world_from_image, image));
+        let view = image.as_deref().map(|image| View { world_from_image: &world_from_image, image });
         let passes = view.is_none();
         let ray = |i: usize| match i.checked_sub(hits) {
             Some(free) => {
@@ -200,10 +204,15 @@ impl HitMissSweep {
         let rays: Vec<Ray> = image.readings().map(ray).collect();
         let hits = rays.iter().filter(|r| r.hit).count();
         let rays = Rays { hits, count: rays.len(), ray: |i: usize| rays[i] };
-        self.plan_rays(&rays, (!passes).then_some((world_from_sensor, image)), lattice, limits)
+        self.plan_rays(
+            &rays,
+            (!passes).then_some(View { world_from_image: world_from_sensor, image }),
+            lattice,
+            limits,
+        )
     }
 
-    /// Marks the rays, and finds what the image of a view sees; without one, rays that pass mark misses.
+    /// Marks the rays, and finds the blocks of which a view sees free cells; without one, rays that pass mark misses.
     fn plan_rays<F: Fn(usize) -> Ray + Sync>(
         &mut self,
         rays: &Rays<F>,
@@ -218,12 +227,11 @@ impl HitMissSweep {
         let bounds = self.bounds.map(|b| b.aabb(lattice));
         let (bounds, most) = (bounds.as_ref(), limits.most_blocks);
         let longest = LONGEST_RAY_CELLS * lattice.resolution;
-        let further: Vec<Ray> =
-            view.and_then(|(pose, image)| free_reach(pose, image, longest)).into_iter().collect();
+        let further: Vec<Ray> = view.and_then(|view| free_reach(view, longest)).into_iter().collect();
         let (exact, misses) = (&mut self.rays, &mut self.misses);
         let (planned, ()) = parallel::join(
             || exact.plan(lattice, bounds, rays.count, &rays.ray, &further, most),
-            || view.into_iter().for_each(|(pose, image)| misses.take(image, pose, lattice)),
+            || view.into_iter().for_each(|view| misses.take(view.image, view.world_from_image, lattice)),
         );
         let mut tally = planned.map_err(|_| PlanError::TooManyBlocks)?;
         let is_searched = match (view, exact.reach()) {
@@ -283,9 +291,9 @@ impl HitMissSweep {
     }
 }
 
-/// The box around a sensor in which pixels without a surface say that space is free, as its diagonal. Not those of more than
+/// The box around a sensor in which pixels without a surface make cells free, as its diagonal. Not those of more than
 /// `longest` metres, which are refused.
-fn free_reach(world_from_image: &Pose<3>, image: &RangeImage, longest: f64) -> Option<Ray> {
+fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Option<Ray> {
     let used = |v: &f32| f64::from(-v) <= longest;
     let farthest = image.values.iter().copied().filter(used).fold(0.0f32, f32::min);
     if farthest == 0.0 || image.has_parallel_rays() {
