@@ -223,3 +223,64 @@ impl<C: Classify> Search<'_, C> {
         Cube { first_cell, edge: OCTANT << node.level }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball of cells around a cell: free inside of half its radius, mixed up to the radius.
+    struct Ball {
+        center: [i64; 3],
+        radius: i64,
+    }
+
+    impl Classify for Ball {
+        type Known = ();
+
+        fn nothing_known(&self) {}
+
+        fn classify(&self, cube: Cube, (): (), _: u8) -> [(Class, ()); 8] {
+            std::array::from_fn(|i| {
+                let Cube { first_cell, edge } = cube.half(i);
+                let (mut near, mut far) = (0, 0);
+                for k in 0..3 {
+                    let (low, high) =
+                        (first_cell[k] - self.center[k], first_cell[k] + edge - 1 - self.center[k]);
+                    near += if low > 0 { low * low } else { high.min(0).pow(2) };
+                    far += low.pow(2).max(high.pow(2));
+                }
+                let square = self.radius * self.radius;
+                let class = match (4 * far < square, near < square) {
+                    (true, _) => Class::Free,
+                    (_, true) => Class::Mixed,
+                    _ => Class::Nothing,
+                };
+                (class, ())
+            })
+        }
+    }
+
+    #[test]
+    fn every_block_is_found_wherever_the_box_begins() {
+        let ball = Ball { center: [5, -40, 101], radius: 150 };
+        for (first, last) in [([-30; 3], [40; 3]), ([-3, -30, 2], [11, -2, 9]), ([0, -5, 12], [0, -5, 12])] {
+            let mut expected = Vec::new();
+            for z in first[2]..=last[2] {
+                for (y, x) in (first[1]..=last[1]).flat_map(|y| (first[0]..=last[0]).map(move |x| (y, x))) {
+                    let cube = Cube { first_cell: [x, y, z].map(|v| 8 * i64::from(v)), edge: 8 };
+                    let octants = Octants::of(ball.classify(cube, (), 0xff).into_iter().map(|c| c.0));
+                    if octants != Octants::default() {
+                        expected.push((BlockKey([x, y, z]), octants));
+                    }
+                }
+            }
+            let (mut keys, mut octants) = (Vec::new(), Vec::new());
+            let most = expected.len();
+            assert!(find_blocks(&ball, BlockBox { first, last }, most, &mut keys, &mut octants));
+            let found: Vec<_> = keys.iter().copied().zip(octants.iter().copied()).collect();
+            assert_eq!(found, expected);
+            let fits = find_blocks(&ball, BlockBox { first, last }, most - 1, &mut keys, &mut octants);
+            assert!(!fits && keys.is_empty());
+        }
+    }
+}
