@@ -79,7 +79,7 @@ fn the_seam(columns: usize, turn: f64) {
             on_pixels += 1;
         }
     }
-    assert!(on_pixels > 3000 && (!has_gap || in_gap > 30), "{on_pixels} {in_gap}");
+    assert!(on_pixels > 3000 && (!has_gap || in_gap > 3), "{on_pixels} {in_gap}");
 }
 
 #[test]

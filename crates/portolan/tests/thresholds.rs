@@ -4,7 +4,7 @@
 use portolan::explore::{FrontierMap, FrontierSettings};
 use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{DistanceMap, SparseTsdf, SparseTsdfConfig, Tsdf2, Tsdf2Config};
+use portolan::map::{DistanceMap, Tsdf2, Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, PointScan, RangeLimits, Scan};
 use portolan::surface::{
     ContourSettings, MeshSettings, RayCast, RayCastSettings, RayCaster, marching_cubes, marching_squares,
@@ -26,9 +26,9 @@ impl Wall<2> for Tsdf2 {
         let bearings: Vec<f64> = (-250..=250).map(|i| 0.002 * f64::from(i)).collect();
         let ranges: Vec<f64> = bearings.iter().map(|b| 4.0 / b.cos()).collect();
         let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
-        let config = Tsdf2Config { truncation: 3.0 * R, weights, carve_weight, ..Default::default() };
-        let mut map = Tsdf2::new(config.with_grid(&Grid::new([-0.5, -3.0], R, [55, 60]))).unwrap();
-        map.integrate(&Pose::IDENTITY, &scan, true);
+        let config = TsdfConfig { truncation: 3.0 * R, weights, carve_weight, ..Default::default() };
+        let mut map = Tsdf2::covering(&Grid::new([-0.5, -3.0], R, [55, 60]), config).unwrap();
+        map.integrate(&Pose::IDENTITY, &scan).unwrap();
         map
     }
 
@@ -37,18 +37,18 @@ impl Wall<2> for Tsdf2 {
     }
 }
 
-impl Wall<3> for SparseTsdf {
+impl Wall<3> for Tsdf3 {
     fn seen(weights: WeightModel, carve_weight: f32) -> Self {
         let at = |i: u16| 0.03 * f32::from(i) - 2.0;
         let points = (0..133 * 133).map(|n| [4.0, at(n % 133), at(n / 133)]);
-        let config = SparseTsdfConfig {
+        let config = TsdfConfig {
             resolution: R,
             truncation: 3.0 * R,
             weights,
             carve_weight,
             ..Default::default()
         };
-        let mut map = SparseTsdf::new(config).unwrap();
+        let mut map = Tsdf3::new(config).unwrap();
         map.integrate(&Pose::IDENTITY, &Frame::Points(PointScan::new(points, [0.0; 3]))).unwrap();
         map
     }
@@ -107,5 +107,5 @@ fn defaults_fit<const D: usize, M: Wall<D>>() {
 #[test]
 fn defaults_fit_2d_and_3d() {
     defaults_fit::<2, Tsdf2>();
-    defaults_fit::<3, SparseTsdf>();
+    defaults_fit::<3, Tsdf3>();
 }

@@ -1,13 +1,13 @@
 //! One beam of a scan.
 
-/// What a beam says; the table in [`crate::scan`] tells what each kind does to a map.
+/// What a beam measured; see the table in [`crate::scan`] for what each kind does to a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BeamKind {
     /// A surface at the beam's range.
     Hit,
     /// Nothing up to the beam's range; what lies beyond is not used.
     MaxRange,
-    /// No echo. Frees space up to the beam's range, which is zero unless the caller knows better.
+    /// No echo. Frees space up to the beam's range, which is zero unless the caller gives another.
     NoReturn,
     /// No information.
     Dropped,
@@ -22,7 +22,7 @@ pub struct Beam<const D: usize> {
     pub direction: [f64; D],
     /// Metres; its meaning depends on the kind.
     pub range: f64,
-    /// What the beam says.
+    /// What the beam measured.
     pub kind: BeamKind,
 }
 
@@ -33,7 +33,7 @@ impl<const D: usize> Beam<D> {
         self.kind == BeamKind::Hit
     }
 
-    /// Arc length up to which the beam saw free space (metres); 0 where it says nothing.
+    /// Arc length up to which the beam saw free space (metres); 0 where it has no information.
     #[inline(always)]
     pub fn free_range(&self) -> f64 {
         match self.kind {

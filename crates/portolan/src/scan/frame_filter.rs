@@ -11,7 +11,7 @@ pub enum Body {
     Box(Aabb<3>),
     /// A ball (metres).
     Sphere {
-        /// Its centre.
+        /// Its center.
         center: [f64; 3],
         /// Its radius.
         radius: f64,
@@ -30,7 +30,7 @@ impl Body {
 
 /// Which readings of a frame are used. The default uses all.
 ///
-/// Ranges are measured from a ray's own origin. Parallel rays have none that says anything: the limits of range do not
+/// Ranges are measured from a ray's own origin. Parallel rays have no meaningful one: the limits of range do not
 /// apply to them (to an image of parallel rays, and to the points beside one), only the body does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameFilter {
@@ -62,7 +62,7 @@ enum Use {
 impl FrameFilter {
     /// The frame with what is used, and what its readings were: the self hits are those that were left out.
     ///
-    /// Refused readings are counted in the frame itself. Times and colours stay with their points; the image beside points
+    /// Refused readings are counted in the frame itself. Times and colors stay with their points; the image beside points
     /// is filtered by the same rules. Bodies are compared with points relative to a common origin, else with the points
     /// themselves. A point beyond the largest range that has an origin of its own is dropped: there is no place for its free
     /// end. An image that contradicts itself ([`RangeImage::check`]) stays as it is, and is not counted: maps refuse it.
@@ -179,7 +179,7 @@ impl FrameFilter {
                     counts.dropped += 1;
                 }
                 Use::Body => counts.self_hit += 1,
-                // Only rays of the common origin can be told as free ends.
+                // Only rays of the common origin can become free ends.
                 Use::Cut if common => {
                     counts.max_range += 1;
                     let end = along(origin, offset, self.max_range / range);

@@ -1,18 +1,18 @@
-//! Under which angle beams meet the surface, from their neighbours.
+//! Under which angle beams meet the surface, from their neighbors.
 
 use super::Scan;
 use crate::geom::vector::{distance, dot, scale, sub, unit};
 
-/// Neighbours nearer than this say more about the noise than about the surface (metres).
+/// Neighbors nearer than this say more about the noise than about the surface (metres).
 const BASELINE: f64 = 0.1;
-/// How many neighbours on either side are looked at for the baseline.
+/// How many neighbors on either side are looked at for the baseline.
 const REACH: usize = 5;
-/// Neighbouring hits belong to one surface up to this tangent of the incidence angle (80 degrees).
+/// Neighboring hits belong to one surface up to this tangent of the incidence angle (80 degrees).
 pub(crate) const MAX_SLOPE: f64 = 5.67;
 
 /// Cosine of the angle between each beam and the surface's normal, in `[0, 1]`: 1 head-on. The tangent is
-/// the chord between the nearest neighbours that are at least 10 cm apart and connected to the beam. Beams
-/// whose neighbourhood says nothing (no fan, no hit, a lone point) get 1. `out` is cleared and refilled,
+/// the chord between the nearest neighbors that are at least 10 cm apart and connected to the beam. Beams
+/// whose neighborhood gives no surface (no fan, no hit, a lone point) get 1. `out` is cleared and refilled,
 /// one entry per beam.
 pub fn cos_incidence<const D: usize>(scan: &Scan<D>, out: &mut Vec<f32>) {
     out.clear();
@@ -46,10 +46,10 @@ fn tangent<const D: usize>(scan: &Scan<D>, i: usize) -> Option<[f64; D]> {
     unit(sub(point(left), point(right)))
 }
 
-/// Neighbours further apart than this know nothing of what is between them (sine of the angle, 11 degrees).
+/// Neighbors further apart than this know nothing of what is between them (sine of the angle, 11 degrees).
 pub(crate) const MAX_OPENING: f64 = 0.2;
 
-/// Whether two neighbouring hits can belong to one surface: they are near to each other in angle, and the
+/// Whether two neighboring hits can belong to one surface: they are near to each other in angle, and the
 /// chord between them is not steeper than 80 degrees of incidence.
 pub(crate) fn connected<const D: usize>(scan: &Scan<D>, a: usize, b: usize) -> bool {
     let (a, b) = (scan.beam(a), scan.beam(b));

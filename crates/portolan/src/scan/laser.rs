@@ -11,7 +11,7 @@ pub struct RangeLimits {
     pub max: f64,
     /// Readings at or above this mean that the sensor got no echo (metres); sensors have different codes.
     pub no_return: f64,
-    /// What the caller knows to be free along a beam without an echo (metres); 0: nothing.
+    /// Free length along a beam without an echo (metres), if the caller has a reason to assume one; 0: unknown.
     pub no_return_free: f64,
 }
 
@@ -57,8 +57,8 @@ impl Scan<2> {
     /// A planar laser scan: one bearing (radians, counter-clockwise from the sensor's x axis) and one reading
     /// (metres) per beam. Extra entries of the longer slice are ignored.
     ///
-    /// Bearings that ascend within one turn make the beams neighbours ([`BeamOrder::Fan`]); any other order
-    /// makes a scan without neighbourhood.
+    /// Bearings that ascend within one turn make the beams neighbors ([`BeamOrder::Fan`]); any other order
+    /// makes a scan without neighborhood.
     pub fn from_laser(bearings: &[f64], readings: &[f64], limits: &RangeLimits) -> Self {
         let directions: Vec<_> = bearings.iter().map(|b| [b.cos(), b.sin()]).collect();
         Self::from_laser_directions(bearings, &directions, readings, limits)
@@ -81,7 +81,7 @@ impl Scan<2> {
     }
 
     /// A planar scan of beams whose kinds are known, with their bearings (radians), one per beam. Bearings that
-    /// ascend within one turn make the beams neighbours.
+    /// ascend within one turn make the beams neighbors.
     pub fn from_fan(bearings: &[f64], beams: Vec<Beam<2>>) -> Self {
         let order = fan_order(&bearings[..beams.len().min(bearings.len())]);
         Self::from_beams(beams).with_order(order)
@@ -97,7 +97,7 @@ fn fan_order(bearings: &[f64]) -> BeamOrder {
         return BeamOrder::Unordered;
     }
     let widest = bearings.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-    // Neighbours half a turn apart have no wedge between them.
+    // Neighbors half a turn apart have no wedge between them.
     if widest >= std::f64::consts::PI {
         return BeamOrder::Unordered;
     }

@@ -2,11 +2,11 @@
 //!
 //! What each kind of beam does to a map:
 //!
-//! | kind | what the sensor says | frees space | adds a surface |
+//! | kind | what was measured | frees space | adds a surface |
 //! |---|---|---|---|
 //! | [`BeamKind::Hit`] | a surface at `range` | up to it | yes |
 //! | [`BeamKind::MaxRange`] | nothing nearer than `range` (a reading beyond the caller's limit) | up to `range` | never |
-//! | [`BeamKind::NoReturn`] | no echo: open space, glass, black cloth | up to `range`, which is 0 unless the caller knows better | never |
+//! | [`BeamKind::NoReturn`] | no echo: open space, glass, black cloth | up to `range`, which is 0 unless the caller gives another | never |
 //! | [`BeamKind::Dropped`] | nothing at all, or a reading that was refused | no | never |
 //! | [`BeamKind::SelfHit`] | the robot's own body | no | never |
 

@@ -25,7 +25,7 @@ pub struct OrganisedPoints<'a> {
 }
 
 impl OrganisedPoints<'_> {
-    /// The image of these points with the projection that their pixels speak of: a pinhole camera (x right, y down, z forward),
+    /// The image of these points with the projection that fits their pixels: a pinhole camera (x right, y down, z forward),
     /// or a turning lidar (rows of one elevation, in any order; columns a constant angle apart; rows that were turned by
     /// whole columns, as some sensors deliver them, are turned back; rows and columns may be exchanged). Ranges and depths
     /// are those of the points; their directions become those of their pixels, off by less than half a pixel.
@@ -106,7 +106,7 @@ impl OrganisedPoints<'_> {
         let steps =
             row_members.iter().flat_map(|m| m.windows(2)).filter(|w| place(w[1])[0] == place(w[0])[0] + 1);
         let step = median(steps.map(|w| wrapped(polar[w[1]].azimuth - polar[w[0]].azimuth)).collect())?;
-        // A median of neighbours is good to a few per cent; a full turn is exact.
+        // A median of neighbors is good to a few per cent; a full turn is exact.
         let turns = columns as f64 * step.abs() / TAU;
         let whole = (turns - 1.0).abs() < 0.05;
         let step = if whole { (TAU / columns as f64).copysign(step) } else { step };

@@ -1,4 +1,4 @@
-//! Scans of space as end points: what a lidar's driver delivers.
+//! 3-D scans as end points: what a lidar's driver delivers.
 
 use super::{RangeImage, RefusedBeams};
 
@@ -24,9 +24,9 @@ pub struct PointScan {
     pub points: Vec<[f32; 3]>,
     /// Ends of rays that met no surface up to there (metres); their origin is the common one.
     pub free_ends: Vec<[f32; 3]>,
-    /// Seconds since the scan began, one per point, if the sensor tells. Empty: it does not.
+    /// Seconds since the scan began, one per point, if the sensor gives them. Empty: it does not.
     pub times: Vec<f32>,
-    /// Red, green, blue, one per point, if the sensor sees colour. Empty: it does not.
+    /// Red, green, blue, one per point, if the sensor sees color. Empty: it does not.
     pub colors: Vec<[u8; 3]>,
     /// The same readings as rows and columns, where they have them.
     pub image: Option<RangeImage>,
@@ -70,7 +70,7 @@ impl PointScan {
     }
 }
 
-/// One scan of space, in its own form.
+/// One 3-D scan, in its own form.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Frame {
     /// Rows and columns only: a depth camera, a range scanner.

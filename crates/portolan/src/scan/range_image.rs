@@ -106,13 +106,13 @@ impl RangeImage {
         Self { colors: colors.into(), ..self }
     }
 
-    /// Whether rows, columns, values and rays fit together, so that every pixel has a ray. Says why not. O(rows).
+    /// Whether rows, columns, values and rays fit together, so that every pixel has a ray. O(rows).
     ///
-    /// What maps are given is checked: an image that fails is refused, and nothing of it is used. Its values may be
+    /// Maps check their images: one that fails is refused, and nothing of it is used. Its values may be
     /// anything.
     ///
     /// # Errors
-    /// What contradicts the rest, in words.
+    /// The reason, in words.
     pub fn check(&self) -> Result<(), &'static str> {
         let cells = self.columns.saturating_mul(self.rows);
         let fits = |holds: bool, why: &'static str| if holds { Ok(()) } else { Err(why) };

@@ -16,11 +16,11 @@ const NONE: u32 = u32::MAX;
 /// `points` are in the scan's frame (metres), `pixels[i] = row * columns + column` is where point `i` was seen; columns run
 /// along x and rows along y, both roughly. Scanners of triangulation do not look along exactly parallel rays: a Cyberware
 /// moves every other row by half a pixel in x, and its camera sees y in perspective. So the points are joined to a surface of
-/// triangles between neighbouring pixels, and the surface is sampled at the middle of every pixel of a regular image
+/// triangles between neighboring pixels, and the surface is sampled at the middle of every pixel of a regular image
 /// *(Curless & Levoy 1996, section 3)*.
 ///
 /// What it costs: heights are interpolated linearly between points (for a surface of radius `R` and points `h` apart an
-/// error of up to `h^2 / 8R`, 0.01 mm for 0.7 mm on 5 mm); readings without a neighbour, and the last half pixel at the rim of
+/// error of up to `h^2 / 8R`, 0.01 mm for 0.7 mm on 5 mm); readings without a neighbor, and the last half pixel at the rim of
 /// a surface, are lost. Points on a regular grid come out as they are. The first surface from above counts.
 ///
 /// `None` where columns do not run along x and rows along y, or where points lie too far from any regular grid. O(pixels).
@@ -42,7 +42,7 @@ pub fn orthographic_image(
             image.draw(corners);
         }
     });
-    // The rays begin just above the highest point: nothing is said about what lies above the scan.
+    // The rays begin just above the highest point: what lies above the scan stays unknown.
     let top = points.iter().map(|p| f64::from(p[2])).fold(f64::NEG_INFINITY, f64::max) + longest;
     let value = |z: &f64| if z.is_finite() { (top - z) as f32 } else { 0.0 };
     let projection = Projection::Orthographic { rays: Orthographic { first, step }, top };
@@ -78,7 +78,7 @@ impl<'a> Grid<'a> {
         (i != NONE).then(|| self.points[i as usize].map(f64::from))
     }
 
-    /// Median distance between neighbours: along x in a row, along y in a column.
+    /// Median distance between neighbors: along x in a row, along y in a column.
     fn step(&self) -> Option<[f64; 2]> {
         let mut along = [Vec::new(), Vec::new()];
         let mut across = [Vec::new(), Vec::new()];
@@ -132,7 +132,7 @@ impl<'a> Grid<'a> {
         (shape[0] * shape[1] <= MOST_PIXELS * self.index.len()).then_some((first, shape))
     }
 
-    /// The triangles between neighbouring pixels: two of four points, split along the shorter diagonal, or one of three.
+    /// The triangles between neighboring pixels: two of four points, split along the shorter diagonal, or one of three.
     /// All wind the same way.
     fn triangles(&self, mut each: impl FnMut([[f64; 3]; 3])) {
         for row in 0..self.rows.saturating_sub(1) {
@@ -171,7 +171,7 @@ struct Raster {
 impl Raster {
     /// Draws a triangle, where it is higher than what is there. One that winds the other way is the back of a surface.
     fn draw(&mut self, corners: [[f64; 3]; 3]) {
-        // In units of pixels, where a triangle of neighbours that was not turned over has a positive area.
+        // In units of pixels, where a triangle of neighbors that was not turned over has a positive area.
         let place = |p: [f64; 3]| [0, 1].map(|k| (p[k] - self.first[k]) / self.step[k]);
         let [a, b, c] = corners.map(place);
         let cross = |o: [f64; 2], p: [f64; 2], q: [f64; 2]| {

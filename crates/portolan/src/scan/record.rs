@@ -3,13 +3,13 @@
 use super::{Beam, BeamCounts, BeamKind, RefusedBeams};
 use crate::geom::{Pose, vector};
 
-/// What is known about the neighbourhood of beams.
+/// What is known about the neighborhood of beams.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BeamOrder {
     /// Nothing: a bag of beams.
     Unordered,
-    /// Bearings ascend counter-clockwise (2-D), so that consecutive beams are neighbours; with `closed` the
-    /// last is a neighbour of the first.
+    /// Bearings ascend counter-clockwise (2-D), so that consecutive beams are neighbors; with `closed` the
+    /// last is a neighbor of the first.
     Fan {
         /// Whether the fan goes all the way round.
         closed: bool,
@@ -103,7 +103,7 @@ impl<const D: usize> Scan<D> {
         self
     }
 
-    /// When the scan was taken (seconds, in the log's own clock), if the log says so.
+    /// When the scan was taken (seconds, in the log's own clock), if the log has it.
     pub fn time(&self) -> Option<f64> {
         self.time
     }
@@ -118,7 +118,7 @@ impl<const D: usize> Scan<D> {
         self.ranges.is_empty()
     }
 
-    /// Beam `i`. Panics where there is none.
+    /// Beam `i`. Panics where `i` is out of range.
     #[inline(always)]
     pub fn beam(&self, i: usize) -> Beam<D> {
         Beam { direction: self.directions[i], range: self.ranges[i], kind: self.kinds[i] }
@@ -129,12 +129,12 @@ impl<const D: usize> Scan<D> {
         (0..self.len()).map(|i| self.beam(i))
     }
 
-    /// What is known about which beams are neighbours.
+    /// What is known about which beams are neighbors.
     pub fn order(&self) -> BeamOrder {
         self.order
     }
 
-    /// The neighbour after beam `i`, if the order tells.
+    /// The neighbor after beam `i`, if the order gives one.
     #[inline(always)]
     pub fn next(&self, i: usize) -> Option<usize> {
         match self.order {
@@ -144,7 +144,7 @@ impl<const D: usize> Scan<D> {
         }
     }
 
-    /// The neighbour before beam `i`, if the order tells.
+    /// The neighbor before beam `i`, if the order gives one.
     #[inline(always)]
     pub fn previous(&self, i: usize) -> Option<usize> {
         match self.order {

@@ -51,7 +51,7 @@ pub(super) fn rings(elevations: &[f32]) -> Option<Vec<f32>> {
     Some(sums.iter().rev().map(|(sum, n)| (sum / *n as f64) as f32).collect())
 }
 
-/// Neighbouring bins that are well filled.
+/// Neighboring bins that are well filled.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     first: usize,
@@ -80,7 +80,7 @@ impl Run {
     }
 }
 
-/// Median distance of neighbours (bins); 0 for fewer than two.
+/// Median distance of neighbors (bins); 0 for fewer than two.
 fn spacing(runs: &[Run]) -> f64 {
     let mut all: Vec<f64> = runs.windows(2).map(|w| w[0].distance(&w[1])).collect();
     all.sort_by(f64::total_cmp);
@@ -131,7 +131,7 @@ fn whole(runs: Vec<Run>) -> Vec<Run> {
 
 /// Number of columns of a full turn and the azimuth of one of them (radians), from points of known rings.
 ///
-/// The step is the lower quartile of the differences of neighbours on a ring; the number of columns next to it with the
+/// The step is the lower quartile of the differences of neighbors on a ring; the number of columns next to it with the
 /// most agreement in phase is taken.
 pub(super) fn columns(azimuths: &[f32], ring_of: &[u32]) -> Option<(usize, f64)> {
     let mut order: Vec<(u32, f32)> = ring_of.iter().copied().zip(azimuths.iter().copied()).collect();

@@ -6,7 +6,7 @@ use super::{RangeImage, Spherical};
 use crate::parallel;
 use std::f64::consts::TAU;
 
-/// Fewer points than this are no scan of rows and columns.
+/// Fewer points than this have no rows and columns.
 const FEWEST_POINTS: usize = 512;
 /// Share of points that may lie well behind another point of their pixel: silhouettes, not a cloud of many scans.
 const MOST_BEHIND: f64 = 0.25;

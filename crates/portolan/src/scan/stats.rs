@@ -1,4 +1,4 @@
-//! What became of the beams: nothing is dropped in silence.
+//! What became of the beams: whatever is dropped is counted.
 
 use super::BeamKind;
 
@@ -46,7 +46,7 @@ impl std::ops::AddAssign for BeamCounts {
 }
 
 /// Readings that could not be used, by cause. They stay in the scan as [`BeamKind::Dropped`], so that their
-/// neighbours keep their places.
+/// neighbors keep their places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RefusedBeams {
     /// NaN or infinite range or direction.

@@ -1,12 +1,12 @@
 //! The sweep for distances through a range image: every cell's center is looked up in it.
 
+use super::depth_bounds::DepthBounds;
 use super::observe::{BlockCenters, ImageLookup, cell_of, nearest, observe_block, places};
 use super::padded_image::{Cleaning, PaddedImage};
 use super::project::LANES;
 use super::projector::Projector;
 use super::range_pyramid::RangePyramid;
-use super::search::{Class, Classify, Cube, LONGEST_EDGE, Octants, find_blocks};
-use super::window::Window;
+use super::search::{BlockBox, LONGEST_EDGE, Octants, find_blocks};
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
 use crate::scan::{RangeImage, ScanStats};
@@ -55,7 +55,7 @@ pub struct Projective {
 }
 
 impl Projective {
-    /// A sweep with these settings, which has seen nothing yet.
+    /// A sweep with these settings.
     pub fn new(settings: ProjectiveSettings) -> Self {
         Self {
             settings,
@@ -81,20 +81,27 @@ impl Projective {
         world_from_image: &Pose<3>,
         most: usize,
     ) -> Result<(), PlanError> {
-        let Some((first, last)) = self.reach(projector, world_from_image) else { return Ok(()) };
-        if (0..3).any(|k| i64::from(last[k]) - i64::from(first[k]) >= LONGEST_EDGE) {
+        let Some(whole) = self.reach(projector, world_from_image) else { return Ok(()) };
+        if (0..3).any(|k| i64::from(whole.last[k]) - i64::from(whole.first[k]) >= LONGEST_EDGE) {
             return Err(PlanError::TooManyBlocks);
         }
         let (mut keys, mut octants) = (std::mem::take(&mut self.keys), std::mem::take(&mut self.octants));
-        let spread = self.image_from_world.map(|row| row[0].abs() + row[1].abs() + row[2].abs());
-        let question = Question { sweep: self, projector, spread };
-        let fits = find_blocks(&question, (first, last), most, &mut keys, &mut octants);
+        let bounds = DepthBounds {
+            projector,
+            pyramid: &self.pyramid,
+            lattice: self.lattice,
+            origin: self.origin,
+            image_from_world: self.image_from_world,
+            truncation: self.settings.truncation,
+            carves: self.carves(),
+        };
+        let fits = find_blocks(&bounds, whole, most, &mut keys, &mut octants);
         (self.keys, self.octants) = (keys, octants);
         if fits { Ok(()) } else { Err(PlanError::TooManyBlocks) }
     }
 
-    /// The first and the last block of a box that holds all that the image sees.
-    fn reach(&self, projector: &Projector, world_from_image: &Pose<3>) -> Option<([i32; 3], [i32; 3])> {
+    /// A box that holds all blocks that the image sees.
+    fn reach(&self, projector: &Projector, world_from_image: &Pose<3>) -> Option<BlockBox> {
         let whole = self.pyramid.extremes([0, self.image.columns + 2], [0, self.image.rows + 1]);
         let farthest = f64::from(whole[1]);
         if farthest <= 0.0 {
@@ -123,7 +130,7 @@ impl Projective {
         const LIMIT: f64 = (1u32 << 27) as f64;
         let first: [i32; 3] = std::array::from_fn(|k| block(seen.min, k).max(-LIMIT) as i32);
         let last: [i32; 3] = std::array::from_fn(|k| block(seen.max, k).min(LIMIT - 1.0) as i32);
-        (0..3).all(|k| first[k] <= last[k]).then_some((first, last))
+        (0..3).all(|k| first[k] <= last[k]).then_some(BlockBox { first, last })
     }
 
     fn lookup<'a>(&'a self, projector: &'a Projector) -> ImageLookup<'a> {
@@ -157,8 +164,7 @@ impl Projective {
             // What is free has weights of its own too.
             octants = Octants { mixed: octants.mixed | octants.free, ..Octants::default() };
         }
-        if let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight))
-        {
+        if let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight)) {
             observe_block(&self.lookup(projector), &self.centers(self.keys[i]), octants, distance, weight);
         }
     }
@@ -254,95 +260,5 @@ impl SweptColors<3> for Projective {
                 }
             }
         }
-    }
-}
-
-/// What an image says of cubes of cells: their smallest and largest depth against those of their window.
-struct Question<'a> {
-    sweep: &'a Projective,
-    projector: &'a Projector,
-    /// Half edges along the sensor's axes of a box of half edge 1 along the map's.
-    spread: [f64; 3],
-}
-
-impl Classify for Question<'_> {
-    /// Extremes of a window that holds that of the cube.
-    type Known = [f32; 2];
-
-    /// A window that could hold any values: nearest 0, farthest infinitely far. Of neither is anything sure.
-    fn nothing_known(&self) -> [f32; 2] {
-        [f32::NEG_INFINITY, f32::INFINITY]
-    }
-
-    fn classify(&self, cube: Cube, known: [f32; 2], asked: u8) -> [(Class, [f32; 2]); 8] {
-        std::array::from_fn(|i| match asked >> i & 1 {
-            0 => (Class::Nothing, known),
-            _ => self.class(cube.half(i), known),
-        })
-    }
-}
-
-impl Question<'_> {
-    /// What the image says of a cube, and the extremes of its window: those of the window of its parent are `known`.
-    fn class(&self, cube: Cube, known: [f32; 2]) -> (Class, [f32; 2]) {
-        let sweep = self.sweep;
-        let r = sweep.lattice.resolution;
-        let offset: [f64; 3] = std::array::from_fn(|k| {
-            (sweep.lattice.origin[k] - sweep.origin[k])
-                + (cube.first_cell[k] as f64 + 0.5 * cube.edge as f64) * r
-        });
-        // The box of the centers of its cells.
-        let half = 0.5 * (cube.edge - 1) as f64 * r;
-        let (mut center, mut halves) = ([0.0; 3], [0.0; 3]);
-        for k in 0..3 {
-            let row = &sweep.image_from_world[k];
-            center[k] = row[0] * offset[0] + row[1] * offset[1] + row[2] * offset[2];
-            halves[k] = half * self.spread[k];
-        }
-        let depth = self.projector.depth(center, halves, || {
-            let (mut near, mut far) = (0.0, 0.0);
-            for o in offset.map(f64::abs) {
-                let (low, high) = ((o - half).max(0.0), o + half);
-                (near, far) = (near + low * low, far + high * high);
-            }
-            [near.sqrt(), far.sqrt()]
-        });
-        // No corner is further away than the way to it along the axes.
-        let far = offset[0].abs() + offset[1].abs() + offset[2].abs() + 3.0 * half;
-        let (tau, slack) = (sweep.settings.truncation, 1e-4 * r + 1e-6 * (depth[1].abs() + far));
-        let class = |[least, most]: [f32; 2]| {
-            let before = depth[1] < f64::from(least) - tau - slack;
-            if depth[0] > f64::from(most) + tau + slack || (before && !sweep.carves()) {
-                Class::Nothing
-            } else if before && depth[0] >= 0.0 {
-                // (What lies behind a camera is before everything, too.)
-                Class::Free
-            } else {
-                Class::Mixed
-            }
-        };
-        // Mostly the parent's window is enough, which costs nothing.
-        match class(known) {
-            Class::Mixed => match self.projector.window(center, halves) {
-                None => (Class::Nothing, known),
-                Some(window) => {
-                    let extremes = self.extremes(&window);
-                    (class(extremes), extremes)
-                }
-            },
-            sure => (sure, known),
-        }
-    }
-
-    fn extremes(&self, window: &Window) -> [f32; 2] {
-        let (pyramid, columns) = (&self.sweep.pyramid, self.sweep.image.columns);
-        let [from, to] = window.columns;
-        if to <= columns + 2 {
-            return pyramid.extremes([from, to], window.rows);
-        }
-        // Past the seam: the rest is at the other end.
-        let a = pyramid.extremes([from.min(columns + 1), columns + 1], window.rows);
-        let b = pyramid.extremes([1, (to - columns).min(columns + 1)], window.rows);
-        [a[0].min(b[0]), a[1].max(b[1])]
     }
 }

@@ -1,4 +1,4 @@
-//! Range images: where points fall in them, and what they say about cells.
+//! Range images: where points fall in them, and which cells they observe.
 //!
 //! | step | for distances | for misses |
 //! |---|---|---|
@@ -6,19 +6,23 @@
 //! | its projection | `projector`, `rings`, and `project` | the same, and `pixels`, `sine_rows` |
 //! | readings made ready | `padded_image`: cleaned, torn where surfaces end | `window_minima`: the nearest within any window |
 //! | nearest and farthest reading that a cube of cells may fall on | `window` of its box, in `range_pyramid` | `balls` around it, in `window_minima` |
-//! | blocks that the image says something about | `search` | `search` |
-//! | what it says about their cells | `observe`: interpolated at centers | `misses`: the nearest within a cell's width |
+//! | cubes of cells against them | `depth_bounds` | `placed_image` |
+//! | blocks that are observed, by such cubes | `search` | `search` |
+//! | their cells | `observe`: interpolated at centers | `placed_image`: the nearest within a cell's width |
+//! | the sweep, which makes these steps | `distances` | `misses` |
 //!
 //! Distances need the smallest and the largest value of few windows, of any size: a pyramid costs a third of the image.
 //! Misses need the smallest one around *every* cell: tables over all places of a few sizes answer that by one read.
 
 mod balls;
 mod bands;
+mod depth_bounds;
 mod distances;
 mod misses;
 mod observe;
 mod padded_image;
 mod pixels;
+mod placed_image;
 mod project;
 mod projector;
 mod range_pyramid;

@@ -1,4 +1,4 @@
-//! What a range image says about the centers of a block's cells: 64 lanes at a time.
+//! Distances at the centers of a block's cells from a range image: 64 lanes at a time.
 //!
 //! Every loop runs over the 64 lanes of an octant without calls and without branches, so that it stands in the widest vectors that the
 //! processor has; no operation depends on the width, so that all versions give the same bits.
@@ -195,9 +195,9 @@ pub(super) fn nearest(index: usize, right: f32, below: f32, stride: usize) -> us
     index + usize::from(right >= 0.5) + if below >= 0.5 { stride } else { 0 }
 }
 
-/// Distances and weights as if no point were between pixels of one surface: the nearest ray speaks of its surface, but only
-/// as far aside as half a cell; beyond, what is free is free up to the nearest of the four. A ray that met nothing says that
-/// it is free.
+/// Distances and weights as if no point were between pixels of one surface: the nearest ray counts for its surface, but only
+/// as far aside as half a cell; beyond, what is free is free up to the nearest of the four. A ray that met nothing is
+/// free.
 #[inline(always)]
 fn alone(view: &ImageLookup<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes) {
     let stride = view.image.stride;
@@ -214,7 +214,7 @@ fn alone(view: &ImageLookup<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes
     }
     let aside = view.projector.aside(&steps, seen);
     let mut least = [0.0f32; LANES];
-    // Who says nothing of free space needs no more than the nearest ray.
+    // Where free space gets nothing, the nearest ray is enough.
     if view.carve_weight > 0.0 {
         let n = value.len().saturating_sub(stride + 1);
         let (above, below) = (&value[..n], &value[stride..][..n]);

@@ -30,7 +30,7 @@ pub(super) struct PaddedImage {
     pub linear: Vec<f32>,
     /// Cosine of the incidence at each pixel; empty where the weights do not ask for it.
     pub cosine: Vec<f32>,
-    /// Colors, without border; empty where there are none.
+    /// Colors, without border; empty where the image has no colors.
     pub colors: Vec<[u8; 3]>,
 }
 
@@ -202,7 +202,7 @@ impl PaddedImage {
                     }
                     (None, None) => 1.0,
                 };
-                // Never quite 0: a grazing beam still knows that there is something.
+                // Never quite 0: a grazing beam still shows that there is something.
                 self.cosine[(row + 1) * stride + column + 1] = cosine.clamp(0.02, 1.0) as f32;
             }
         }
@@ -241,9 +241,9 @@ fn mark_torn(above: &[f32], below: &[f32], linear: &mut [f32], how: [f32; 4]) {
         let hits = (a > 0.0) & (b > 0.0) & (c > 0.0) & (d > 0.0);
         let [kx, sx, ky, sy] = how;
         let whole = hits & near(a, b, kx, sx) & near(c, d, kx, sx) & near(a, c, ky, sy) & near(b, d, ky, sy);
-        let silent = (a == 0.0) & (b == 0.0) & (c == 0.0) & (d == 0.0);
+        let unknown = (a == 0.0) & (b == 0.0) & (c == 0.0) & (d == 0.0);
         // (What was there may have the mark of another image: in the border.)
-        linear[i] = if whole | silent { linear[i].abs() } else { -linear[i].abs() };
+        linear[i] = if whole | unknown { linear[i].abs() } else { -linear[i].abs() };
     }
 }
 

@@ -91,6 +91,9 @@ impl PixelProjector {
                 let Rings { first_azimuth, per_radian, period, .. } = **rings;
                 let (first, per_radian, turn) = (first_azimuth as f32, per_radian as f32, period as f32);
                 let half = self.sine_rows.middle();
+                // What a full turn has more than its columns belongs to the last one.
+                let last = self.projector.columns as i32 * STEPS - STEPS / 2 - 1;
+                let last = if self.projector.misfit() > 1e-3 { last } else { i32::MAX };
                 for i in 0..LANES {
                     let [x, y, z] = at(i);
                     let depth = (x * x + y * y + z * z).sqrt();
@@ -101,7 +104,7 @@ impl PixelProjector {
                     let c = if c < -0.5 { c + turn } else { c };
                     let c = if c < -0.5 { c + turn } else { c };
                     let c = if c >= turn - 0.5 { c - turn } else { c };
-                    out.column[i] = steps(c);
+                    out.column[i] = steps(c).min(last);
                 }
                 self.sine_rows.look_up(&mut out.row);
             }

@@ -66,6 +66,14 @@ impl Projector {
         }
     }
 
+    /// By how much the columns of a closed image miss a full turn: less than half a column.
+    pub(super) fn misfit(&self) -> f64 {
+        match &self.kind {
+            Kind::Spherical(rings) if rings.closed => rings.period - self.columns as f64,
+            _ => 0.0,
+        }
+    }
+
     /// Whether all rays are parallel.
     #[inline(always)]
     pub(super) fn is_parallel(&self) -> bool {

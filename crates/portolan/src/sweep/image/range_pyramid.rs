@@ -22,8 +22,8 @@ struct Level {
 const SQUARES: usize = 4;
 
 impl RangePyramid {
-    /// Builds it from an image of `columns` a row: of the values without their sign, or of those above 0 only (of which
-    /// none are between infinity and minus infinity).
+    /// Builds it from an image of `columns` a row: of the values without their sign, or of those above 0 only (no values
+    /// lie between infinity and minus infinity).
     pub(super) fn build(&mut self, columns: usize, values: &[f32], surfaces_only: bool) {
         let rows = values.len() / columns;
         let first = self.level(0, columns.div_ceil(2), rows.div_ceil(2));
@@ -94,8 +94,8 @@ impl RangePyramid {
 #[multiversion(targets = "simd")]
 fn halve(top: &[f32], bottom: &[f32], out: &mut [[f32; 2]], surfaces_only: bool) {
     let extremes = |v: f32| {
-        let silent = surfaces_only & !(v > 0.0);
-        [if silent { f32::INFINITY } else { v.abs() }, if silent { f32::NEG_INFINITY } else { v.abs() }]
+        let unused = surfaces_only & !(v > 0.0);
+        [if unused { f32::INFINITY } else { v.abs() }, if unused { f32::NEG_INFINITY } else { v.abs() }]
     };
     let pairs = top.chunks_exact(2).zip(bottom.chunks_exact(2));
     for (out, (t, b)) in out.iter_mut().zip(pairs) {

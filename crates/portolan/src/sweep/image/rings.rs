@@ -10,7 +10,7 @@ pub(super) struct Rings {
     pub first_azimuth: f64,
     /// Columns per radian; negative where columns go clockwise.
     pub per_radian: f64,
-    /// Columns of a full turn: those of the image, where it is closed.
+    /// Columns of a full turn: those of the image to within half a column, where it is closed.
     pub period: f64,
     /// Whether the last column is a neighbor of the first.
     pub closed: bool,
@@ -54,7 +54,7 @@ impl Rings {
         Self {
             first_azimuth: spherical.first_azimuth,
             per_radian: 1.0 / step,
-            period: if closed { columns as f64 } else { turn },
+            period: turn,
             closed,
             margin: if closed { 0.0 } else { margin },
             elevations: elevations.to_vec(),

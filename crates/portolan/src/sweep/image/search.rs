@@ -1,9 +1,9 @@
-//! The search for the blocks that an image says something about: from large cubes of blocks to octants of single ones.
+//! The search for the blocks in which an image observes cells: from large cubes of blocks to octants of single ones.
 
 use crate::geom::{BLOCK_EDGE, BlockKey};
 use crate::parallel;
 
-/// What an image says about the cells of a cube.
+/// What an image shows of the cells of a cube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Class {
     /// Nothing: behind all surfaces, or out of sight.
@@ -40,7 +40,7 @@ pub(super) trait Classify: Sync {
     /// What is known at first.
     fn nothing_known(&self) -> Self::Known;
 
-    /// What the image says about those halves of a cube whose bit is set in `asked`; anything about the others.
+    /// The classes of those halves of a cube whose bit is set in `asked`; any class for the others.
     fn classify(&self, cube: Cube, known: Self::Known, asked: u8) -> [(Class, Self::Known); 8];
 }
 
@@ -72,11 +72,18 @@ impl Octants {
 /// Boxes of more blocks along an edge are not searched.
 pub(super) const LONGEST_EDGE: i64 = 1 << 20;
 
-/// Blocks from `first` to `last`, both included, ascending, with what is known of their octants, into `keys` and `octants`;
-/// no more than `most` and some. Returns whether there are no more. The box is at most [`LONGEST_EDGE`] blocks wide.
+/// Blocks from `first` to `last`, both included.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockBox {
+    pub first: [i32; 3],
+    pub last: [i32; 3],
+}
+
+/// The blocks of a box in which the image observes cells, ascending, into `keys`, and their octants; nothing where they are
+/// more than `most`. Returns whether they are not. The box is at most [`LONGEST_EDGE`] blocks wide.
 pub(super) fn find_blocks<C: Classify>(
     image: &C,
-    (first, last): ([i32; 3], [i32; 3]),
+    BlockBox { first, last }: BlockBox,
     most: usize,
     keys: &mut Vec<BlockKey<3>>,
     octants: &mut Vec<Octants>,
@@ -163,7 +170,7 @@ impl<C: Classify> Search<'_, C> {
         all
     }
 
-    /// The halves of a node that reach into the box and of which the image says something.
+    /// The halves of a node that reach into the box, without those of [`Class::Nothing`].
     #[inline(always)]
     fn parts(&self, node: Node, known: C::Known) -> impl Iterator<Item = (Node, Class, C::Known)> {
         let children = node.children().enumerate();
@@ -214,5 +221,66 @@ impl<C: Classify> Search<'_, C> {
         const OCTANT: i64 = BLOCK_EDGE as i64 / 2;
         let first_cell = [0, 1, 2].map(|k| self.anchor[k] * BLOCK_EDGE as i64 + node.at[k] * OCTANT);
         Cube { first_cell, edge: OCTANT << node.level }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball of cells around a cell: free inside of half its radius, mixed up to the radius.
+    struct Ball {
+        center: [i64; 3],
+        radius: i64,
+    }
+
+    impl Classify for Ball {
+        type Known = ();
+
+        fn nothing_known(&self) {}
+
+        fn classify(&self, cube: Cube, (): (), _: u8) -> [(Class, ()); 8] {
+            std::array::from_fn(|i| {
+                let Cube { first_cell, edge } = cube.half(i);
+                let (mut near, mut far) = (0, 0);
+                for k in 0..3 {
+                    let (low, high) =
+                        (first_cell[k] - self.center[k], first_cell[k] + edge - 1 - self.center[k]);
+                    near += if low > 0 { low * low } else { high.min(0).pow(2) };
+                    far += low.pow(2).max(high.pow(2));
+                }
+                let square = self.radius * self.radius;
+                let class = match (4 * far < square, near < square) {
+                    (true, _) => Class::Free,
+                    (_, true) => Class::Mixed,
+                    _ => Class::Nothing,
+                };
+                (class, ())
+            })
+        }
+    }
+
+    #[test]
+    fn every_block_is_found_wherever_the_box_begins() {
+        let ball = Ball { center: [5, -40, 101], radius: 150 };
+        for (first, last) in [([-30; 3], [40; 3]), ([-3, -30, 2], [11, -2, 9]), ([0, -5, 12], [0, -5, 12])] {
+            let mut expected = Vec::new();
+            for z in first[2]..=last[2] {
+                for (y, x) in (first[1]..=last[1]).flat_map(|y| (first[0]..=last[0]).map(move |x| (y, x))) {
+                    let cube = Cube { first_cell: [x, y, z].map(|v| 8 * i64::from(v)), edge: 8 };
+                    let octants = Octants::of(ball.classify(cube, (), 0xff).into_iter().map(|c| c.0));
+                    if octants != Octants::default() {
+                        expected.push((BlockKey([x, y, z]), octants));
+                    }
+                }
+            }
+            let (mut keys, mut octants) = (Vec::new(), Vec::new());
+            let most = expected.len();
+            assert!(find_blocks(&ball, BlockBox { first, last }, most, &mut keys, &mut octants));
+            let found: Vec<_> = keys.iter().copied().zip(octants.iter().copied()).collect();
+            assert_eq!(found, expected);
+            let fits = find_blocks(&ball, BlockBox { first, last }, most - 1, &mut keys, &mut octants);
+            assert!(!fits && keys.is_empty());
+        }
     }
 }

@@ -54,13 +54,13 @@ impl Projector {
         const SLACK: f64 = 0.02;
         let rows = clamped(v[0] - SLACK, v[1] + SLACK, self.rows)?;
         let columns = if self.is_closed() {
-            let turn = self.columns as f64;
-            if u[1] - u[0] + 2.0 * SLACK >= turn - 2.0 {
+            let (turn, slack) = (self.columns as f64, SLACK + self.misfit().abs());
+            if u[1] - u[0] + 2.0 * slack >= turn - 2.0 {
                 [0, self.columns + 1]
             } else {
-                let turns = ((u[0] - SLACK - 1.0) / turn).floor() * turn;
-                let first = (u[0] - SLACK - turns).floor().max(0.0);
-                [first as usize, (u[1] + SLACK - turns).floor() as usize + 1]
+                let turns = ((u[0] - slack - 1.0) / turn).floor() * turn;
+                let first = (u[0] - slack - turns).floor().max(0.0);
+                [first as usize, (u[1] + slack - turns).floor() as usize + 1]
             }
         } else {
             clamped(u[0] - SLACK, u[1] + SLACK, self.columns)?

@@ -15,7 +15,7 @@ pub(crate) struct Ray {
     pub(crate) end: [f64; 3],
     /// Whether there is a surface at the end.
     pub(crate) hit: bool,
-    /// Whether the cells that it passes are missed; else the ray only says where it ends.
+    /// Whether the cells that it passes are missed; else only its end counts.
     pub(crate) passes: bool,
 }
 

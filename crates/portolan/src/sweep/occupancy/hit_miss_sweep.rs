@@ -57,8 +57,15 @@ struct Rays<'a, F> {
     hits: usize,
     count: usize,
     ray: F,
-    /// The range image that free space is read from, and where it was taken.
-    view: Option<(&'a Pose<3>, &'a RangeImage)>,
+    /// The range image that free space is read from.
+    view: Option<View<'a>>,
+}
+
+/// An image and the pose of the frame in which its pixels look.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    world_from_image: &'a Pose<3>,
+    image: &'a RangeImage,
 }
 
 impl<S: ?Sized> HitMissSweep<S> {
@@ -93,11 +100,11 @@ impl<S: ?Sized> HitMissSweep<S> {
         let (bounds, most) = (limits.bounds.as_ref(), limits.most_blocks);
         let longest = LONGEST_RAY_CELLS * lattice.resolution;
         let further: Vec<Ray> =
-            rays.view.and_then(|(pose, image)| free_reach(pose, image, longest)).into_iter().collect();
+            rays.view.and_then(|view| free_reach(view, longest)).into_iter().collect();
         let (exact, misses) = (&mut self.exact, &mut self.misses);
         let (planned, ()) = parallel::join(
             || exact.plan(lattice, bounds, rays.count, &rays.ray, &further, most),
-            || rays.view.into_iter().for_each(|(pose, image)| misses.take(image, pose, lattice)),
+            || rays.view.into_iter().for_each(|view| misses.take(view.image, view.world_from_image, lattice)),
         );
         let mut tally = planned.map_err(|TooManyBricks| PlanError::TooManyBlocks)?;
         let is_searched = match (rays.view, exact.reach()) {
@@ -155,7 +162,7 @@ impl Sweep<3> for HitMissSweep<RangeImage> {
             })
             .collect();
         let hits = all.iter().filter(|r| r.hit).count();
-        let view = (!passes).then_some((world_from_sensor, image));
+        let view = (!passes).then_some(View { world_from_image: world_from_sensor, image });
         let rays = Rays { hits, count: all.len(), ray: |i| all[i], view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
         Ok(ScanStats { refused: stats.refused + image.refused, ..stats })
@@ -179,7 +186,7 @@ impl Sweep<3> for HitMissSweep<PointScan> {
             Origin::PerPoint(_) => (world_from_sensor.translation, None),
         };
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
-        let view = image.as_deref().map(|image| (&world_from_image, image));
+        let view = image.as_deref().map(|image| View { world_from_image: &world_from_image, image });
         let passes = view.is_none();
         let ray = |i: usize| match i.checked_sub(hits) {
             Some(free) => {
@@ -261,7 +268,7 @@ impl<S: ?Sized> Swept<3> for HitMissSweep<S> {
 
 /// The box around a sensor in which pixels without a surface mean that space is free, as its diagonal. Not those of more
 /// than `longest` metres, which are refused.
-fn free_reach(world_from_image: &Pose<3>, image: &RangeImage, longest: f64) -> Option<Ray> {
+fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Option<Ray> {
     let used = |v: &f32| f64::from(-v) <= longest;
     let farthest = image.values.iter().copied().filter(used).fold(0.0f32, f32::min);
     if farthest == 0.0 || image.has_parallel_rays() {

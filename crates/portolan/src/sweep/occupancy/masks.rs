@@ -73,7 +73,7 @@ impl BrickMasks {
         self.keys.len()
     }
 
-    /// The slot of a brick, made where there is none.
+    /// The slot of a brick, made where it is missing.
     #[inline(always)]
     pub(crate) fn slot(&mut self, key: BlockKey<3>) -> usize {
         match self.window.and_then(|w| w.index(key)) {

@@ -4,7 +4,7 @@ use super::masks::BrickMasks;
 use crate::geom::vector::{distance, scale, sub};
 use crate::geom::{BlockKey, Lattice, RayWalk};
 
-/// A cell's place in its brick as three numbers of four bits; the fourth bit of each tells when a step leaves.
+/// A cell's place in its brick as three numbers of four bits; the fourth bit of each changes when a step leaves.
 type Packed = u32;
 const FENCE: Packed = 0x888;
 
