@@ -54,3 +54,8 @@ pub mod sweep;
 
 pub use answer::{Answer, Status};
 pub use mapper::{Mapper, MapperSettings};
+
+/// The code of the front page of the project is compiled as it is printed.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
