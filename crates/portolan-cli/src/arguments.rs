@@ -12,44 +12,40 @@ fn number(text: &str) -> Result<f64, String> {
     text.trim().parse::<f64>().map_err(|_| "not a number".to_owned())
 }
 
+fn number_that(text: &str, fits: impl Fn(f64) -> bool, must_be: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if fits(v) { Ok(v) } else { Err(format!("must be {must_be}")) })
+}
+
 /// A length above zero.
 pub(crate) fn length(text: &str) -> Result<f64, String> {
-    match number(text)? {
-        v if v > 0.0 && v.is_finite() => Ok(v),
-        _ => Err("must be a positive, finite length in metres, like 0.05".to_owned()),
-    }
+    number_that(text, |v| v > 0.0 && v.is_finite(), "a positive, finite length in metres, like 0.05")
 }
 
 /// A length of zero or more.
 pub(crate) fn length_or_zero(text: &str) -> Result<f64, String> {
-    match number(text)? {
-        v if v >= 0.0 && v.is_finite() => Ok(v),
-        _ => Err("must be a finite length in metres, not negative".to_owned()),
-    }
+    number_that(text, |v| v >= 0.0 && v.is_finite(), "a finite length in metres, not negative")
 }
 
 /// A weight above zero; `inf` is one.
 pub(crate) fn weight(text: &str) -> Result<f32, String> {
-    match number(text)? as f32 {
-        v if v > 0.0 => Ok(v),
-        _ => Err("must be a positive number, or inf to never forget".to_owned()),
-    }
+    number_that(text, |v| v as f32 > 0.0, "a positive number, or inf to never forget").map(|v| v as f32)
+}
+
+/// A weight of zero or more.
+pub(crate) fn weight_or_zero(text: &str) -> Result<f32, String> {
+    let fits = |v: f64| v as f32 >= 0.0 && (v as f32).is_finite();
+    number_that(text, fits, "a finite number, not negative").map(|v| v as f32)
 }
 
 /// A share above 0 and at most 1.
 pub(crate) fn share(text: &str) -> Result<f32, String> {
-    match number(text)? as f32 {
-        v if v > 0.0 && v <= 1.0 => Ok(v),
-        _ => Err("must be above 0 and at most 1".to_owned()),
-    }
+    let fits = |v: f64| v as f32 > 0.0 && v as f32 <= 1.0;
+    number_that(text, fits, "above 0 and at most 1").map(|v| v as f32)
 }
 
 /// A number of observations; `inf` is one.
 pub(crate) fn half_life(text: &str) -> Result<f64, String> {
-    match number(text)? {
-        v if v >= 0.1 => Ok(v),
-        _ => Err("must be a number of observations from 0.1 on, or inf to never forget".to_owned()),
-    }
+    number_that(text, |v| v >= 0.1, "a number of observations, 0.1 or more, or inf to never forget")
 }
 
 /// How soon distances forget, in either of two units.
@@ -98,14 +94,6 @@ pub(crate) fn finite<T: Copy + Into<f64>, S: Serializer>(
 /// 0 for what was not given.
 pub(crate) fn or_zero<S: Serializer>(value: &Option<f64>, out: S) -> Result<S::Ok, S::Error> {
     value.unwrap_or(0.0).serialize(out)
-}
-
-/// A weight of zero or more.
-pub(crate) fn weight_or_zero(text: &str) -> Result<f32, String> {
-    match number(text)? as f32 {
-        v if v >= 0.0 && v.is_finite() => Ok(v),
-        _ => Err("must be a finite number, not negative".to_owned()),
-    }
 }
 
 /// A box of either dimension.

@@ -2,7 +2,6 @@
 
 use std::marker::PhantomData;
 
-use anyhow::bail;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches};
 
@@ -90,12 +89,17 @@ impl<T> Given<T> {
     }
 }
 
-impl<T: FromArgMatches> Given<T> {
+impl<T: Args> Given<T> {
     /// The values with what was given in place of theirs.
     pub(crate) fn over(&self, mut values: T) -> anyhow::Result<T> {
-        if let Err(error) = values.update_from_arg_matches(&self.matches) {
-            bail!(error);
+        let mut given = self.matches.clone();
+        for argument in T::augment_args(Command::new("")).get_arguments() {
+            // A flag that was not given has a value, too.
+            if !self.has(argument.get_id().as_str()) {
+                given.try_clear_id(argument.get_id().as_str())?;
+            }
         }
+        values.update_from_arg_matches(&given)?;
         Ok(values)
     }
 }

@@ -1,4 +1,4 @@
-//! How a run ends that could not do what it was asked for.
+//! How a failed run ends.
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -20,14 +20,14 @@ pub(crate) fn bad_call(text: impl Into<String>) -> anyhow::Error {
     BadCall(text.into()).into()
 }
 
-/// Says on stderr, in one line, what went wrong, and gives the exit status.
+/// Prints to stderr, in one line, what went wrong; gives the exit status.
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    // Whoever reads our output may stop early (`head`): no reason to complain.
+    // Whoever reads the output may stop early (`head`): not an error.
     if error.chain().any(|e| e.downcast_ref::<io::Error>().is_some_and(closed)) {
         return ExitCode::SUCCESS;
     }
     let text: String = format!("{error:#}").chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    // Without a stderr there is nobody to tell.
+    // Without a stderr the text goes nowhere.
     let _ = writeln!(io::stderr(), "portolan: {text}");
     ExitCode::from(if error.is::<BadCall>() { 2 } else { 1 })
 }

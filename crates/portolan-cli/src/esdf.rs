@@ -1,8 +1,12 @@
 //! How distance fields are made of maps.
 
-use portolan::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings};
-use portolan::geom::vector;
-use portolan::map::Tsdf;
+use anyhow::Context;
+use portolan::cell::DistancePlanes;
+use portolan::field::{DenseEsdf, Esdf, EsdfMethod, EsdfSettings, SparseEsdf, SparseEsdfSettings};
+use portolan::geom::{Grid, vector};
+use portolan::map::{Tsdf, TsdfConfig};
+use portolan::store::Dense;
+use portolan_io::MapCell;
 use serde::{Deserialize, Serialize};
 
 /// What distances are measured to.
@@ -52,4 +56,23 @@ pub(crate) fn status_plane<const D: usize>(dense: &DenseEsdf<D>) -> Option<&[u8]
 pub(crate) fn known_where_finite<const D: usize>(grid: Grid<D>, distances: Vec<f32>) -> DenseEsdf<D> {
     let status = distances.iter().map(|d| u8::from(!d.is_nan())).collect();
     DenseEsdf { grid, distances, status }
+}
+
+/// A 2-D field of distances to occupied and free cells.
+pub(crate) fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> Esdf<2> {
+    Esdf::from_mask(grid, |i| match cells[i] {
+        MapCell::Occupied => Some(true),
+        MapCell::Free => Some(false),
+        MapCell::Unknown => None,
+    })
+}
+
+/// Samples of a 2-D field as signed distances of weight 1, or 0 where they are NaN.
+pub(crate) fn tsdf_of_samples(grid: Grid<2>, samples: &[f32]) -> anyhow::Result<Tsdf<2>> {
+    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
+    let (distances, weights) = samples.iter().map(known).unzip();
+    let planes = DistancePlanes::from_parts(distances, weights);
+    let store = planes.and_then(|planes| Dense::from_planes(grid, planes));
+    let store = store.context("the distance field has values that are not finite")?;
+    Ok(Tsdf::from_store(store, TsdfConfig::default())?)
 }

@@ -31,7 +31,7 @@ pub(crate) fn stats(stats: &ScanStats) -> Value {
     })
 }
 
-/// Refused readings by cause, in words.
+/// Refused readings by cause, for people.
 pub(crate) fn refused_words(r: &RefusedBeams) -> String {
     let mut causes = format!("{} not finite, {} negative, {} too near", r.not_finite, r.negative, r.too_near);
     if r.too_far > 0 {
@@ -55,7 +55,7 @@ pub(crate) fn add_counts(sum: &mut Map<String, Value>, other: &Map<String, Value
     }
 }
 
-/// What else was found in a log.
+/// What else was found in a 2-D log.
 pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
     let by_cause: Map<_, _> =
         stats.refused.by_fault.iter().map(|(fault, n)| (fault.to_string(), json!(n))).collect();
@@ -78,8 +78,8 @@ pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
     })
 }
 
-/// What else was found in a log of space.
-pub(crate) fn space_log_stats(stats: &ScanLogStats) -> Value {
+/// What else was found in a 3-D log.
+pub(crate) fn space_log_stats(stats: &SpaceLogStats) -> Value {
     json!({
         "scans": stats.scans,
         "missing_files": stats.missing_files,

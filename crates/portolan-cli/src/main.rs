@@ -21,7 +21,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-/// Maps from range scans with known poses: occupancy grid, quadtree, signed distance fields, contour.
+/// Maps from range scans with known poses, in 2-D and 3-D: occupancy, signed distance fields, surfaces.
 #[derive(Parser)]
 #[command(name = "portolan", version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "Example:\n  portolan map intel.log.gz --resolution 0.05 --out intel")]
@@ -34,5 +34,15 @@ fn main() -> ExitCode {
     match Cli::parse().command.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => error::report(&error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn every_command_is_well_formed() {
+        super::Cli::command().debug_assert();
     }
 }

@@ -3,33 +3,28 @@
 use std::path::Path;
 
 use anyhow::bail;
-use portolan_io::{Container, map_dimension, IoError, MapHeader};
+use portolan_io::{AnyMapFile, IoError, MapFile, MapHeader, SpaceMapFile};
 
 use crate::dimension::Dimension;
 
-/// Reads the map to go on with.
+/// Reads a map to go on with.
 ///
 /// # Errors
-/// A file that is not a map or needs more than `memory` bytes, and a map of the other dimension than the log.
+/// A file that is not a map or needs more than `memory` bytes, and a map of another dimension.
 pub(crate) fn read(path: &Path, memory: u64, log: Dimension) -> anyhow::Result<AnyMapFile> {
     let file = AnyMapFile::read_within(path, memory)?;
-    let map = dimension(&file);
-    if map != log {
-        bail!(
-            "{}: the map is {} and the log {}; write to another folder",
-            path.display(),
-            map.word(),
-            log.word()
-        );
+    if matches!(file, AnyMapFile::Plane(_)) != (log == Dimension::Two) {
+        bail!("{}: the map is not {} like the log; write to another folder", path.display(), log.word());
     }
     Ok(file)
 }
 
-pub(crate) fn dimension(file: &AnyMapFile) -> Dimension {
-    match file {
-        AnyMapFile::Plane(_) => Dimension::Two,
-        AnyMapFile::Space(_) => Dimension::Three,
-    }
+pub(crate) fn in_2d(file: AnyMapFile) -> Option<Box<MapFile>> {
+    if let AnyMapFile::Plane(file) = file { Some(file) } else { None }
+}
+
+pub(crate) fn in_3d(file: AnyMapFile) -> Option<Box<SpaceMapFile>> {
+    if let AnyMapFile::Space(file) = file { Some(file) } else { None }
 }
 
 pub(crate) fn header(file: &AnyMapFile) -> &MapHeader {

@@ -9,6 +9,7 @@ use portolan_io::{
     map_dimension, read_geojson,
 };
 
+use crate::dimension::{Dimension, Given};
 use crate::log::describe;
 use crate::mapping::available_memory;
 
@@ -72,6 +73,18 @@ fn yaml_beside(path: &Path) -> Option<PathBuf> {
 }
 
 impl Source {
+    /// Refuses options that were given and that files of this dimension have no use for.
+    pub(crate) fn check<A: clap::Args>(&self, given: &Given<()>) -> anyhow::Result<()> {
+        let dimension = match self {
+            Self::Image(_) => return Ok(()),
+            Self::Map2(_) | Self::Server(_) | Self::Contour(_) | Self::Log2(_) => Dimension::Two,
+            Self::Esdf(EsdfFile::Two(_)) => Dimension::Two,
+            Self::Map3(_) | Self::Octomap(_) | Self::Log3(_) => Dimension::Three,
+            Self::Esdf(EsdfFile::Three(_)) => Dimension::Three,
+        };
+        dimension.check::<A, _>(given, "the file")
+    }
+
     /// What lowers the trust in it.
     pub(crate) fn warning(&self) -> Option<String> {
         if let Self::Octomap(file) = self {

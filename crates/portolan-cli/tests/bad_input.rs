@@ -200,7 +200,7 @@ fn the_wrong_kind_of_file() {
     std::fs::write(&points, "1,1\n2\n").unwrap();
     refused(1, &["query", arg(&log), "--points", arg(&points)], &["room.log", "is a CARMEN log"]);
     refused(1, &["mesh", arg(&log), "a.svg"], &["room.log", "is a CARMEN log"]);
-    refused(1, &["convert", arg(&log), "a.svg"], &["room.log", "`portolan map` makes maps of logs"]);
+    refused(1, &["convert", arg(&log), "a.svg"], &["room.log", "it can become a map, by `portolan map`"]);
     refused(1, &["query", arg(folder.path()), "--points", arg(&points)], &["a folder without map.portolan"]);
     let out = folder.path().join("out");
     map(&log, &out, &[]);

@@ -1,4 +1,4 @@
-//! `eval` of maps of space.
+//! `eval` of 3-D maps.
 
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
@@ -19,7 +19,7 @@ use support::{arg, fail, json, succeed};
 /// Where the map has its wall (x, metres); the truth has it at 1.
 const WALL: f64 = 1.03;
 
-/// A map of a wall of 1.6 x 1.6 m and the space before it, at 10 cm.
+/// A map of a wall of 1.6 x 1.6 m and the free space before it, at 10 cm.
 fn write_map(folder: &Path) {
     let lattice = Lattice::new([0.0; 3], 0.1);
     let mut store = Bricks::new(lattice);

@@ -114,8 +114,8 @@ fn layouts_are_those_of_their_consumers() {
     let (_room, log) = room();
     assert!(fail(1, ["convert", arg(&log), arg(&npz)]).contains("a CARMEN log"));
     let yaml = folder.path().join("a.yaml");
-    assert!(fail(2, ["convert", arg(&file), arg(&yaml), "--layout", "gpmp2"]).contains("are for .npz"));
-    assert!(fail(2, ["convert", arg(&file), arg(&npz), "--inflate", "1"]).contains("are for .yaml"));
+    assert!(fail(2, ["convert", arg(&file), arg(&yaml), "--layout", "gpmp2"]).contains("are only for .npz"));
+    assert!(fail(2, ["convert", arg(&file), arg(&npz), "--inflate", "1"]).contains("are only for .yaml"));
     assert!(fail(2, ["convert", arg(&file), arg(&npz), "--bounds", "0,0,1,1"]).contains("six numbers"));
     let outside = ["convert", arg(&file), arg(&npz), "--bounds", "50,0,0,51,1,1"];
     assert!(fail(1, outside).contains("no cell of the map"));
@@ -162,7 +162,7 @@ fn costmaps_are_the_formula_over_the_distances() {
 }
 
 #[test]
-fn a_layer_of_space_becomes_a_map_of_the_plane() {
+fn a_layer_of_a_3d_field_becomes_a_2d_map() {
     let folder = tempfile::tempdir().unwrap();
     let (file, grid, _) = space(folder.path());
     let yaml = folder.path().join("layer.yaml");

@@ -76,7 +76,7 @@ fn convert_keeps_bytes_and_makes_free_and_occupied() {
 }
 
 #[test]
-fn query_answers_occupancy_in_space() {
+fn query_answers_occupancy_in_3d() {
     let folder = tempfile::tempdir().unwrap();
     let (_, ot) = written(folder.path());
     let points = folder.path().join("p.csv");

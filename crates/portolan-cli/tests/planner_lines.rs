@@ -1,4 +1,4 @@
-//! What the README shows to planners, in the plane and in space.
+//! What the README shows to planners, in 2-D and 3-D.
 
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
@@ -19,7 +19,7 @@ fn wall_2d() -> Tsdf2 {
 }
 
 #[test]
-fn in_the_plane() {
+fn in_2d() {
     let tsdf = wall_2d();
     let how = EsdfSettings { unknown: true, ..Default::default() };
     let field = Esdf::of(&tsdf, &how);
@@ -29,8 +29,8 @@ fn in_the_plane() {
 }
 
 #[test]
-fn in_space() {
-    let how = EsdfSettings { unknown: true, ..Default::default() };
+fn in_3d() {
+    let how = SparseEsdfSettings { unknown: true, ..Default::default() };
     let path = Waypoints::new(vec![[0.5, 0.5, 0.5], [1.5, 1.0, 1.5], [1.5, 1.5, 1.0]]).unwrap();
     // Nothing was seen yet: nothing is certified.
     let unseen = Tsdf3::new(TsdfConfig::default()).unwrap();

@@ -1,4 +1,4 @@
-//! The real logs of space, mapped and measured.
+//! The real 3-D logs, mapped and measured.
 
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 

@@ -136,7 +136,7 @@ fn a_recorded_log_is_shown_and_makes_the_map_that_map_makes() {
 }
 
 #[test]
-fn a_recorded_log_of_space_makes_the_surface_that_map_makes() {
+fn a_recorded_3d_log_makes_the_surface_that_map_makes() {
     let mut made_before: Vec<Vec<[[i64; 3]; 3]>> = Vec::new();
     for ((folder, log), limits) in [
         (lidar_log(), &["--min-range", "1.2", "--max-range", "4"][..]),

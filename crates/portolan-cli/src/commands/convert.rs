@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use portolan::cell::{DistancePlanes, LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
-use portolan::field::{DenseEsdf, Esdf};
+use portolan::cell::{LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
+use portolan::field::DenseEsdf;
 use portolan::geom::{Grid, Pose};
-use portolan::map::{OccupancyGrid, Tsdf, TsdfConfig};
+use portolan::map::OccupancyGrid;
 use portolan::store::{Dense, Tree};
 use portolan::surface::{Contour, ContourSettings, marching_cubes, marching_squares};
 use portolan_io::{
@@ -18,11 +18,10 @@ use serde_json::json;
 use self::arrays::ArrayArgs;
 use self::costs::CostArgs;
 use self::field::Field;
-use super::query::esdf_of_server;
 use crate::arguments::{Bounds, bounds, length};
-use crate::dimension::ONLY_3D;
+use crate::dimension::{Given, ONLY_3D};
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, status_plane};
+use crate::esdf::{EsdfArg, esdf_of_cells, status_plane, tsdf_of_samples};
 use crate::mapping::{cells_for_map_server, mesh_settings, polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
@@ -39,6 +38,8 @@ pub(crate) use arrays::UnknownArg;
                   portolan convert intel costs.yaml --inflate 0.55 --inscribed 0.22\n  \
                   portolan convert kitchen floor.yaml --z 0.1:1.2 --unknown pessimistic")]
 pub(crate) struct Args {
+    #[command(flatten)]
+    given: Given<()>,
     /// map.portolan or its folder, map_server yaml, esdf.bin, GeoJSON contour, or OctoMap .bt or .ot
     input: PathBuf,
     /// File to write: .portolan, .yaml (with its .pgm), .bin, .npz, .npy, .geojson, .svg, .bt, .ot, .ply, .glb or .obj
@@ -78,6 +79,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let target = target(&args.out);
     let source = open(&args.input)?;
     let Some(target) = target else { return Err(not_possible(args, &source)) };
+    source.check::<Args>(&args.given)?;
     args.check(target, &source)?;
     let done = match &source {
         _ if args.takes_field(target, &source) => match Field::of(&source, args)? {
@@ -87,14 +89,16 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Source::Map2(file) => convert_map2(file, target, args)?,
         Source::Map3(file) => convert_map3(file, target, args)?,
         Source::Server(map) => convert_server(map, target, args)?,
-        Source::Esdf(EsdfFile::Two(field)) => {
-            if target == Target::Esdf {
-                write_whole(field, args)?
-            } else {
-                convert_esdf(field, target, args)?
-            }
+        // The same file, its status plane included.
+        Source::Esdf(EsdfFile::Two(file)) if target == Target::Esdf => {
+            file.write(&args.out).map(|()| true)?
         }
-        Source::Esdf(EsdfFile::Three(field)) if target == Target::Esdf => write_whole(field, args)?,
+        Source::Esdf(EsdfFile::Three(file)) if target == Target::Esdf => {
+            file.write(&args.out).map(|()| true)?
+        }
+        Source::Esdf(EsdfFile::Two(file)) => {
+            convert_samples(file.grid, &field::of_file(file).distances, target, args)?
+        }
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
         Source::Octomap(file) => convert_octomap(file, target, args)?,
         _ => false,
@@ -171,7 +175,7 @@ fn convert_map2(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Resul
         }
         (Target::Contour, None) => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
-            return convert_esdf(&esdf_of_cells(grid, &cells), target, args);
+            return write_lines(&contour_of(grid, esdf_of_cells(grid, &cells).samples())?, args);
         }
         _ => return Ok(false),
     }
@@ -216,7 +220,7 @@ fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Re
         Target::Portolan => as_map_file(map, args)?.write(&args.out)?,
         Target::MapServer => write_map_server(yaml(&args.out), &map.grid, &map.cells)?,
         Target::Contour => {
-            let mut contour = contour_of(&esdf_of_server(map))?;
+            let mut contour = contour_of(map.grid, esdf_of_cells(map.grid, &map.cells).samples())?;
             let world_from_grid: Pose<2> = map.world_from_grid();
             if turned {
                 contour.vertices.iter_mut().for_each(|v| *v = world_from_grid.transform_point(*v));
@@ -238,7 +242,7 @@ fn convert_octomap(file: &OctomapTree, target: Target, args: &Args) -> anyhow::R
     Ok(true)
 }
 
-fn convert_esdf(esdf: &EsdfGrid<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
+fn convert_samples(grid: Grid<2>, samples: &[f32], target: Target, args: &Args) -> anyhow::Result<bool> {
     match target {
         Target::MapServer => {
             let cell = |d: &f32| match d {
@@ -246,21 +250,13 @@ fn convert_esdf(esdf: &EsdfGrid<2>, target: Target, args: &Args) -> anyhow::Resu
                 d if *d < 0.0 => MapCell::Occupied,
                 _ => MapCell::Free,
             };
-            let cells: Vec<_> = esdf.samples().iter().map(cell).collect();
-            write_map_server(yaml(&args.out), esdf.grid(), &cells)?;
+            let cells: Vec<_> = samples.iter().map(cell).collect();
+            write_map_server(yaml(&args.out), &grid, &cells)?;
         }
-        Target::Contour => return write_lines(&contour_of(esdf)?, args),
+        Target::Contour => return write_lines(&contour_of(grid, samples)?, args),
         _ => return Ok(false),
     }
     Ok(true)
-}
-
-fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> EsdfGrid<2> {
-    EsdfGrid::from_mask(grid, |i| match cells[i] {
-        MapCell::Occupied => Some(true),
-        MapCell::Free => Some(false),
-        MapCell::Unknown => None,
-    })
 }
 
 /// Writes a distance field as `esdf.bin`, arrays or a costmap.
@@ -326,13 +322,8 @@ fn write_lines(contour: &Contour, args: &Args) -> anyhow::Result<bool> {
 }
 
 /// The zero level set of a distance field.
-fn contour_of(esdf: &EsdfGrid<2>) -> anyhow::Result<Contour> {
-    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
-    let (distances, weights) = esdf.samples().iter().map(known).unzip();
-    let planes = DistancePlanes::from_parts(distances, weights);
-    let store = planes.and_then(|p| Dense::from_planes(*esdf.grid(), p));
-    let Some(store) = store else { bail!("the distance field has values that are not finite") };
-    let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
+fn contour_of(grid: Grid<2>, samples: &[f32]) -> anyhow::Result<Contour> {
+    let tsdf = tsdf_of_samples(grid, samples)?;
     Ok(marching_squares(&tsdf, &ContourSettings::of(&tsdf)))
 }
 

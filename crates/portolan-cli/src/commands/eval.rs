@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use serde_json::{Value, json};
 
-use crate::dimension::{Dimension, Given, ONLY_3D};
+use crate::dimension::{Given, ONLY_3D};
 use crate::log::{LimitArgs, LogArgs};
 use crate::output::Output;
 use crate::source::{Source, open};
@@ -67,15 +67,11 @@ struct Part {
 
 /// Evaluates the map.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    let parts = match open(&args.map)? {
-        Source::Map2(file) => {
-            Dimension::Two.check::<Args, _>(&args.given, "the map")?;
-            contour::evaluate(args, &file)?
-        }
-        Source::Map3(file) => {
-            Dimension::Three.check::<Args, _>(&args.given, "the map")?;
-            mesh::evaluate(args, &file)?
-        }
+    let source = open(&args.map)?;
+    source.check::<Args>(&args.given)?;
+    let parts = match source {
+        Source::Map2(file) => contour::evaluate(args, &file)?,
+        Source::Map3(file) => mesh::evaluate(args, &file)?,
         other => bail!(
             "{}: is {}; to evaluate it, give a map.portolan or its folder",
             args.map.display(),

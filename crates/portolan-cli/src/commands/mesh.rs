@@ -8,7 +8,7 @@ use portolan_io::MapFile;
 use serde_json::json;
 
 use crate::arguments::weight_or_zero;
-use crate::dimension::{Dimension, Given, ONLY_2D};
+use crate::dimension::{Given, ONLY_2D};
 use crate::error::bad_call;
 use crate::mapping::{mesh_settings, polylines, write_contour, write_mesh};
 use crate::output::Output;
@@ -37,7 +37,9 @@ pub(crate) struct Args {
 
 /// Extracts the surface.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    match open(&args.map)? {
+    let source = open(&args.map)?;
+    source.check::<Args>(&args.given)?;
+    match source {
         Source::Map2(file) => contour(args, &file),
         Source::Map3(file) => mesh(args, &file),
         other => {
@@ -83,9 +85,8 @@ fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     )
 }
 
-fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
-    Dimension::Three.check::<Args, _>(&args.given, "the map")?;
-    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
+fn mesh(args: &Args, file: &SpaceMapFile) -> anyhow::Result<()> {
+    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let usual = mesh_settings(tsdf.weights);
     let settings = MeshSettings { min_weight: args.min_weight.or(usual.min_weight), ..usual };
     let mesh = marching_cubes(&tsdf.store, file.color_bricks.as_ref().map(|c| &c.store), &settings);

@@ -17,21 +17,21 @@ pub(crate) enum Command {
     Demo(demo::Args),
     /// One log in every representation: what each costs and how true its answers are
     Gallery(gallery::Args),
-    /// Fuse a log into maps and write them into a folder
+    /// Fuse a log of range scans into maps, 2-D or 3-D
     Map(Box<map::Args>),
-    /// Ask a map at points: occupancy, distance, gradient
+    /// Occupancy, distance and gradient of a map at given points
     Query(query::Args),
-    /// Say what a file is and what it holds
+    /// What a file is and what it holds
     Info(info::Args),
-    /// Turn one format into another
+    /// Convert a map, field or contour to another format
     Convert(convert::Args),
-    /// Extract the contour of a map again, with other settings
+    /// Extract the contour or mesh of a map again, with other settings
     Mesh(mesh::Args),
     /// The differentiable renderer on a line: rendering as a measurement model
     Radiance(radiance::Args),
-    /// A web app on this machine that shows maps while they are made
+    /// Watch maps grow in the browser (a local web app)
     Studio(studio::Args),
-    /// Measure a map against scans that were not fused, or against a reference contour
+    /// Measure how good a map is: on scans that were not fused, or against a reference surface
     Eval(eval::Args),
 }
 

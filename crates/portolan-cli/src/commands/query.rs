@@ -12,15 +12,15 @@ use portolan::sweep::OccupancySweep;
 use portolan::store::Store;
 use portolan::sweep::OccupancySweep;
 use portolan_io::{
-    AnswerRow, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
-    certified_reach, write_answer, write_answer_header,
+    AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapFile, MapServerMap, OctomapTree, QueryPoints,
+    SpaceMapFile, certified_reach, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
 use super::convert::UnknownArg;
 use crate::arguments::length;
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, esdf_2d};
+use crate::esdf::{EsdfArg, esdf_2d, esdf_of_cells};
 use crate::mapping::{Settings, esdf_settings};
 use crate::output::Output;
 use crate::source::{Source, open};
@@ -258,7 +258,7 @@ fn of_esdf<const D: usize>(esdf: EsdfGrid<D>) -> Field<D> {
 
 fn of_server(map: MapServerMap) -> Field<2> {
     let world_from_field = map.world_from_grid();
-    let distance = Some(dense(esdf_of_server(&map)));
+    let distance = Some(dense(esdf_of_cells(map.grid, &map.cells)));
     let occupancy: Occupancy<2> = Box::new(move |p| match map.grid.index_of(p) {
         None => Answer::Outside,
         Some(i) if map.occupancy[i].is_nan() => Answer::Unknown,
@@ -282,15 +282,6 @@ fn of_octomap(file: OctomapTree) -> Field<3> {
 /// P(occupied) of log odds.
 fn logistic(log_odds: f32) -> f64 {
     1.0 / (1.0 + (-f64::from(log_odds)).exp())
-}
-
-/// The distance field of a map_server map, in its own frame.
-pub(super) fn esdf_of_server(map: &MapServerMap) -> EsdfGrid<2> {
-    EsdfGrid::from_mask(map.grid, |i| match map.cells[i] {
-        MapCell::Occupied => Some(true),
-        MapCell::Free => Some(false),
-        MapCell::Unknown => None,
-    })
 }
 
 impl<const D: usize> Field<D> {

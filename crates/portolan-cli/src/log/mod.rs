@@ -133,7 +133,7 @@ pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> 
     if args.format.is_none() {
         match detect(path)? {
             FileKind::CarmenLog => {}
-            // The reader's own error says what a folder is.
+            // The reader's own error is about folders.
             FileKind::Unknown(_) | FileKind::PortolanFolder if path.is_dir() => {}
             FileKind::Unknown(what) => {
                 bail!("{}: not a log: {what}; or force it with --format carmen", path.display())

@@ -14,7 +14,7 @@ use super::{MapKind, Settings};
 use crate::arguments::shown_bytes;
 use crate::json;
 
-/// The largest cell index that is computed with (of 2^53 that an f64 tells apart).
+/// The largest cell index that is computed with (an f64 holds whole numbers up to 2^53).
 const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
 
 /// The box that the maps of a run cover.

@@ -18,6 +18,7 @@ use super::map_server::grid_of;
 use super::{MapKind, Maps, Maps2, Maps3, Settings, recipe};
 use crate::log::{self, Log};
 use crate::progress::Progress;
+use crate::saved;
 
 /// What a run may use, and the names that its errors give.
 pub(crate) struct Limits<'a> {
@@ -44,16 +45,9 @@ impl<'a> Mapper<'a> {
         before: Option<AnyMapFile>,
         limits: &Limits,
     ) -> anyhow::Result<Self> {
-        match (log, before) {
-            (Log::Two(log), None) => Self::new_2d(log, indices, settings, None, limits),
-            (Log::Two(log), Some(AnyMapFile::Plane(file))) => {
-                Self::new_2d(log, indices, settings, Some(file), limits)
-            }
-            (Log::Three(log), None) => Self::new_3d(log, indices, settings, None, limits),
-            (Log::Three(log), Some(AnyMapFile::Space(file))) => {
-                Self::new_3d(log, indices, settings, Some(file), limits)
-            }
-            _ => bail!("{}: the map is not of the log's dimension", limits.map),
+        match log {
+            Log::Two(log) => Self::new_2d(log, indices, settings, before.and_then(saved::in_2d), limits),
+            Log::Three(log) => Self::new_3d(log, indices, settings, before.and_then(saved::in_3d), limits),
         }
     }
 
@@ -98,12 +92,12 @@ impl<'a> Mapper<'a> {
         let bounds = settings.bounds.map(|bounds| bounds.in_3d("the log")).transpose()?;
         let filter = settings.shape.range.filter(settings.shape.self_filter.clone())?;
         let frames = Frames { log, indices, filter };
-        let mut file = before.unwrap_or_default();
-        let mut maps = if file.occupancy.is_some() || file.tsdf.is_some() {
-            saved_3d(&mut file, settings, limits)?
-        } else {
-            let origin = recipe::origin(log.pose(0).translation, settings.resolution());
-            Maps3::new(settings, origin, limits.memory)?
+        let (mut maps, file) = match before {
+            Some(mut file) => (saved_3d(&mut file, settings, limits)?, file),
+            None => {
+                let origin = recipe::origin(log.pose(0).translation, settings.resolution());
+                (Maps3::new(settings, origin, limits.memory)?, Box::default())
+            }
         };
         if let Some(map) = &mut maps.occupancy {
             map.set_bounds(bounds);

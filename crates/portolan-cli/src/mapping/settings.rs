@@ -41,8 +41,7 @@ pub(crate) struct Shape {
     #[serde(flatten)]
     pub(crate) range: RangeArgs,
     /// Do not fuse the free space in front of surfaces into the signed distances: faster, but free space stays unknown
-    #[arg(long = "no-carve", num_args = 0, default_missing_value = "false", required = false)]
-    #[arg(action = clap::ArgAction::Set)]
+    #[arg(long = "no-carve", action = clap::ArgAction::SetFalse)]
     pub(crate) carve: bool,
     /// Weight of free space relative to that of a surface, above 0 and at most 1. A lower weight keeps thin objects, but
     /// objects that have moved away fade more slowly [default: 0.3; the textbook uses 1]
@@ -51,8 +50,7 @@ pub(crate) struct Shape {
     #[serde(serialize_with = "four_digits")]
     pub(crate) carve_weight: f32,
     /// Do not fuse colour
-    #[arg(long = "no-color", num_args = 0, default_missing_value = "false", required = false)]
-    #[arg(action = clap::ArgAction::Set, help_heading = ONLY_3D)]
+    #[arg(long = "no-color", action = clap::ArgAction::SetFalse, help_heading = ONLY_3D)]
     pub(crate) color: bool,
     /// Leave out readings inside this part of the sensor's frame, which belong to the robot itself: a box
     /// x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius (metres); may be given several times
@@ -273,7 +271,30 @@ fn or_one<S: Serializer>(n: &Option<u64>, out: S) -> Result<S::Ok, S::Error> {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
+    use crate::dimension::Given;
+
+    #[derive(clap::Parser)]
+    struct Call {
+        #[command(flatten)]
+        settings: Given<Settings>,
+        #[arg(long)]
+        append: bool,
+    }
+
+    #[test]
+    fn only_what_was_given_changes_saved_settings() {
+        let mut saved = Settings::default();
+        (saved.shape.carve, saved.shape.hold_out, saved.every) = (false, Some(7), Some(3));
+        saved.shape.forgetting = ForgettingArgs::of(8.0);
+        let over = |call: &[&str]| Call::parse_from(call).settings.over(saved.clone()).unwrap();
+        assert_eq!(over(&["map", "--append"]), saved);
+        let other = over(&["map", "--append", "--truncation", "0.2", "--no-color", "--half-life", "1"]);
+        assert_eq!((other.truncation(), other.shape.carve, other.shape.color), (0.2, false, false));
+        assert_eq!((other.w_max(), other.shape.hold_out, other.every), (1.0, Some(7), Some(3)));
+    }
 
     #[test]
     fn saved_settings_come_back() {

@@ -2,19 +2,15 @@
 
 use std::path::Path;
 
-use anyhow::bail;
-use portolan::cell::DistancePlanes;
-use portolan::field::{EsdfGrid, UnknownSpace};
+use portolan::field::{DenseEsdf, UnknownSpace};
 use portolan::geom::Grid;
 use portolan::handover::{Inflation, lowest_between};
-use portolan::map::{Tsdf, TsdfConfig};
-use portolan::store::Dense;
 use portolan_io::{MapMode, write_costmap};
 
 use super::field::Field;
 use crate::arguments::{heights, length_or_zero};
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, dense_esdf_2d};
+use crate::esdf::{EsdfArg, dense_esdf_2d, tsdf_of_samples};
 
 /// How costs become pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -100,14 +96,8 @@ fn layer_in_2d(
     field: &DenseEsdf<3>,
     heights: [f64; 2],
     unknown: UnknownSpace,
-) -> anyhow::Result<EsdfGrid<2>> {
-    let (grid, lowest): (Grid<2>, _) = lowest_between(field.grid(), field.samples(), heights, unknown)?;
-    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
-    let (distances, weights) = lowest.iter().map(known).unzip();
-    let planes = DistancePlanes::from_parts(distances, weights);
-    let Some(store) = planes.and_then(|p| Dense::from_planes(grid, p)) else {
-        bail!("the distance field has values that are not finite")
-    };
-    let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
+) -> anyhow::Result<DenseEsdf<2>> {
+    let (grid, lowest): (Grid<2>, _) = lowest_between(&field.grid, &field.distances, heights, unknown)?;
+    let tsdf = tsdf_of_samples(grid, &lowest)?;
     Ok(dense_esdf_2d(&tsdf, EsdfArg::Accurate))
 }

@@ -5,8 +5,8 @@ use portolan::field::{Esdf, EsdfGrid};
 use portolan::geom::{Aabb, Grid};
 use portolan_io::{EsdfBin, EsdfFile};
 
-use super::{Args, esdf_of_cells, esdf_of_server};
-use crate::esdf::{dense_esdf_2d, known_where_finite};
+use super::Args;
+use crate::esdf::{dense_esdf_2d, esdf_of_cells, known_where_finite};
 use crate::mapping::{Settings, cells_for_map_server, dense_esdf, esdf_settings};
 use crate::source::Source;
 
@@ -39,7 +39,7 @@ impl Field {
                         args.out.display()
                     );
                 }
-                Self::Two(in_2d(of_samples(esdf_of_server(map)), args)?)
+                Self::Two(in_2d(of_samples(esdf_of_cells(map.grid, &map.cells)), args)?)
             }
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(in_2d(of_file(field), args)?),
             Source::Esdf(EsdfFile::Three(field)) => {
@@ -72,7 +72,7 @@ fn of_samples(esdf: Esdf<2>) -> DenseEsdf<2> {
 }
 
 /// The field of a file: cells whose status is unknown hold NaN.
-fn of_file<const D: usize>(file: &EsdfBin<D>) -> DenseEsdf<D> {
+pub(super) fn of_file<const D: usize>(file: &EsdfBin<D>) -> DenseEsdf<D> {
     let mut dense = known_where_finite(file.grid, file.distances.clone());
     for (i, &status) in file.status.iter().flatten().enumerate() {
         if status == EsdfBin::<D>::UNKNOWN {
