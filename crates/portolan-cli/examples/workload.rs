@@ -15,6 +15,7 @@ use clap::{Parser, ValueEnum};
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Lattice, Pose};
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
+use portolan::sweep::OccupancySweep;
 use portolan::scan::Frame;
 use portolan::surface::isosurface;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};

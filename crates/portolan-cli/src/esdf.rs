@@ -1,13 +1,9 @@
 //! How distance fields are made of maps.
 
-use anyhow::Context;
-use portolan::cell::DistancePlanes;
-use portolan::field::{DenseEsdf, Esdf, EsdfMethod, EsdfSettings, SparseEsdf, SparseEsdfSettings};
-use portolan::geom::{Grid, vector};
-use portolan::map::{Tsdf, TsdfConfig};
-use portolan::store::Dense;
-use portolan_io::MapCell;
-use serde::{Deserialize, Serialize};
+use portolan::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings};
+use portolan::geom::vector;
+use portolan::map::Tsdf;
+use serde_json::{Map, Value};
 
 /// What distances are measured to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
@@ -35,27 +31,21 @@ impl EsdfArg {
 
 /// The field of a 2-D map, as far as the method reaches (509 cells where it is accurate), with distances to
 /// unknown cells where they are wanted.
-pub(crate) fn esdf_2d(tsdf: &Tsdf2, method: EsdfArg, unknown: bool) -> SparseEsdf<2> {
+pub(crate) fn plane_esdf(tsdf: &Tsdf2, method: EsdfArg, unknown: bool) -> Esdf<2> {
     let grid = tsdf.grid();
     let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
     let how = EsdfSettings { max_distance, method: method.method(), unknown, ..EsdfSettings::default() };
     Esdf::of(tsdf, &how)
 }
 
-/// The cells of the field of a 2-D map.
-pub(crate) fn dense_esdf_2d(tsdf: &Tsdf2, method: EsdfArg) -> DenseEsdf<2> {
-    esdf_2d(tsdf, method, false).dense(tsdf.grid())
+/// The cells of a map of the plane.
+pub(crate) fn dense_plane_esdf(tsdf: &Tsdf2, method: EsdfArg) -> EsdfGrid<2> {
+    plane_esdf(tsdf, method, false).dense(tsdf.grid())
 }
 
-/// The status plane of a file, where it holds more than NaN does.
-pub(crate) fn status_plane<const D: usize>(dense: &DenseEsdf<D>) -> Option<&[u8]> {
-    dense.status.contains(&2).then_some(&dense.status[..])
-}
-
-/// A field of samples that are known where they are numbers.
-pub(crate) fn known_where_finite<const D: usize>(grid: Grid<D>, distances: Vec<f32>) -> DenseEsdf<D> {
-    let status = distances.iter().map(|d| u8::from(!d.is_nan())).collect();
-    DenseEsdf { grid, distances, status }
+/// The status plane of a file, where there is something to say that NaN does not.
+pub(crate) fn status_plane<const D: usize>(dense: &EsdfGrid<D>) -> Option<Vec<u8>> {
+    dense.is_saturated().then(|| dense.status_bytes())
 }
 
 /// A 2-D field of distances to occupied and free cells.
@@ -68,7 +58,7 @@ pub(crate) fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> Esdf<2> {
 }
 
 /// Samples of a 2-D field as signed distances of weight 1, or 0 where they are NaN.
-pub(crate) fn tsdf_of_samples(grid: Grid<2>, samples: &[f32]) -> anyhow::Result<Tsdf<2>> {
+pub(crate) fn tsdf_of_samples(grid: Grid<2>, samples: &[f32]) -> anyhow::Result<Tsdf2> {
     let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
     let (distances, weights) = samples.iter().map(known).unzip();
     let planes = DistancePlanes::from_parts(distances, weights);

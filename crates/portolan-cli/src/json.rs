@@ -79,7 +79,7 @@ pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
 }
 
 /// What else was found in a 3-D log.
-pub(crate) fn space_log_stats(stats: &SpaceLogStats) -> Value {
+pub(crate) fn space_log_stats(stats: &ScanLogStats) -> Value {
     json!({
         "scans": stats.scans,
         "missing_files": stats.missing_files,

@@ -11,7 +11,6 @@ mod json;
 mod log;
 mod mapping;
 mod output;
-mod pictures;
 mod progress;
 mod saved;
 mod source;

@@ -1,49 +1,91 @@
 //! `map.portolan` of either dimension.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::bail;
-use portolan_io::{AnyMapFile, IoError, MapFile, MapHeader, SpaceMapFile};
+use portolan::store::Store;
+use portolan_io::{Container, IoError, MapFile, MapHeader, map_dimension};
 
 use crate::dimension::Dimension;
 
-/// Reads a map to go on with.
-///
-/// # Errors
-/// A file that is not a map or needs more than `memory` bytes, and a map of another dimension.
-pub(crate) fn read(path: &Path, memory: u64, log: Dimension) -> anyhow::Result<AnyMapFile> {
-    let file = AnyMapFile::read_within(path, memory)?;
-    if matches!(file, AnyMapFile::Plane(_)) != (log == Dimension::Two) {
-        bail!("{}: the map is not {} like the log; write to another folder", path.display(), log.word());
+/// A saved map.
+pub(crate) enum SavedMap {
+    Two(Box<MapFile<2>>),
+    Three(Box<MapFile<3>>),
+}
+
+impl SavedMap {
+    /// Reads a map that may take `memory` bytes.
+    ///
+    /// # Errors
+    /// A file that is not a map, or needs more.
+    pub(crate) fn read(path: &Path, memory: u64) -> Result<Self, IoError> {
+        let container = Container::read(path)?;
+        Ok(match map_dimension(&container)? {
+            3 => Self::Three(Box::new(MapFile::from_container(&container, memory)?)),
+            _ => Self::Two(Box::new(MapFile::from_container(&container, memory)?)),
+        })
     }
-    Ok(file)
-}
 
-pub(crate) fn in_2d(file: AnyMapFile) -> Option<Box<MapFile>> {
-    if let AnyMapFile::Plane(file) = file { Some(file) } else { None }
-}
-
-pub(crate) fn in_3d(file: AnyMapFile) -> Option<Box<SpaceMapFile>> {
-    if let AnyMapFile::Space(file) = file { Some(file) } else { None }
-}
-
-pub(crate) fn header(file: &AnyMapFile) -> &MapHeader {
-    match file {
-        AnyMapFile::Plane(file) => &file.header,
-        AnyMapFile::Space(file) => &file.header,
+    /// Reads a map to go on with.
+    ///
+    /// # Errors
+    /// As [`SavedMap::read`], and a map of another dimension.
+    pub(crate) fn read_to_append(path: &Path, memory: u64, log: Dimension) -> anyhow::Result<Self> {
+        let file = Self::read(path, memory)?;
+        if matches!(file, Self::Two(_)) != (log == Dimension::Two) {
+            bail!("{}: the map is not {} like the log; write to another folder", path.display(), log.word());
+        }
+        Ok(file)
     }
-}
 
-pub(crate) fn header_mut(file: &mut AnyMapFile) -> &mut MapHeader {
-    match file {
-        AnyMapFile::Plane(file) => &mut file.header,
-        AnyMapFile::Space(file) => &mut file.header,
+    pub(crate) fn in_2d(self) -> Option<Box<MapFile<2>>> {
+        if let Self::Two(file) = self { Some(file) } else { None }
     }
-}
 
-pub(crate) fn write(file: &AnyMapFile, path: &Path) -> Result<(), IoError> {
-    match file {
-        AnyMapFile::Plane(file) => file.write(path),
-        AnyMapFile::Space(file) => file.write(path),
+    pub(crate) fn in_3d(self) -> Option<Box<MapFile<3>>> {
+        if let Self::Three(file) = self { Some(file) } else { None }
+    }
+
+    pub(crate) fn header(&self) -> &MapHeader {
+        match self {
+            Self::Two(file) => &file.header,
+            Self::Three(file) => &file.header,
+        }
+    }
+
+    pub(crate) fn header_mut(&mut self) -> &mut MapHeader {
+        match self {
+            Self::Two(file) => &mut file.header,
+            Self::Three(file) => &mut file.header,
+        }
+    }
+
+    pub(crate) fn write(&self, path: &Path) -> Result<(), IoError> {
+        match self {
+            Self::Two(file) => file.write(path),
+            Self::Three(file) => file.write(path),
+        }
+    }
+
+    /// Bytes of each map, measured.
+    pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
+        let named = match self {
+            Self::Two(file) => [
+                ("grid", file.grid.as_ref().map(|map| map.memory_bytes())),
+                ("tree", file.tree.as_ref().map(|map| map.memory_bytes())),
+                ("tsdf", file.tsdf.as_ref().map(|map| map.memory_bytes())),
+            ],
+            Self::Three(file) => {
+                let colors = file.color_bricks.as_ref().map_or(0, |map| map.store.memory_bytes());
+                [
+                    ("grid", None),
+                    ("tree", file.occupancy_bricks.as_ref().map(|map| map.store.memory_bytes())),
+                    ("tsdf", file.tsdf_bricks.as_ref().map(|map| map.store.memory_bytes() + colors)),
+                ]
+            }
+        };
+        named.into_iter().filter_map(|(name, bytes)| Some((name, bytes?))).collect()
     }
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    CarmenLog, Container, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline, detect,
-    map_dimension, read_geojson,
+    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline,
+    detect, read_geojson,
 };
 
 use crate::dimension::{Dimension, Given};

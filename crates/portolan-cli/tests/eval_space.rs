@@ -9,10 +9,10 @@ use std::path::Path;
 
 use portolan::cell::DistanceBrick;
 use portolan::geom::{BlockKey, Lattice, Pose};
-use portolan::scan::{Frame, Pinhole, RangeImage};
+use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
 use portolan::store::Bricks;
 use portolan::sweep::WeightModel;
-use portolan_io::{LogLayout, LogWriter, MapFile, MapHeader, TsdfBricks};
+use portolan_io::{LogLayout, LogWriter, MapHeader, MapFile, TsdfBricks};
 use serde_json::{Map, Value, json as value};
 use support::{arg, fail, json, succeed};
 
@@ -107,9 +107,14 @@ fn ranges_of_scans_are_predicted() {
     // The camera stands in the map, 0.8 m before the true wall, and looks along x.
     let rotation = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]];
     let pose = Pose { rotation, translation: [0.2, 0.8, 0.8] };
-    let camera = Pinhole { fx: 40.0, fy: 40.0, cx: 9.5, cy: 4.5 };
-    let depths: Vec<f32> = (0..200).map(|i| if i < 20 { 0.0 } else { 0.8 }).collect();
-    let frame = Frame::Image(RangeImage::from_depth(camera, 20, 10, depths));
+    let frame = Frame::Image(RangeImage {
+        projection: Projection::Pinhole(Pinhole { fx: 40.0, fy: 40.0, cx: 9.5, cy: 4.5 }),
+        columns: 20,
+        rows: 10,
+        values: (0..200).map(|i| if i < 20 { 0.0 } else { 0.8 }).collect(),
+        colors: Vec::new(),
+        refused: RefusedBeams::default(),
+    });
     for scan in 0..4 {
         writer.push(&pose, f64::from(scan), &frame).unwrap();
     }

@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
-use portolan::field::{Esdf, EsdfSettings};
-use portolan::map::{Tsdf, Tsdf2, Tsdf3, TsdfConfig};
+use portolan::field::{SparseEsdf, SparseEsdfSettings};
+use portolan::map::{Tsdf3, TsdfConfig, Tsdf, Tsdf2, TsdfConfig, TsdfConfig};
 use portolan::plan::{Demand, Waypoints, check_path};
 use portolan::store::Bricks;
 
@@ -21,8 +21,8 @@ fn wall_2d() -> Tsdf2 {
 #[test]
 fn in_2d() {
     let tsdf = wall_2d();
-    let how = EsdfSettings { unknown: true, ..Default::default() };
-    let field = Esdf::of(&tsdf, &how);
+    let how = SparseEsdfSettings { unknown: true, ..Default::default() };
+    let field = SparseEsdf::of_tsdf(&tsdf, &how);
     let path = Waypoints::new(vec![[0.5, 0.5], [2.5, 1.5], [2.5, 2.4]]).unwrap();
     assert!(check_path(&field, &path, &Demand::new(0.4)).is_certified());
     assert!(!check_path(&field, &path, &Demand::new(0.55)).is_certified());
@@ -34,7 +34,7 @@ fn in_3d() {
     let path = Waypoints::new(vec![[0.5, 0.5, 0.5], [1.5, 1.0, 1.5], [1.5, 1.5, 1.0]]).unwrap();
     // Nothing was seen yet: nothing is certified.
     let unseen = Tsdf3::new(TsdfConfig::default()).unwrap();
-    let field = Esdf::of(unseen.store(), &how);
+    let field = SparseEsdf::of(unseen.store(), &how);
     assert!(!check_path(&field, &path, &Demand::new(0.3)).is_certified());
     // A wall at x = 2.
     let mut tsdf = Tsdf::<3>::new(TsdfConfig { cells: [48; 3], ..Default::default() }).unwrap();
@@ -43,7 +43,7 @@ fn in_3d() {
         let d = 2.0 - tsdf.grid().lattice.center(cell)[0];
         tsdf.fuse(cell, d, 1.0);
     });
-    let field = Esdf::of(&Bricks::from(tsdf.store()), &how);
+    let field = SparseEsdf::of(&Bricks::from(tsdf.store()), &how);
     assert!(check_path(&field, &path, &Demand::new(0.45)).is_certified());
     assert!(!check_path(&field, &path, &Demand::new(0.55)).is_certified());
 }

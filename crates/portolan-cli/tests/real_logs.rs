@@ -38,7 +38,7 @@ struct Limits {
 
 // The aim is a median of 3 cm and 85 % within two cells for both logs, and 3 % doubled contour. What is measured, with
 // free space at the default weight of 0.3: Intel 22.4 mm, 85.0 %, 0.4 %; Freiburg 34.1 mm, 75.1 %, 0.6 %. (With the
-// textbook's weight of 1: Intel 26.3 mm, 82.1 %; Freiburg 43.3 mm, 68.0 %.)
+// chapter's weight of 1: Intel 26.3 mm, 82.1 %; Freiburg 43.3 mm, 68.0 %.)
 //
 // Freiburg misses the aim, and its poses are not the reason: 99.8 % of its held-out end points have a fused one within
 // 5 cm. Its rooms are full of table and chair legs, which are thinner than two cells: the beams that pass them carve

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use portolan::cell::{LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
-use portolan::field::DenseEsdf;
+use portolan::cell::{DistancePlanes, LogOdds8, LogOddsValue, OccupancyModel};
+use portolan::field::EsdfGrid;
 use portolan::geom::{Grid, Pose};
 use portolan::map::OccupancyGrid;
 use portolan::store::{Dense, Tree};
@@ -89,16 +89,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         Source::Map2(file) => convert_map2(file, target, args)?,
         Source::Map3(file) => convert_map3(file, target, args)?,
         Source::Server(map) => convert_server(map, target, args)?,
-        // The same file, its status plane included.
-        Source::Esdf(EsdfFile::Two(file)) if target == Target::Esdf => {
-            file.write(&args.out).map(|()| true)?
+        Source::Esdf(EsdfFile::Two(field)) => {
+            if target == Target::Esdf {
+                write_whole(field, args)?
+            } else {
+                convert_esdf(field, target, args)?
+            }
         }
-        Source::Esdf(EsdfFile::Three(file)) if target == Target::Esdf => {
-            file.write(&args.out).map(|()| true)?
-        }
-        Source::Esdf(EsdfFile::Two(file)) => {
-            convert_samples(file.grid, &field::of_file(file).distances, target, args)?
-        }
+        Source::Esdf(EsdfFile::Three(field)) if target == Target::Esdf => write_whole(field, args)?,
         Source::Contour(lines) => target == Target::Contour && write_contour(&args.out, lines)?,
         Source::Octomap(file) => convert_octomap(file, target, args)?,
         _ => false,
@@ -242,7 +240,7 @@ fn convert_octomap(file: &OctomapTree, target: Target, args: &Args) -> anyhow::R
     Ok(true)
 }
 
-fn convert_samples(grid: Grid<2>, samples: &[f32], target: Target, args: &Args) -> anyhow::Result<bool> {
+fn convert_esdf(esdf: &EsdfGrid<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
     match target {
         Target::MapServer => {
             let cell = |d: &f32| match d {
@@ -259,6 +257,14 @@ fn convert_samples(grid: Grid<2>, samples: &[f32], target: Target, args: &Args) 
     Ok(true)
 }
 
+fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> EsdfGrid<2> {
+    EsdfGrid::from_mask(grid, |i| match cells[i] {
+        MapCell::Occupied => Some(true),
+        MapCell::Free => Some(false),
+        MapCell::Unknown => None,
+    })
+}
+
 /// Writes a distance field as `esdf.bin`, arrays or a costmap.
 fn write_field_as(field: &Field, target: Target, args: &Args) -> anyhow::Result<bool> {
     match (target, field) {
@@ -272,10 +278,17 @@ fn write_field_as(field: &Field, target: Target, args: &Args) -> anyhow::Result<
     Ok(true)
 }
 
-fn write_dense<const D: usize>(field: &DenseEsdf<D>, args: &Args) -> anyhow::Result<()> {
-    // In 3-D the status has always been written.
-    let status = if D == 3 { Some(&field.status[..]) } else { status_plane(field) };
-    Ok(write_esdf(&args.out, &field.grid, &field.distances, status)?)
+/// The same file: statuses only where it has them.
+fn write_whole<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Result<bool> {
+    let status = field.has_status().then(|| field.status_bytes());
+    write_esdf(&args.out, field.grid(), field.samples(), status.as_deref())?;
+    Ok(true)
+}
+
+fn write_dense<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Result<()> {
+    // In space the status has always been written.
+    let status = if D == 3 { Some(field.status_bytes()) } else { status_plane(field) };
+    Ok(write_esdf(&args.out, field.grid(), field.samples(), status.as_deref())?)
 }
 
 impl Args {
@@ -322,8 +335,13 @@ fn write_lines(contour: &Contour, args: &Args) -> anyhow::Result<bool> {
 }
 
 /// The zero level set of a distance field.
-fn contour_of(grid: Grid<2>, samples: &[f32]) -> anyhow::Result<Contour> {
-    let tsdf = tsdf_of_samples(grid, samples)?;
+fn contour_of(esdf: &EsdfGrid<2>) -> anyhow::Result<Contour> {
+    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
+    let (distances, weights) = esdf.samples().iter().map(known).unzip();
+    let planes = DistancePlanes::from_parts(distances, weights);
+    let store = planes.and_then(|p| Dense::from_planes(*esdf.grid(), p));
+    let Some(store) = store else { bail!("the distance field has values that are not finite") };
+    let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
     Ok(marching_squares(&tsdf, &ContourSettings::of(&tsdf)))
 }
 

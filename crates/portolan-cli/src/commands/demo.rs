@@ -9,21 +9,24 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use portolan::geom::{Grid, Pose};
-use portolan::scan::{Scan, ScanStats};
-use portolan_io::{Container, map_dimension, MapFile, write_atomic};
+use portolan::map::{BeamSweep, TsdfConfig};
+use portolan::scan::{RangeLimits, Scan, ScanStats};
+use portolan::sweep::WeightModel;
+use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
+use portolan_chapter::pictures::{self, Scene};
+use portolan_chapter::report::{self, Facts};
+use portolan_io::{MapFile, write_atomic};
 use portolan_sim::{LapConfig, Lidar, SEED};
 
 use self::found::Found;
 use super::gallery;
 use crate::arguments::ForgettingArgs;
-use crate::dimension::Dimension;
-use crate::experiment::{Drift, Forgetting, PoseSet};
-use crate::log::RangeArgs;
-use crate::mapping::{Artifacts, Derived, FusionReport, Maps, Maps2, Settings, fuse_2d};
+use crate::esdf::EsdfArg;
+use crate::json;
+use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, fuse};
 use crate::output::Output;
 use crate::progress::Progress;
-use crate::report::{self, Facts};
-use crate::{json, saved};
+use crate::saved::SavedMap;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan demo --out out")]
@@ -100,8 +103,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let grid = gallery::apartment_grid(RESOLUTION);
     let (mut file, fusion, bytes) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
     describe(&mut file, &settings, &config, &fusion.stats);
-    let derived = run.timed("derive", || Derived::of(&file, &settings, usize::MAX));
-    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &settings))?;
+    let derived = run.timed("derive", || Derived::of(&file, &settings));
+    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings)))?;
     let gallery =
         run.timed("gallery", || gallery::measure(&scans, &grid, &settings, PROBES, Some(&world)))?;
 
@@ -253,7 +256,7 @@ fn fused(
     grid: &Grid<2>,
     scans: &[(Pose<2>, Scan<2>)],
     output: Output,
-) -> anyhow::Result<(AnyMapFile, FusionReport, BTreeMap<&'static str, usize>)> {
+) -> anyhow::Result<(SavedMap, FusionReport, BTreeMap<&'static str, usize>)> {
     let mut maps = Maps2::new(settings, grid)?;
     let progress = Progress::new(scans.len(), "fusing", output);
     let mut file = MapFile::<2>::default();
@@ -261,12 +264,12 @@ fn fused(
     let bytes = maps.bytes();
     file.poses = scans.iter().map(|(pose, _)| *pose).collect();
     (file.grid, file.tree, file.tsdf) = (maps.grid, maps.tree, maps.tsdf);
-    Ok((AnyMapFile::Plane(Box::new(file)), fusion, bytes))
+    Ok((SavedMap::Two(Box::new(file)), fusion, bytes))
 }
 
 /// Writes into the file's header what it is made of.
-fn describe(file: &mut AnyMapFile, settings: &Settings, config: &LapConfig, stats: &ScanStats) {
-    let header = saved::header_mut(file);
+fn describe(file: &mut SavedMap, settings: &Settings, config: &LapConfig, stats: &ScanStats) {
+    let header = file.header_mut();
     header.logs.push(format!("simulated Apartment, seed {:#x}", config.seed));
     header.scans = stats.scans;
     header.settings = settings.to_json();

@@ -2,9 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use portolan::geom::Aabb;
+use portolan::Status;
+use portolan::field::EsdfGrid;
+use portolan::geom::{Aabb, Grid};
 use portolan::store::Store;
-use portolan_io::{EsdfBin, EsdfFile, FileKind, MapCell, MapServerMap, OctomapTree, Polyline, detect};
+use portolan_io::{CarmenLog, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
+use portolan_io::{OctomapTree, Polyline, detect_no_return};
 use serde_json::{Value, json};
 
 use crate::arguments::shown_bytes;
@@ -91,9 +94,51 @@ fn about(source: &Source) -> Value {
     }
 }
 
-fn of_esdf<const D: usize>(field: &EsdfBin<D>) -> Value {
-    let known = || field.distances.iter().copied().filter(|d| !d.is_nan());
-    let count = |status: u8| field.status.as_ref().map(|s| s.iter().filter(|&&v| v == status).count());
+fn of_map(file: &MapFile<2>) -> Value {
+    let header = &file.header;
+    let mut maps = json!({});
+    if let Some(map) = &file.grid {
+        maps["grid"] = json!({
+            "cell": "log odds, one byte",
+            "extent": json::grid(map.store().grid()),
+            "observed": map.observed_cells(),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    if let Some(map) = &file.tree {
+        maps["tree"] = json!({
+            "cell": "log odds, one byte",
+            "extent": json::aabb(&map.tree().grid().aabb()),
+            "depth": map.tree().depth(),
+            "nodes": map.tree().nodes(),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    if let Some(map) = &file.tsdf {
+        maps["tsdf"] = json!({
+            "cell": "signed distance and weight, f32",
+            "extent": json::grid(map.grid()),
+            "truncation": map.config().truncation,
+            "w_max": map.config().w_max.is_finite().then_some(map.config().w_max),
+            "observed": map.observed_cells(0.0),
+            "bytes": map.memory_bytes(),
+        });
+    }
+    json!({
+        "logs": header.logs,
+        "scans": header.scans,
+        "hold_out": header.hold_out,
+        "every": header.every,
+        "settings": header.settings,
+        "statistics": header.statistics,
+        "poses": file.poses.len(),
+        "maps": maps,
+    })
+}
+
+fn of_esdf<const D: usize>(field: &EsdfGrid<D>) -> Value {
+    let known = || field.samples().iter().copied().filter(|d| !d.is_nan());
+    let saturated = || (0..field.samples().len()).filter(|&i| field.status(i) == Status::Saturated).count();
     json!({
         "dimension": D,
         "extent": json::grid::<D>(field.grid()),

@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use portolan::geom::Aabb;
 use portolan::scan::ScanStats;
-use portolan_io::{Container, map_dimension, detect_no_return, write_atomic};
+use portolan_io::{detect_no_return, write_atomic};
 
 use crate::arguments::{box3, bytes};
 use crate::dimension::{Dimension, Given, ONLY_3D};
@@ -18,6 +18,7 @@ use crate::mapping::{Artifacts, Derived, Limits, MapKind, Mapper, Settings, Summ
 use crate::output::Output;
 use crate::progress::Progress;
 use crate::{json, saved};
+use crate::saved::SavedMap;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  portolan map intel-corrected.log.gz --resolution 0.05 --out intel\n  \
@@ -84,7 +85,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 
     let derived = Derived::of(&file, &settings, memory);
     bytes.extend(derived.bytes());
-    let header = saved::header(&file);
+    let header = file.header();
     let title = title(&header.logs, settings.resolution(), header.scans);
     let (dense, camera) = (args.dense, log.is_of_camera());
     let written = Artifacts { file: &file, derived: &derived, dense, camera, title }.write(&args.out)?;
@@ -120,8 +121,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// Writes into the file's header what it is made of.
-fn describe(file: &mut AnyMapFile, settings: &Settings, log: &Log, stats: &ScanStats) {
-    let header = saved::header_mut(file);
+fn describe(file: &mut SavedMap, settings: &Settings, log: &Log, stats: &ScanStats) {
+    let header = file.header_mut();
     header.logs.push(log.name());
     header.scans += stats.scans;
     header.every = settings.every;
@@ -136,7 +137,7 @@ impl Args {
     }
 
     /// The map to go on with. Without one, a folder that cannot be written to is found out before the work.
-    fn saved_map(&self, dimension: Dimension) -> anyhow::Result<Option<AnyMapFile>> {
+    fn saved_map(&self, dimension: Dimension) -> anyhow::Result<Option<SavedMap>> {
         if self.append {
             return saved::read(&self.map_path(), self.memory, dimension).map(Some);
         }
@@ -152,9 +153,9 @@ impl Args {
     }
 
     /// What was given, else what the map to go on with was made with, else the defaults.
-    fn settings(&self, dimension: Dimension, before: Option<&AnyMapFile>) -> anyhow::Result<Settings> {
+    fn settings(&self, dimension: Dimension, before: Option<&SavedMap>) -> anyhow::Result<Settings> {
         let map = self.map_path().display().to_string();
-        let saved = before.map(|file| &saved::header(file).settings);
+        let saved = before.map(|file| &file.header().settings);
         let base = saved.map(Settings::of_saved).unwrap_or_default();
         let settings = self.settings.over(base)?.resolved(dimension);
         settings.check(dimension)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use portolan::surface::{Ambiguity, ContourSettings, MeshSettings, marching_cubes, marching_squares};
-use portolan_io::MapFile;
+use portolan_io::{MapFile};
 use serde_json::json;
 
 use crate::arguments::weight_or_zero;
@@ -85,8 +85,8 @@ fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     )
 }
 
-fn mesh(args: &Args, file: &SpaceMapFile) -> anyhow::Result<()> {
-    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
+fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
+    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
     let usual = mesh_settings(tsdf.weights);
     let settings = MeshSettings { min_weight: args.min_weight.or(usual.min_weight), ..usual };
     let mesh = marching_cubes(&tsdf.store, file.color_bricks.as_ref().map(|c| &c.store), &settings);

@@ -10,10 +10,9 @@ use portolan::geom::Pose;
 use portolan::map::Occupancy;
 use portolan::sweep::OccupancySweep;
 use portolan::store::Store;
-use portolan::sweep::OccupancySweep;
 use portolan_io::{
-    AnswerRow, EsdfBin, EsdfFile, HELD_BACK, Input, MapFile, MapServerMap, OctomapTree, QueryPoints,
-    SpaceMapFile, certified_reach, write_answer, write_answer_header,
+    AnswerRow, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
+    certified_reach, write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
@@ -152,12 +151,8 @@ struct Certified<const D: usize> {
     limit: f64,
 }
 
-/// Distances and, with the accurate method, certified bounds of a field in bricks.
-fn sparse<const D: usize>(
-    field: SparseEsdf<D>,
-    limit: f64,
-    args: &Args,
-) -> (Distance<D>, Option<Certified<D>>) {
+/// What a field in bricks answers. Only the accurate method certifies.
+fn sparse<const D: usize>(field: Esdf<D>, limit: f64, args: &Args) -> (Distance<D>, Option<Certified<D>>) {
     let unknown = args.unknown.map_or(UnknownSpace::Optimistic, UnknownArg::space);
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
     let reach = certified_reach(&field);
@@ -173,9 +168,9 @@ fn dense<const D: usize>(esdf: EsdfGrid<D>) -> Distance<D> {
 impl Fields {
     fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
-            Source::Map2(file) => Self::Two(of_map2(*file, args)),
-            Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)?),
-            Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)?),
+            Source::Map(file) => Self::Two(of_map(*file, args)),
+            Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)),
+            Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)),
             Source::Server(map) => Self::Two(of_server(map)),
             Source::Map3(file) => Self::Three(of_map3(*file, args)?),
             Source::Octomap(file) => Self::Three(of_octomap(*file)),
@@ -234,7 +229,7 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     });
     let (distance, clearance) =
         field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
-    let occupancy: Occupancy<3> = match (file.occupancy_bricks, file.tsdf_bricks) {
+    let occupancy: Occupancy<3> = match (file.occupancy, file.tsdf) {
         (Some(map), _) => {
             let map = Occupancy::from_store(map.store, map.model, OccupancySweep::Auto)?;
             Box::new(move |p| map.probability(p))
@@ -282,6 +277,15 @@ fn of_octomap(file: OctomapTree) -> Field<3> {
 /// P(occupied) of log odds.
 fn logistic(log_odds: f32) -> f64 {
     1.0 / (1.0 + (-f64::from(log_odds)).exp())
+}
+
+/// The distance field of a map_server map, in its own frame.
+pub(super) fn esdf_of_server(map: &MapServerMap) -> EsdfGrid<2> {
+    EsdfGrid::from_mask(map.grid, |i| match map.cells[i] {
+        MapCell::Occupied => Some(true),
+        MapCell::Free => Some(false),
+        MapCell::Unknown => None,
+    })
 }
 
 impl<const D: usize> Field<D> {

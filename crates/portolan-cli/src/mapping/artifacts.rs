@@ -8,17 +8,18 @@ use std::time::Instant;
 use portolan::cell::LogOddsRule;
 use portolan::geom::Aabb;
 use portolan_io::{
-    Container, map_dimension, IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server,
+    IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server,
     write_octomap_bt, write_octomap_ot, write_svg,
 };
 
 use super::files::{dense_esdf, polylines, write_mesh};
 use super::{Derived, DistanceField, cells_for_map_server, picture, preview};
 use crate::stale::remove_stale;
+use crate::saved::SavedMap;
 
 /// Everything that is written.
 pub(crate) struct Artifacts<'a> {
-    pub(crate) file: &'a AnyMapFile,
+    pub(crate) file: &'a SavedMap,
     pub(crate) derived: &'a Derived,
     /// The box of a 3-D distance field that goes into `esdf.bin`; `None`: all of it.
     pub(crate) dense: Option<Aabb<3>>,
@@ -69,7 +70,7 @@ impl Artifacts<'_> {
     }
 
     fn write_octree(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
-        let AnyMapFile::Space(file) = self.file else { return Ok(()) };
+        let SavedMap::Three(file) = self.file else { return Ok(()) };
         let (Some(tree), Some(map)) = (&self.derived.octree, &file.occupancy) else { return Ok(()) };
         let rule = LogOddsRule::<i8>::new(&map.model)?;
         let bt = write_octomap_bt(folder.join("octree.bt"), tree);
@@ -105,7 +106,7 @@ impl Artifacts<'_> {
     }
 
     fn write_map_server(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
-        let AnyMapFile::Plane(file) = self.file else { return Ok(()) };
+        let SavedMap::Two(file) = self.file else { return Ok(()) };
         if let Some((grid, cells)) = cells_for_map_server(file) {
             write_map_server(folder.join("map.yaml"), &grid, &cells)?;
             written.files.extend(["map.pgm", "map.yaml"]);
@@ -117,10 +118,10 @@ impl Artifacts<'_> {
     fn write_picture(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
         let start = Instant::now();
         let (stage, name, png) = match self.file {
-            AnyMapFile::Plane(file) => {
+            SavedMap::Two(file) => {
                 ("picture", "map.png", picture::of_map(file, self.derived, &self.title))
             }
-            AnyMapFile::Space(file) => {
+            SavedMap::Three(file) => {
                 let mesh = self.derived.mesh.as_ref();
                 let png = mesh.and_then(|mesh| preview::of_mesh(mesh, &file.poses, self.camera, &self.title));
                 ("preview", "preview.png", png)

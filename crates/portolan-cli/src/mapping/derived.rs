@@ -9,12 +9,13 @@ use portolan::map::{DerivedField, Tsdf};
 use portolan::store::{Store, Tree};
 use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, ThinWalls};
 use portolan::surface::{doubled_length, marching_cubes, marching_squares, thin_walls};
-use portolan_io::{Container, map_dimension, MapFile, TsdfBricks};
+use portolan_io::{MapFile, TsdfBricks};
 
 use super::recipe::{esdf_settings, mesh_settings};
 use super::{MapKind, Settings};
 use crate::arguments::shown_bytes;
 use crate::esdf::{dense_esdf_2d, status_plane};
+use crate::saved::SavedMap;
 
 /// Contours nearer to each other than this and facing the same way are one wall seen twice (metres).
 const DOUBLED_REACH: f64 = 0.15;
@@ -48,10 +49,10 @@ pub(crate) enum DistanceField {
 
 impl Derived {
     /// `memory`: what maps and fields may take together (bytes).
-    pub(crate) fn of(file: &AnyMapFile, settings: &Settings, memory: usize) -> Self {
+    pub(crate) fn of(file: &SavedMap, settings: &Settings, memory: usize) -> Self {
         match file {
-            AnyMapFile::Plane(file) => Self::of_2d(file, settings),
-            AnyMapFile::Space(file) => Self::of_3d(file, settings, memory),
+            SavedMap::Two(file) => Self::of_2d(file, settings),
+            SavedMap::Three(file) => Self::of_3d(file, settings, memory),
         }
     }
 

@@ -6,13 +6,13 @@ use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
 use portolan::geom::Pose;
-use portolan::map::MapError;
-use portolan::scan::{FrameFilter, Scan, ScanStats};
+use portolan::Mapper;
+use portolan::map::{MapError, ScanKind};
+use portolan::mapper::Fused;
+use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
 use portolan_io::IoError;
 use portolan_io::scan_log::ScanLog;
 
-use super::maps::Filtered;
-use super::{Maps, Maps2, Maps3};
 use crate::progress::Progress;
 
 /// Frames that are read ahead.
@@ -36,10 +36,24 @@ pub(crate) struct FusionReport {
 }
 
 impl FusionReport {
-    /// A map has taken a scan.
-    pub(super) fn add(&mut self, map: &'static str, seconds: f64, stats: &ScanStats) {
-        *self.seconds.entry(map).or_default() += seconds;
-        *self.observations.entry(map).or_default() += stats.cells;
+    /// The maps have taken a scan: notes what each did. Gives the counts of the map that comes last.
+    fn add<const D: usize>(&mut self, fused: &Fused, scan: &impl LogScan<D>) -> ScanStats {
+        let occupancy = if D == 2 { "grid" } else { "tree" };
+        let maps = [(occupancy, fused.occupancy), ("tsdf", fused.distances)];
+        for ((name, stats), seconds) in maps.into_iter().zip(fused.seconds) {
+            if let Some(stats) = stats {
+                *self.seconds.entry(name).or_default() += seconds;
+                *self.observations.entry(name).or_default() += stats.cells;
+            }
+        }
+        let last = fused.stats();
+        let Some(counts) = scan.counts() else { return last };
+        // Points that share a row and column with a nearer one, or lie outside of all.
+        if scan.has_loose_points() {
+            self.without_pixel += last.beams.dropped.saturating_sub(counts.dropped);
+        }
+        // What the filter left out does not reach the maps.
+        ScanStats { beams: *counts, ..last }
     }
 
     fn leave_out(&mut self, why: String) {
@@ -51,16 +65,66 @@ impl FusionReport {
 /// A scan of a log: its number, its pose, and its readings, where they could be read.
 type Read<const D: usize, S> = (usize, Pose<D>, Result<S, IoError>);
 
+/// A scan of a log, and what a filter counted of it before the maps see it.
+trait LogScan<const D: usize> {
+    type Kind: ScanKind<D> + Sync;
+
+    fn scan(&self) -> &Self::Kind;
+
+    fn counts(&self) -> Option<&BeamCounts>;
+
+    /// Whether points have lost rows and columns on the way into the maps.
+    fn has_loose_points(&self) -> bool;
+}
+
+impl LogScan<2> for Scan<2> {
+    type Kind = Self;
+
+    fn scan(&self) -> &Self {
+        self
+    }
+
+    fn counts(&self) -> Option<&BeamCounts> {
+        None
+    }
+
+    fn has_loose_points(&self) -> bool {
+        false
+    }
+}
+
+/// A frame of a log and what its filter counted.
+struct Filtered {
+    frame: Frame,
+    counts: BeamCounts,
+}
+
+impl LogScan<3> for Filtered {
+    type Kind = Frame;
+
+    fn scan(&self) -> &Frame {
+        &self.frame
+    }
+
+    fn counts(&self) -> Option<&BeamCounts> {
+        Some(&self.counts)
+    }
+
+    fn has_loose_points(&self) -> bool {
+        matches!(&self.frame, Frame::Points(scan) if scan.image.is_none())
+    }
+}
+
 /// Fuses 2-D scans, in order. The result does not depend on the number of threads.
 pub(crate) fn fuse_2d(
-    maps: &mut Maps2,
+    mapper: &mut Mapper<2>,
     scans: &[(Pose<2>, Scan<2>)],
     poses: &mut Vec<Pose<2>>,
     progress: &Progress,
 ) -> FusionReport {
     let scans = scans.iter().enumerate().map(|(i, (pose, scan))| (i, *pose, Ok(scan)));
     // On a worker thread: from there the maps of a scan are shared out to the others without a detour.
-    rayon::scope(|_| fuse(maps, scans, "", poses, progress))
+    rayon::scope(|_| fuse(mapper, scans, "", poses, progress))
 }
 
 /// Frames of a 3-D log.
@@ -83,7 +147,7 @@ impl Frames<'_> {
 /// Fuses these frames of a log, in order, the next being read while one is fused. The result does not depend on the
 /// number of threads.
 pub(crate) fn fuse_3d(
-    maps: &mut Maps3,
+    mapper: &mut Mapper<3>,
     frames: &Frames,
     poses: &mut Vec<Pose<3>>,
     threads: usize,
@@ -92,29 +156,36 @@ pub(crate) fn fuse_3d(
     let name = frames.log.path().display().to_string();
     let mut read = frames.indices.iter().map(|i| frames.read(i));
     if threads == 1 {
-        return fuse(maps, read, &name, poses, progress);
+        return fuse(mapper, read, &name, poses, progress);
     }
     std::thread::scope(|scope| {
         let (send, receive) = sync_channel::<Read<3, Filtered>>(AHEAD);
         // Sending fails where fusing has ended early.
         scope.spawn(move || read.try_for_each(|frame| send.send(frame)));
-        fuse(maps, receive.into_iter(), &name, poses, progress)
+        fuse(mapper, receive.into_iter(), &name, poses, progress)
     })
 }
 
 /// The loop. Poses of scans that were fused are added to `poses`.
-fn fuse<const D: usize, M: Maps<D>, S: Borrow<M::Scan>>(
-    maps: &mut M,
+fn fuse<const D: usize, L: LogScan<D>, S: Borrow<L>>(
+    mapper: &mut Mapper<D>,
     scans: impl Iterator<Item = Read<D, S>>,
     log: &str,
     poses: &mut Vec<Pose<D>>,
     progress: &Progress,
 ) -> FusionReport {
     let mut report = FusionReport::default();
-    let mut waiting = Instant::now();
+    let start = Instant::now();
+    let clock = || start.elapsed().as_secs_f64();
+    let mut waiting = clock();
     for (i, pose, scan) in scans {
-        *report.seconds.entry("frames").or_default() += waiting.elapsed().as_secs_f64();
-        match scan.map(|scan| maps.integrate(&pose, scan.borrow(), &mut report)) {
+        *report.seconds.entry("frames").or_default() += clock() - waiting;
+        let fused = scan.map(|scan| {
+            let scan: &L = scan.borrow();
+            let fused = mapper.integrate_timed(&pose, scan.scan(), &clock)?;
+            Ok(report.add(&fused, scan))
+        });
+        match fused {
             Ok(Ok(stats)) => {
                 if stats.scans > 0 {
                     poses.push(pose);
@@ -129,8 +200,8 @@ fn fuse<const D: usize, M: Maps<D>, S: Borrow<M::Scan>>(
             Err(error) => report.leave_out(error.to_string()),
         }
         progress.add(1);
-        progress.holding(|| maps.bytes().values().sum());
-        waiting = Instant::now();
+        progress.holding(|| mapper.memory_bytes());
+        waiting = clock();
     }
     report
 }

@@ -1,24 +1,22 @@
 //! From a log to fused maps: what of a run differs by dimension.
 
-use std::collections::BTreeMap;
-
-use anyhow::bail;
+use anyhow::{anyhow, bail};
+use portolan::Mapper;
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Occupancy, Tsdf3};
+use portolan::map::{Occupancy, OccupancyGrid, OccupancyTree, Tsdf, Tsdf2};
 use portolan::scan::Scan;
-use portolan::store::Store;
+use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan_io::scan_log::ScanLog;
-use portolan_io::{Container, map_dimension, CarmenLog, ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
+use portolan_io::{CarmenLog, ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
 use serde_json::Map;
 
 use super::extent::{Extent, check_memory, grid_over, seen, with_outlier};
 use super::fuse::{Frames, FusionReport, fuse_2d, fuse_3d};
-use super::grow::grown;
 use super::map_server::grid_of;
-use super::{MapKind, Maps, Maps2, Maps3, Settings, recipe};
+use super::{MapKind, Settings, recipe};
 use crate::log::{self, Log};
 use crate::progress::Progress;
-use crate::saved;
+use crate::saved::SavedMap;
 
 /// What a run may use, and the names that its errors give.
 pub(crate) struct Limits<'a> {
@@ -31,27 +29,27 @@ pub(crate) struct Limits<'a> {
 }
 
 /// Scans that are to be fused, and the maps for them.
-pub(crate) enum Mapper<'a> {
-    Two { scans: Vec<(Pose<2>, Scan<2>)>, grid: Grid<2>, maps: Maps2, file: Box<MapFile<2>> },
-    Three { frames: Frames<'a>, maps: Maps3, file: Box<MapFile<3>> },
+pub(crate) enum Run<'a> {
+    Two { scans: Vec<(Pose<2>, Scan<2>)>, grid: Grid<2>, mapper: Box<Mapper<2>>, file: Box<MapFile<2>> },
+    Three { frames: Frames<'a>, mapper: Box<Mapper<3>>, file: Box<MapFile<3>> },
 }
 
-impl<'a> Mapper<'a> {
+impl<'a> Run<'a> {
     /// Prepares to fuse these scans of a log into new maps, or into those of a file.
     pub(crate) fn new(
         log: &'a Log,
         indices: &'a [usize],
         settings: &Settings,
-        before: Option<AnyMapFile>,
+        before: Option<SavedMap>,
         limits: &Limits,
     ) -> anyhow::Result<Self> {
         match log {
-            Log::Two(log) => Self::new_2d(log, indices, settings, before.and_then(saved::in_2d), limits),
-            Log::Three(log) => Self::new_3d(log, indices, settings, before.and_then(saved::in_3d), limits),
+            Log::Two(log) => Self::new_2d(log, indices, settings, before.and_then(SavedMap::in_2d), limits),
+            Log::Three(log) => Self::new_3d(log, indices, settings, before.and_then(SavedMap::in_3d), limits),
         }
     }
 
-    /// Dense maps over the box of all that the scans see: these are read first.
+    /// Maps over the box of all that the scans see, which become dense in the end: scans are read first.
     fn new_2d(
         log: &CarmenLog,
         indices: &[usize],
@@ -66,19 +64,9 @@ impl<'a> Mapper<'a> {
                 check_memory(&grid, settings, &scans, limits.memory as u64, limits.log).map(|()| grid)
             })
             .map_err(|error| with_outlier(error, &scans))?;
-        let Some(mut file) = before else {
-            let maps = Maps2::new(settings, &grid)?;
-            return Ok(Self::Two { scans, grid, maps, file: Box::default() });
-        };
-        let carve = settings.shape.carve;
-        let saved = Maps2 { grid: file.grid.take(), tree: file.tree.take(), tsdf: file.tsdf.take(), carve };
-        let held = [
-            (MapKind::Grid, saved.grid.is_some()),
-            (MapKind::Tree, saved.tree.is_some()),
-            (MapKind::Tsdf, saved.tsdf.is_some()),
-        ];
-        check_held(settings, &held, limits.map)?;
-        Ok(Self::Two { scans, grid, maps: grown(saved, &grid)?, file })
+        let mut file = before.unwrap_or_default();
+        let mapper = Box::new(mapper_2d(&mut file, settings, &grid, limits)?);
+        Ok(Self::Two { scans, grid, mapper, file })
     }
 
     /// Maps in bricks, which grow with what is seen: frames are read while they are fused.
@@ -89,23 +77,11 @@ impl<'a> Mapper<'a> {
         before: Option<Box<MapFile<3>>>,
         limits: &Limits,
     ) -> anyhow::Result<Self> {
-        let bounds = settings.bounds.map(|bounds| bounds.in_3d("the log")).transpose()?;
         let filter = settings.shape.range.filter(settings.shape.self_filter.clone())?;
         let frames = Frames { log, indices, filter };
-        let (mut maps, file) = match before {
-            Some(mut file) => (saved_3d(&mut file, settings, limits)?, file),
-            None => {
-                let origin = recipe::origin(log.pose(0).translation, settings.resolution());
-                (Maps3::new(settings, origin, limits.memory)?, Box::default())
-            }
-        };
-        if let Some(map) = &mut maps.occupancy {
-            map.set_bounds(bounds);
-        }
-        if let Some(map) = &mut maps.tsdf {
-            map.set_bounds(bounds);
-        }
-        Ok(Self::Three { frames, maps, file })
+        let mut file = before.unwrap_or_default();
+        let mapper = Box::new(mapper_3d(&mut file, settings, log.pose(0), limits)?);
+        Ok(Self::Three { frames, mapper, file })
     }
 
     /// Number of scans.
@@ -119,30 +95,27 @@ impl<'a> Mapper<'a> {
     /// Fuses all scans, in order.
     pub(crate) fn fuse(&mut self, threads: usize, progress: &Progress) -> FusionReport {
         match self {
-            Self::Two { scans, maps, file, .. } => fuse_2d(maps, scans, &mut file.poses, progress),
-            Self::Three { frames, maps, file } => fuse_3d(maps, frames, &mut file.poses, threads, progress),
-        }
-    }
-
-    /// Bytes of each map, measured.
-    pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
-        match self {
-            Self::Two { maps, .. } => maps.bytes(),
-            Self::Three { maps, .. } => maps.bytes(),
+            Self::Two { scans, mapper, file, .. } => fuse_2d(mapper, scans, &mut file.poses, progress),
+            Self::Three { frames, mapper, file } => {
+                fuse_3d(mapper, frames, &mut file.poses, threads, progress)
+            }
         }
     }
 
     /// The maps as a file, and the box that they cover.
-    pub(crate) fn finish(self) -> (AnyMapFile, Extent) {
+    ///
+    /// # Errors
+    /// Where 2-D maps do not fit the grid that they were made for.
+    pub(crate) fn finish(self, settings: &Settings) -> anyhow::Result<(SavedMap, Extent)> {
         match self {
-            Self::Two { grid, maps, mut file, .. } => {
-                (file.grid, file.tree, file.tsdf) = (maps.grid, maps.tree, maps.tsdf);
-                (AnyMapFile::Plane(file), Extent::Two(grid))
+            Self::Two { grid, mapper, mut file, .. } => {
+                store_2d(*mapper, settings, &grid, &mut file)?;
+                Ok((SavedMap::Two(file), Extent::Two(grid)))
             }
-            Self::Three { maps, mut file, .. } => {
-                store_3d(maps, &mut file);
+            Self::Three { mapper, mut file, .. } => {
+                store_3d(*mapper, &mut file);
                 let extent = Extent::of_bricks(&file);
-                (AnyMapFile::Space(file), extent)
+                Ok((SavedMap::Three(file), extent))
             }
         }
     }
@@ -159,32 +132,114 @@ fn check_held(settings: &Settings, held: &[(MapKind, bool)], map: &str) -> anyho
     }
 }
 
-/// The maps of a file, to go on with; they are taken out of it.
-fn saved_3d(file: &mut MapFile<3>, settings: &Settings, limits: &Limits) -> anyhow::Result<Maps3> {
-    let held = [(MapKind::Tree, file.occupancy.is_some()), (MapKind::Tsdf, file.tsdf.is_some())];
+/// New maps on the lattice of a grid, or those of a file, which are taken out of it.
+pub(crate) fn mapper_2d(
+    file: &mut MapFile<2>,
+    settings: &Settings,
+    grid: &Grid<2>,
+    limits: &Limits,
+) -> anyhow::Result<Mapper<2>> {
+    let how = recipe::mapper_settings(settings, Some(grid.lattice.origin), Some(grid.aabb()), limits.memory);
+    let held = [
+        (MapKind::Grid, file.grid.is_some()),
+        (MapKind::Tree, file.tree.is_some()),
+        (MapKind::Tsdf, file.tsdf.is_some()),
+    ];
+    if held.iter().all(|(_, held)| !held) {
+        let mut mapper = Mapper::with(how);
+        mapper.prepare(grid.lattice.origin)?;
+        return Ok(mapper);
+    }
     check_held(settings, &held, limits.map)?;
-    let occupancy = file
-        .occupancy
-        .take()
-        .map(|o| Occupancy::from_store(o.store, o.model, settings.sweep().in_3d()));
-    let tsdf = file.tsdf.take().map(|t| {
-        let config = recipe::tsdf_3d(settings, t.store.lattice().origin);
-        Tsdf3::from_stores(t.store, file.colors.take().map(|c| c.store), config)
+    let lost = || anyhow!("the saved map does not fit the lattice of the new grid; write to another folder");
+    let occupancy = match (file.grid.take(), file.tree.take()) {
+        (Some(map), _) => {
+            let store = Bricks::of_dense(map.store(), grid.lattice).ok_or_else(lost)?;
+            Some(Occupancy::<2>::from_store(store, *map.model())?)
+        }
+        (None, Some(map)) => {
+            let own = map.store().to_bricks(*map.store().lattice(), limits.memory)?;
+            let dense = Dense::of_bricks(&own, *grid).ok_or_else(lost)?;
+            let store = Bricks::of_dense(&dense, grid.lattice).ok_or_else(lost)?;
+            Some(Occupancy::<2>::from_store(store, *map.model())?)
+        }
+        (None, None) => None,
+    };
+    let tsdf = file.tsdf.take().map(|map| {
+        let store = Bricks::of_dense(map.store(), grid.lattice).ok_or_else(lost)?;
+        anyhow::Ok(Tsdf::<2>::from_stores(store, None, *map.config())?)
     });
-    Ok(Maps3 { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()?, memory: limits.memory })
+    Ok(Mapper::of_maps(how, occupancy, tsdf.transpose()?)?)
+}
+
+/// Puts the maps into a file, as arrays over the grid and as a tree over it.
+pub(crate) fn store_2d(
+    mapper: Mapper<2>,
+    settings: &Settings,
+    grid: &Grid<2>,
+    file: &mut MapFile<2>,
+) -> anyhow::Result<()> {
+    let lost = || anyhow!("the maps do not fit their grid");
+    let (occupancy, tsdf) = mapper.into_maps();
+    if let Some(map) = occupancy {
+        let model = *map.model();
+        let store = map.into_store();
+        if settings.wants(MapKind::Tree) {
+            let tree = Tree::covering(grid).and_then(|tree| tree.with_bricks(&store)).ok_or_else(lost)?;
+            file.tree = Some(OccupancyTree::from_store(tree, model)?);
+        }
+        if settings.wants(MapKind::Grid) {
+            let dense = Dense::of_bricks(&store, *grid).ok_or_else(lost)?;
+            file.grid = Some(OccupancyGrid::from_store(dense, model)?);
+        }
+    }
+    if let Some(map) = tsdf {
+        let config = *map.config();
+        let (store, _) = map.into_stores();
+        let dense = Dense::of_bricks(&store, *grid).ok_or_else(lost)?;
+        file.tsdf = Some(Tsdf2::from_stores(dense, None, config)?);
+    }
+    Ok(())
+}
+
+/// New maps on a lattice that fits the first pose, or those of a file, which are taken out of it.
+fn mapper_3d(
+    file: &mut MapFile<3>,
+    settings: &Settings,
+    first: &Pose<3>,
+    limits: &Limits,
+) -> anyhow::Result<Mapper<3>> {
+    let bounds = settings.bounds.map(|bounds| bounds.in_3d("the log")).transpose()?;
+    let how = recipe::mapper_settings(settings, None, bounds, limits.memory);
+    let held =
+        [(MapKind::Tree, file.occupancy_bricks.is_some()), (MapKind::Tsdf, file.tsdf_bricks.is_some())];
+    if held.iter().all(|(_, held)| !held) {
+        let mut mapper = Mapper::with(how);
+        mapper.prepare(first.translation)?;
+        return Ok(mapper);
+    }
+    check_held(settings, &held, limits.map)?;
+    let occupancy = file.occupancy_bricks.take().map(|o| Occupancy::<3>::from_store(o.store, o.model));
+    let tsdf = file.tsdf_bricks.take().map(|t| {
+        let config = how.tsdf(t.store.lattice().origin);
+        Tsdf::<3>::from_stores(t.store, file.color_bricks.take().map(|c| c.store), config)
+    });
+    Ok(Mapper::of_maps(how, occupancy.transpose()?, tsdf.transpose()?)?)
 }
 
 /// Puts the maps into a file.
-fn store_3d(maps: Maps3, file: &mut MapFile<3>) {
-    file.occupancy = maps.occupancy.map(|map| {
+fn store_3d(mapper: Mapper<3>, file: &mut MapFile<3>) {
+    let (occupancy, tsdf) = mapper.into_maps();
+    file.occupancy_bricks = occupancy.map(|map| {
         let model = *map.model();
         OccupancyBricks { store: map.into_store(), model, more: Map::new() }
     });
-    if let Some(map) = maps.tsdf {
+    if let Some(map) = tsdf {
         let config = *map.config();
         let (store, colors) = map.into_stores();
-        file.colors = colors.map(|store| ColorBricks { store, w_max: config.color_w_max, more: Map::new() });
-        file.tsdf = Some(TsdfBricks {
+        file.color_bricks =
+            colors.map(|store| ColorBricks { store, w_max: config.color_w_max, more: Map::new() });
+        file.tsdf_bricks = Some(TsdfBricks {
             store,
             truncation: config.truncation,
             w_max: config.w_max,

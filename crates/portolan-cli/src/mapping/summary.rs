@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use portolan_io::Container, map_dimension;
 use serde_json::{Value, json};
 
 use super::extent::Extent;
@@ -13,6 +12,7 @@ use crate::arguments::shown_bytes;
 use crate::dimension::Dimension;
 use crate::log::Log;
 use crate::{json, saved};
+use crate::saved::SavedMap;
 
 /// Everything that a run found out.
 pub(crate) struct Summary<'a> {
@@ -21,7 +21,7 @@ pub(crate) struct Summary<'a> {
     pub(crate) extent: Extent,
     pub(crate) held_out: usize,
     pub(crate) fusion: &'a FusionReport,
-    pub(crate) file: &'a AnyMapFile,
+    pub(crate) file: &'a SavedMap,
     pub(crate) derived: &'a Derived,
     /// What was not made or written, and why.
     pub(crate) notes: Vec<String>,
@@ -93,7 +93,7 @@ impl Summary<'_> {
     /// `summary.json`.
     pub(crate) fn to_json(&self) -> Value {
         let stats = json::stats(&self.fusion.stats);
-        let header = saved::header(self.file);
+        let header = self.file.header();
         let settings = self.settings.to_json();
         let mut input = self.log.to_json();
         if self.settings.dimension == Dimension::Two {

@@ -209,9 +209,9 @@ impl ArrayArgs {
         [("layout", NpyArray::text(layout)), ("unknown", NpyArray::text(unknown))]
     }
 
-    /// The field without unknown cells: what they count as must be given where the field has some.
-    fn filled<const D: usize>(&self, field: &DenseEsdf<D>) -> anyhow::Result<Filled<D>> {
-        let unknown = field.distances.iter().filter(|d| d.is_nan()).count();
+    /// The field without unknown. What unknown is has to be said where there is any.
+    fn filled<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Filled<D>> {
+        let unknown = field.samples().iter().filter(|d| d.is_nan()).count();
         let space = match self.unknown {
             Some(unknown) => unknown.space(),
             None if unknown == 0 => UnknownSpace::Pessimistic,

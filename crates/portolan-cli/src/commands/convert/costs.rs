@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use portolan::field::{DenseEsdf, UnknownSpace};
+use anyhow::bail;
+use portolan::cell::DistancePlanes;
+use portolan::field::{EsdfGrid, UnknownSpace};
 use portolan::geom::Grid;
 use portolan::handover::{Inflation, lowest_between};
 use portolan_io::{MapMode, write_costmap};
@@ -76,8 +78,8 @@ impl CostArgs {
                          --unknown pessimistic (such a column is unknown)",
                     ));
                 };
-                let layer = layer_in_2d(field, heights, unknown)?;
-                (layer.grid, how.costs(&layer.distances))
+                let layer = in_the_plane(field, heights, unknown)?;
+                (*layer.grid(), how.costs(layer.samples()))
             }
         };
         let mode = match self.mode {
@@ -91,13 +93,19 @@ impl CostArgs {
     }
 }
 
-/// Distances in 2-D to the obstacles between two heights.
-fn layer_in_2d(
-    field: &DenseEsdf<3>,
+/// Distances in the plane to what stands between two heights.
+fn in_the_plane(
+    field: &EsdfGrid<3>,
     heights: [f64; 2],
     unknown: UnknownSpace,
-) -> anyhow::Result<DenseEsdf<2>> {
-    let (grid, lowest): (Grid<2>, _) = lowest_between(&field.grid, &field.distances, heights, unknown)?;
-    let tsdf = tsdf_of_samples(grid, &lowest)?;
-    Ok(dense_esdf_2d(&tsdf, EsdfArg::Accurate))
+) -> anyhow::Result<EsdfGrid<2>> {
+    let (grid, lowest): (Grid<2>, _) = lowest_between(field.grid(), field.samples(), heights, unknown)?;
+    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
+    let (distances, weights) = lowest.iter().map(known).unzip();
+    let planes = DistancePlanes::from_parts(distances, weights);
+    let Some(store) = planes.and_then(|p| Dense::from_planes(grid, p)) else {
+        bail!("the distance field has values that are not finite")
+    };
+    let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
+    Ok(dense_plane_esdf(&tsdf, EsdfArg::Accurate))
 }

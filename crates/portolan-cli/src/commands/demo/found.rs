@@ -4,14 +4,17 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::geom::Grid;
-use portolan_io::Container, map_dimension;
+use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
+use portolan_chapter::gallery::Gallery;
+use portolan_io::MapFile;
 use portolan_sim::{LapConfig, World};
 use serde_json::{Value, json};
 
 use super::Run;
-use crate::experiment::{Drift, Forgetting, PoseSet};
+use crate::json;
 use crate::mapping::{Derived, FusionReport, Settings};
 use crate::{json, saved};
+use crate::saved::SavedMap;
 
 /// Everything that a run found out.
 pub(super) struct Found<'a> {
@@ -22,7 +25,7 @@ pub(super) struct Found<'a> {
     pub(super) fusion: FusionReport,
     /// Bytes of each map, measured.
     pub(super) bytes: BTreeMap<&'static str, usize>,
-    pub(super) file: AnyMapFile,
+    pub(super) file: SavedMap,
     pub(super) derived: Derived,
     pub(super) gallery: &'a Gallery,
     pub(super) drift: &'a Drift,
