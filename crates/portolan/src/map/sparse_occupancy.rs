@@ -236,7 +236,7 @@ mod tests {
     use super::*;
     use crate::cell::LogOdds32;
     use crate::geom::BlockKey;
-    use crate::scan::{Beam, BeamKind, Origin, Pinhole, PointScan, RangeImage, RefusedBeams};
+    use crate::scan::{Beam, BeamKind, Origin, Pinhole, PointScan, RangeImage};
     use crate::sweep::CellBox;
 
     type Map = SparseOccupancy<LogOdds8>;
