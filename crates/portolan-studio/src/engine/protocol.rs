@@ -37,7 +37,7 @@ pub(super) enum View {
     Clearance,
     Radiance,
     #[serde(rename = "3d")]
-    View3d,
+    ThreeD,
 }
 
 /// An answer.

@@ -70,7 +70,7 @@ impl Session {
             View::Gallery => self.gallery.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Clearance => self.clearance.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Radiance => self.radiance.ask(&serde_json::from_str(ask)?),
-            View::View3d => self.view3d.ask(serde_json::from_str(ask)?),
+            View::ThreeD => self.view3d.ask(serde_json::from_str(ask)?),
         }?;
         let held = self.memory_bytes();
         if held > self.limits.memory {
@@ -100,7 +100,7 @@ impl Session {
             View::Gallery => self.gallery.forget(),
             View::Clearance => self.clearance.forget(),
             View::Radiance => self.radiance.forget(),
-            View::View3d => self.view3d.forget(),
+            View::ThreeD => self.view3d.forget(),
         }
     }
 }

@@ -60,7 +60,7 @@ pub(super) fn check(
         "clearance": clearance,
         "tolerance": demand.tolerance,
         "check": verdict(&whole),
-        "pieces": pieces.iter().map(Piece::to_json).collect::<Vec<_>>(),
+        "pieces": pieces.iter().map(Piece::as_json).collect::<Vec<_>>(),
         "lengths": {
             "certified": total(&pieces, |c| c.is_none()),
             "violated": total(&pieces, |c| c == Some(Cause::TooNear)),
@@ -137,7 +137,7 @@ fn name(field: &Esdf<2>, path: &Waypoints<2>, demand: &Demand, [from, to]: [f64;
 }
 
 impl Piece {
-    fn to_json(&self) -> Value {
+    fn as_json(&self) -> Value {
         json!({ "from": self.from, "to": self.to, "verdict": self.verdict(), "cause": self.cause.map(word) })
     }
 

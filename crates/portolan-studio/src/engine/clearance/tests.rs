@@ -1,4 +1,4 @@
-//! What the page is told is what the library computes.
+//! What the page gets is what the library computes.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -20,7 +20,7 @@ use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Source2d};
 
 /// Scans that one question may fuse: more would keep the page waiting for its picture.
 const MOST_STEPS: usize = 256;
-/// Cells around everything that was page, besides the truncation.
+/// Cells around everything that was seen, besides the truncation.
 const MARGIN_CELLS: f64 = 4.0;
 /// Bytes of a cell: the map, the page's copy, what is derived from them for a picture or a file.
 const BYTES_PER_CELL: f64 = 64.0;
@@ -97,7 +97,7 @@ impl Fusion {
         self.fused.as_ref().map_or(0, |m| m.at)
     }
 
-    /// The map as it is; fused if there was none.
+    /// The map as it is, made where there was none yet.
     pub(in crate::engine) fn tsdf(&mut self) -> Result<&Tsdf2, Refusal> {
         Ok(&self.fused()?.tsdf)
     }
@@ -212,7 +212,7 @@ impl Fusion {
         settings.config()?;
         let at = self.at();
         let before = std::mem::replace(&mut self.settings, settings);
-        // What cannot be fused leaves what there is.
+        // What cannot be made leaves what there is.
         if let Err(refusal) = self.empty() {
             self.settings = before;
             return Err(refusal);

@@ -1,4 +1,4 @@
-//! What the page is told is what the library computes.
+//! What the page gets is what the library computes.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ fn said(session: &mut Session, question: Value) -> Value {
     }
 }
 
-/// The events of a cell as the library tells them, fused without a studio.
+/// The events of a cell as the library has them, fused without a studio.
 fn events(scans: &[(Pose<2>, Scan<2>)], config: TsdfConfig<2>, cell: [i32; 2]) -> Vec<(usize, FusionEvent)> {
     let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [240, 180]), config).unwrap();
     tsdf.watch([cell]);

@@ -1,4 +1,4 @@
-//! What the page is told is what the library builds and measures.
+//! What the page gets is what the library builds and measures.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -18,7 +18,7 @@ use crate::engine::{Clock, Limits, Logs, Session, Source2d, Wire};
 /// Scans that are fused, of the lap's 200.
 const SCANS: usize = 40;
 
-/// A session whose clock tells how often it was asked, with some scans fused.
+/// A session whose clock counts how often it was asked, with some scans fused.
 fn session(limits: Limits) -> Session {
     let calls = AtomicU64::new(0);
     let clock = Clock::new(move || calls.fetch_add(1, Ordering::Relaxed) as f64);

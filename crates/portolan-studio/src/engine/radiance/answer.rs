@@ -1,4 +1,4 @@
-//! What the page is sent: the corridor once, the fit again and again.
+//! What the page gets: the corridor once, the fit again and again.
 
 use portolan_chapter::radiance::{
     Fit, Measurement, NAMED_SEEDS, Residuals, Scene, Term, Terms, opacity, transmittance,

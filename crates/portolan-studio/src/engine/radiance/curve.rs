@@ -9,7 +9,7 @@ const MOST: usize = 1024;
 pub(super) struct Curve {
     points: Vec<Point>,
     stride: u64,
-    /// Points that the page has been sent.
+    /// Points that the page has.
     sent: usize,
 }
 
@@ -48,12 +48,12 @@ impl Curve {
         self.points.push(Point { step, progress: None, stays: true });
     }
 
-    /// The page knows nothing of it.
+    /// The page has nothing of it.
     pub(super) fn resend(&mut self) {
         self.sent = 0;
     }
 
-    /// The number of points that the page knows already, and the values of the others, eight each: step, objective,
+    /// The number of points that the page has already, and the values of the others, eight each: step, objective,
     /// then depth, reflectance and second moment of the training rays and of the held-out ones.
     pub(super) fn news(&mut self) -> (usize, Vec<f32>) {
         let from = self.sent;

@@ -11,7 +11,7 @@ use super::settings::Settings;
 #[derive(Debug, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case", deny_unknown_fields)]
 pub(in crate::engine) enum Ask {
-    /// Everything from the beginning: what the page has buffers is gone.
+    /// Everything from the beginning: what the page has drawn is gone.
     Open {},
     /// Fuses the next frames, as far as a quarter of a second goes, but at least one.
     Step {
@@ -67,7 +67,7 @@ pub(in crate::engine) enum Ask {
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(in crate::engine) enum ColorBy {
-    /// How high it is; the page knows by the places.
+    /// How high it is; the page takes it from the positions.
     #[default]
     Height,
     /// The colors that were seen.

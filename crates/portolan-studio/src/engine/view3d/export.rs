@@ -14,13 +14,13 @@ const LARGEST_DENSE: usize = 256 << 20;
 /// Bytes of a cell of it: distance and status.
 const DENSE_CELL: usize = 5;
 
-/// The file; the Euclidean field was maps before.
+/// The file; the Euclidean field was made before.
 pub(super) fn file(maps: &Maps, file: ExportFile) -> Result<Reply, Refusal> {
     match file {
         ExportFile::Ply => answer("mesh.ply", ply_mesh_to_bytes(&maps.mesh.mesh()).map_err(Refusal::new)?),
         ExportFile::Glb => answer("mesh.glb", glb_to_bytes(&maps.mesh.mesh()).map_err(Refusal::new)?),
         ExportFile::Esdf => {
-            let esdf = maps.esdf.as_ref().ok_or_else(|| Refusal::new("the field was not maps"))?;
+            let esdf = maps.esdf.as_ref().ok_or_else(|| Refusal::new("the field was not made"))?;
             dense(esdf)
         }
         ExportFile::Octree => {

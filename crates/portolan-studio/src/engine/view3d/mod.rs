@@ -3,7 +3,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`ask`], [`answer`], [`queries`] | what can be asked, and the answers |
-//! | [`settings`], [`source`] | how is fused, and what |
+//! | [`settings`], [`source`] | the settings of a run, and its frames |
 //! | [`state`], [`maps`] | the view, and the maps of a run |
 //! | [`mesh_buffers`], [`ranges`], [`shade`] | the page's copy of the mesh, its layout and its colors |
 //! | [`slice`], [`voxel`], [`history`] | a layer of a field, one cell, and what each frame did to it |

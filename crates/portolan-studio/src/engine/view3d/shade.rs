@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::ask::ColorBy;
 
-/// The error that is buffers at the end of the ramp, in cells.
+/// The error that is drawn at the end of the ramp, in cells.
 const ERROR_CELLS: f64 = 1.0;
 
 /// Four bytes per vertex: red, green, blue, 255 for colors as they were seen; else a step of a ramp, 0, 0, and 255 where

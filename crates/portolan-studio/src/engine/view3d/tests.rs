@@ -1,4 +1,4 @@
-//! What the view tells against what the library says.
+//! What the view answers against what the library computes.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ fn coarse() -> Value {
     json!({ "op": "set", "settings": { "resolution": 0.2, "truncation": 0.6, "w_max": 64.0, "carve": true, "occupancy": true, "sensor": "lidar" } })
 }
 
-/// The page: it writes what it is told where it is told.
+/// The page: it writes what it gets where the answer puts it.
 #[derive(Default)]
 struct Page {
     positions: Vec<f32>,

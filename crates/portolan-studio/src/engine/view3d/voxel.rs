@@ -75,7 +75,7 @@ pub(super) fn pick(
     }))
 }
 
-/// What is known of a cell; its distance in the Euclidean field only where that was maps of the map as it is now.
+/// What is known of a cell; its distance in the Euclidean field only where that was made of the map as it is now.
 pub(super) fn describe(maps: &Maps, source: &Source, cell: [i32; 3], origin: [f64; 3]) -> Value {
     let lattice = maps.tsdf().lattice();
     let center = lattice.center(cell);
