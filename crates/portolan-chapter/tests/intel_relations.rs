@@ -51,6 +51,6 @@ fn corrected_intel_poses_agree_with_the_verified_relations() {
     let odometry: Vec<_> = raw.raw_scans().filter_map(|s| Some((s.time?, s.world_from_laser))).collect();
     let all = score_relations(&relations, &odometry, 0.05);
     println!("raw odometry, {} relations: {all}", all.count);
-    // Most relations are between neighbours, where odometry is good: the mean tells, not the median.
+    // Most relations are between neighbors, where odometry is good: the mean tells, not the median.
     assert!(all.count == 2984 && all.translation.mean > 10.0 * score.translation.mean);
 }

@@ -39,7 +39,7 @@ impl ErrorMeasures {
 pub struct PoseErrors {
     /// Poses (or pairs) compared.
     pub count: usize,
-    /// Of the position (metres).
+    /// Of the position (meters).
     pub translation: ErrorMeasures,
     /// Of the heading (radians).
     pub rotation: ErrorMeasures,

@@ -15,7 +15,7 @@ pub struct Relation {
     pub first_from_second: Pose<2>,
 }
 
-/// A line of a relations file that is none.
+/// A line of a relations file that is not a relation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("line {line}: a relation is eight finite numbers, `t1 t2 x y z roll pitch yaw`, found {found:?}")]
 pub struct RelationError {
@@ -26,7 +26,7 @@ pub struct RelationError {
 }
 
 /// Reads the text of a relations file (Kümmerle et al. 2009): `t1 t2 x y z roll pitch yaw` on a line, seconds,
-/// metres and radians; `#` starts a comment. `z`, `roll` and `pitch` are left out: the robot drives in the plane.
+/// meters and radians; `#` starts a comment. `z`, `roll` and `pitch` are left out: the robot drives in the plane.
 ///
 /// # Errors
 /// [`RelationError`], the first line that is no relation.

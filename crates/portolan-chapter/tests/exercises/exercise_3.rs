@@ -4,7 +4,7 @@ use crate::page::{check, mm};
 use portolan::map::{Tsdf, TsdfConfig};
 
 /// What the map of a wall at `y = 0` believes along the normal when beams of these angles (radians) were fused with these
-/// weights, their ranges off by `errors`: cell centres at `(k + 1/2) r`, up to tau on both sides.
+/// weights, their ranges off by `errors`: cell centers at `(k + 1/2) r`, up to tau on both sides.
 fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf<2> {
     let config = TsdfConfig {
         cells: [1, 2 * (tau / r).ceil() as usize],
