@@ -1,13 +1,13 @@
 //! Memory of a tree against a dense array, by the text's formula (section 3.1, D1).
 
-/// Nodes per surface cell, over all levels: `c_d = 2^(d-1) / (2^(d-1) - 1)`; 2 in the plane, 4/3 in space.
+/// Nodes per surface cell, over all levels: `c_d = 2^(d-1) / (2^(d-1) - 1)`; 2 in 2-D, 4/3 in 3-D.
 fn nodes_per_surface_cell<const D: usize>() -> f64 {
     let faces = f64::from(1u32 << (D - 1));
     faces / (faces - 1.0)
 }
 
 /// Predicted bytes of a tree against a dense array of one-byte cells: `b c_d S r / V` (section 3.1, D1), for
-/// `node_bytes` a node, surface measure `S` (metres in the plane, square metres in space), bounded volume `V`.
+/// `node_bytes` a node, surface measure `S` (meters in 2-D, square meters in 3-D), bounded volume `V`.
 pub fn memory_ratio<const D: usize>(node_bytes: f64, surface: f64, volume: f64, resolution: f64) -> f64 {
     node_bytes * nodes_per_surface_cell::<D>() * surface * resolution / volume
 }
@@ -18,7 +18,7 @@ pub fn inner_only_node_bytes<const D: usize>(inner_bytes: f64) -> f64 {
     inner_bytes / f64::from(1u32 << (D - 1))
 }
 
-/// The resolution (metres) below which a tree is smaller than a dense array of one-byte cells:
+/// The resolution (meters) below which a tree is smaller than a dense array of one-byte cells:
 /// `r* = V / (b c_d S)`, where [`memory_ratio`] is 1.
 pub fn crossover_resolution<const D: usize>(node_bytes: f64, surface: f64, volume: f64) -> f64 {
     volume / (node_bytes * nodes_per_surface_cell::<D>() * surface)

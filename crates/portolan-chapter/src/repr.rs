@@ -17,8 +17,8 @@ pub struct Abilities {
 
 /// The thin view in which the gallery compares representations.
 ///
-/// The two negatives are not mixed: what a representation *cannot* answer, [`MapRepr::abilities`] says; `None`
-/// means that it does not *know*.
+/// The two negatives are not mixed: [`MapRepr::abilities`] lists what a representation *can* answer; a `None`
+/// is an answer that is not *known*.
 pub trait MapRepr<const D: usize> {
     /// Folds one scan in, with a known pose.
     ///
@@ -26,10 +26,10 @@ pub trait MapRepr<const D: usize> {
     /// Where the map has no room for it, or it reaches too far.
     fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> Result<ScanStats, MapError>;
 
-    /// P(occupied) at a point (world, metres). `None`: never observed, which is not 0.5.
+    /// P(occupied) at a point (world, meters). `None`: never observed, which is not 0.5.
     fn occupancy(&self, p_world: [f64; D]) -> Option<f64>;
 
-    /// Signed distance to the nearest surface (metres), positive in free space, without a search. `None`: not
+    /// Signed distance to the nearest surface (meters), positive in free space, without a search. `None`: not
     /// known there.
     fn distance(&self, p_world: [f64; D]) -> Option<f64>;
 

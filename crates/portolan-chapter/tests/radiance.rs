@@ -95,7 +95,7 @@ fn chapter19_exercise7_the_term_that_reflectance_repairs() {
     let experiment = Experiment::default();
     let stuck = run(PARKED, Channels::Depth);
     let bin = stuck.worst_bin(&experiment.scene, MARGIN).unwrap();
-    // Depth has leverage, metres of it, and light passes; but bin and far plane balance, so no residual
+    // Depth has leverage, meters of it, and light passes; but bin and far plane balance, so no residual
     // uses it.
     let terms = stuck.fit.explain(bin);
     assert_eq!(terms.len(), 5);
@@ -119,7 +119,7 @@ fn chapter19_exercise7_two_channels_are_not_always_enough() {
     let noise = two.fit.settings().noise;
     // Both channels are at their noise (0.012 m, 0.032), held-out depth is not (0.913 m): where surfaces
     // are gray, a dark clump in front of a bright wall has the right mean distance and the right mean
-    // colour at once.
+    // color at once.
     assert!(at_noise_floor(&two) && two.last().training.reflectance < 1.25 * noise.reflectance);
     assert!(two.last().held_out.depth > 0.5, "{:?}", two.last());
     let bin = two.worst_bin(&Experiment::default().scene, MARGIN).unwrap();

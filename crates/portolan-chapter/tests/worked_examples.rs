@@ -116,7 +116,7 @@ fn chapter19_esdf_against_exact_distance() {
 }
 
 /// Whether no observed cell around the contour point nearest to `p` is as near to it as it says. On a field of
-/// true distances the cell that holds the point always is: its centre is within 0.71 cells, and so is its value.
+/// true distances the cell that holds the point always is: its center is within 0.71 cells, and so is its value.
 fn is_steep_at_contour(tsdf: &Tsdf2, contour: &Contour, p: [f64; 2]) -> bool {
     let Some((segment, _)) = contour.nearest_segment(p) else { return false };
     let [a, b] = contour.segments[segment].map(|i| contour.vertices[i as usize]);

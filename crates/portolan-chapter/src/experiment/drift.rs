@@ -45,7 +45,7 @@ impl PoseSet {
     }
 }
 
-/// A map that drifts has room for so much on each side of the world (metres).
+/// A map that drifts has room for so much on each side of the world (meters).
 const ROOM: f64 = 1.5;
 
 /// One lap, driven and corrected.
@@ -58,7 +58,7 @@ pub struct Drift {
     pub chosen: PoseSet,
     /// Error of the odometry's poses.
     pub before: PoseErrors,
-    /// Error of the optimised poses.
+    /// Error of the optimized poses.
     pub after: PoseErrors,
     /// Distance of the contour from the true walls, for each of [`PoseSet::ALL`]; `None` without a contour.
     pub contours: [Option<ErrorSummary>; 3],
@@ -112,7 +112,7 @@ impl Drift {
         Ok(())
     }
 
-    /// Closures that the optimised poses do not agree with.
+    /// Closures that the optimized poses do not agree with.
     pub fn disagreeing(&self) -> usize {
         self.lap.agrees.iter().filter(|agrees| !**agrees).count()
     }

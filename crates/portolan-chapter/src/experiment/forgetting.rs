@@ -31,7 +31,7 @@ impl Forgetting {
         Ok(Self { settings, ghost })
     }
 
-    /// `ghost.json`; metres, and re-observations where nothing else is said.
+    /// `ghost.json`; meters, and re-observations where nothing else is said.
     pub fn to_json(&self) -> Value {
         let runs = self.ghost.per_w_max.iter().map(|run| {
             let noise = run.static_noise.map(|n| {

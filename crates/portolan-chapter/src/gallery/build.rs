@@ -1,6 +1,6 @@
 //! Fuses one log into every representation and derives the fields.
 
-use super::crossover::{CHAPTER_NODE, CloudCrossover, OUR_NODE, TreeCrossover};
+use super::crossover::{CHAPTER_NODE, CloudCrossover, OUR_NODE, Plane, TreeCrossover};
 use super::fields::{MeasuredField, fields_of};
 use super::probes::{Clock, seconds_of};
 use super::row::{Cost, Row};
@@ -176,13 +176,13 @@ fn chapter_tree(grid: &Grid<2>, model: OccupancyModel) -> Result<Quadtree, MapEr
 fn tree_crossovers(settings: &GallerySettings, contour: &Contour, maps: &Maps) -> Vec<TreeCrossover> {
     let (grid, tree, chapter_tree) = (&settings.grid, &maps.tree.map, &maps.chapter_tree.map);
     let [width, height] = grid.aabb().extent();
-    let plane = (settings.surface_length.unwrap_or(contour.length()), width * height);
-    let dense = grid.len();
+    let surface = settings.surface_length.unwrap_or(contour.length());
+    let plane = Plane { surface, area: width * height, dense_cells: grid.len() };
     let ours = inner_only_node_bytes::<2>(9.0);
     let (fine, coarse) = (grid.lattice.resolution, chapter_tree.store().lattice().resolution);
     vec![
-        TreeCrossover::new(CHAPTER_NODE, (20.0, coarse), plane, (20 * chapter_tree.store().nodes(), dense)),
-        TreeCrossover::new(OUR_NODE, (ours, fine), plane, (tree.memory_bytes(), dense)),
+        plane.against(CHAPTER_NODE, 20.0, coarse, 20 * chapter_tree.store().nodes()),
+        plane.against(OUR_NODE, ours, fine, tree.memory_bytes()),
     ]
 }
 

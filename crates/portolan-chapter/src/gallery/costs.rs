@@ -18,7 +18,7 @@ pub(super) const FEWER: usize = 50;
 type Costs = [Option<Cost>; 8];
 
 impl Gallery {
-    /// Asks every representation one of the questions anew, with `probes` points (searches get a fiftieth); says anew who
+    /// Asks every representation one of the questions anew, with `probes` points (searches get a fiftieth); updates who
     /// wins it, and for distances where the cloud loses to the ESDF. Other costs stay as they were measured.
     pub fn measure(&mut self, workload: Workload, probes: usize, clock: &mut Clock<'_>) {
         let everywhere = points(&self.tsdf.grid().aabb(), probes);
@@ -139,7 +139,7 @@ mod tests {
             probes: 100,
             surface_length: None,
         };
-        // A clock that tells how often it was asked: a round of n probes seems to take a 1/n of a second each.
+        // A clock that counts how often it was read: a round of n probes seems to take a 1/n of a second each.
         let mut calls = 0.0;
         let mut clock = || {
             calls += 1.0;

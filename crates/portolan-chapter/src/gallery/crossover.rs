@@ -19,9 +19,9 @@ pub struct TreeCrossover {
     pub name: String,
     /// Bytes a node as the formula counts them.
     pub node_bytes: f64,
-    /// Edge of a leaf (metres).
+    /// Edge of a leaf (meters).
     pub resolution: f64,
-    /// Resolution at which the tree breaks even (metres), by the formula.
+    /// Resolution at which the tree breaks even (meters), by the formula.
     pub predicted_resolution: f64,
     /// Tree bytes over dense bytes, both at the tree's own resolution, by the formula.
     pub predicted_ratio: f64,
@@ -29,26 +29,40 @@ pub struct TreeCrossover {
     pub measured_ratio: f64,
 }
 
-impl TreeCrossover {
-    /// Predicts for a plane of `area` square metres with `surface` metres of surface, and measures.
-    pub(super) fn new(
+/// The box that a tree is compared over.
+#[derive(Clone, Copy)]
+pub(super) struct Plane {
+    /// Surface in it (meters).
+    pub(super) surface: f64,
+    /// Its area (square meters).
+    pub(super) area: f64,
+    /// Cells of the dense array over it, one byte each.
+    pub(super) dense_cells: usize,
+}
+
+impl Plane {
+    /// Predicts what a tree of leaves of `resolution` (meters) takes, `node_bytes` a node, and compares it with the bytes
+    /// that one takes.
+    pub(super) fn against(
+        &self,
         name: &str,
-        (node_bytes, resolution): (f64, f64),
-        (surface, area): (f64, f64),
-        (tree_bytes, dense_bytes): (usize, usize),
-    ) -> Self {
-        Self {
+        node_bytes: f64,
+        resolution: f64,
+        tree_bytes: usize,
+    ) -> TreeCrossover {
+        let Self { surface, area, dense_cells } = *self;
+        TreeCrossover {
             name: name.into(),
             node_bytes,
             resolution,
             predicted_resolution: crossover_resolution::<2>(node_bytes, surface, area),
             predicted_ratio: memory_ratio::<2>(node_bytes, surface, area, resolution),
-            measured_ratio: tree_bytes as f64 / dense_bytes as f64,
+            measured_ratio: tree_bytes as f64 / dense_cells as f64,
         }
     }
 }
 
-/// Fuses a log into a tree of leaves of each of these sizes (metres) over a box that holds `surface` metres of surface:
+/// Fuses a log into a tree of leaves of each of these sizes (meters) over a box that holds `surface` meters of surface:
 /// what the chapter's node and ours take of a dense array over the same cells, by the formula and measured.
 ///
 /// # Errors
@@ -69,14 +83,10 @@ pub fn tree_crossovers_at(
         for (pose, scan) in log {
             tree.integrate(pose, scan)?;
         }
-        let bytes = tree.memory_bytes();
-        let plane = (surface, extent[0] * extent[1]);
-        let against = |name, node_bytes, bytes| {
-            TreeCrossover::new(name, (node_bytes, resolution), plane, (bytes, grid.len()))
-        };
+        let plane = Plane { surface, area: extent[0] * extent[1], dense_cells: grid.len() };
         Ok([
-            against(CHAPTER_NODE, 20.0, 20 * tree.store().nodes()),
-            against(OUR_NODE, inner_only_node_bytes::<2>(9.0), bytes),
+            plane.against(CHAPTER_NODE, 20.0, resolution, 20 * tree.store().nodes()),
+            plane.against(OUR_NODE, inner_only_node_bytes::<2>(9.0), resolution, tree.memory_bytes()),
         ])
     };
     resolutions.iter().map(of).collect()

@@ -4,7 +4,7 @@ use super::{Cost, Gallery, Row};
 use portolan_sim::ErrorSummary;
 use serde_json::{Value, json};
 
-/// The gallery for machines: metres, seconds, bytes; `null` where a map cannot answer.
+/// The gallery for machines: meters, seconds, bytes; `null` where a map cannot answer.
 pub fn document(gallery: &Gallery, log: &str, scans: usize) -> Value {
     let name = |i: usize| gallery.rows[i].name.as_str();
     let winners: Vec<_> = gallery

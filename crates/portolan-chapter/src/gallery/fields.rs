@@ -15,10 +15,10 @@ pub struct MeasuredField {
     pub field: EsdfGrid<2>,
     /// Seconds of a full rebuild.
     pub seconds: f64,
-    /// Interpolated distance less the exact distance to the extracted contour (metres), at observed free points more than
+    /// Interpolated distance less the exact distance to the extracted contour (meters), at observed free points more than
     /// 5 cm from it.
     pub against_contour: Option<ErrorSummary>,
-    /// Interpolated distance less the true one (metres) at observed free points; `None` without a truth.
+    /// Interpolated distance less the true one (meters) at observed free points; `None` without a truth.
     pub against_truth: Option<ErrorSummary>,
     /// Median gradient norm at the same points.
     pub gradient: f64,

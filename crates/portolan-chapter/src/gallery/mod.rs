@@ -1,6 +1,6 @@
 //! One log, the same poses, every representation: what each costs, and how true its answers are.
 //!
-//! The library reads no clock: the caller passes one. Accuracy needs a [`Truth`], which the simulator has.
+//! The library reads no clock: the caller passes one. Accuracy needs a [`Truth`](portolan_sim::Truth), which the simulator has.
 
 mod against_truth;
 mod asker;

@@ -24,7 +24,7 @@ pub(super) fn points<const D: usize>(bounds: &Aabb<D>, n: usize) -> Vec<[f64; D]
 }
 
 /// Median seconds a call over five rounds of asking at every point. The answers are folded into a number that
-/// the optimiser cannot drop.
+/// the optimizer cannot drop.
 pub(super) fn seconds_per_probe<P: Copy>(
     clock: &mut Clock<'_>,
     points: &[P],

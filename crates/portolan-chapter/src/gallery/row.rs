@@ -41,9 +41,9 @@ pub struct Row {
     /// Share of wrong answers to the first question, among those given more than half a cell from a true
     /// surface.
     pub occupancy_wrong: Option<f64>,
-    /// Error of the second answer against the true distance (metres), at observed free points.
+    /// Error of the second answer against the true distance (meters), at observed free points.
     pub distance_error: Option<ErrorSummary>,
-    /// Distance of the extracted surface from the true one (metres).
+    /// Distance of the extracted surface from the true one (meters).
     pub surface_error: Option<ErrorSummary>,
     /// A number worth telling: nodes, segments, points.
     pub note: String,

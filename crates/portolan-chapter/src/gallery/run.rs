@@ -30,7 +30,7 @@ pub struct GallerySettings {
     pub esdf: EsdfSettings,
     /// Number of probes for direct answers; searches get a fiftieth.
     pub probes: usize,
-    /// Length of all true surfaces, both sides of walls (metres), for the crossover formula; `None`: the
+    /// Length of all true surfaces, both sides of walls (meters), for the crossover formula; `None`: the
     /// length of the extracted contour.
     pub surface_length: Option<f64>,
 }

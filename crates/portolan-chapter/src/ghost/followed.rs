@@ -30,7 +30,7 @@ pub struct GhostGroup {
 /// A followed cell.
 #[derive(Clone, Debug)]
 pub(crate) struct Followed {
-    /// Distance of the new world (metres), clamped to the truncation.
+    /// Distance of the new world (meters), clamped to the truncation.
     pub(crate) truth: f64,
     /// In the place where the chair comes to stand.
     pub(crate) appears: bool,
@@ -45,7 +45,7 @@ pub(crate) enum Fate {
     Measured,
     Unclamped,
     Tapered,
-    /// Never seen again, or at the new place never behind a surface: says nothing.
+    /// Never seen again, or at the new place never behind a surface: left out.
     Silent,
 }
 
@@ -89,7 +89,7 @@ impl Followed {
         f64::INFINITY
     }
 
-    /// Observations until the product of `1 - K` is one half: what the filter must do, whatever it is told.
+    /// Observations until the product of `1 - K` is one half: what the filter must do, whatever is observed.
     fn half_life_of_gains(&self) -> f64 {
         let mut kept = 1.0;
         for (n, e) in self.events.iter().enumerate() {

@@ -2,7 +2,7 @@
 //!
 //! The lap is driven until every cell of the chair's place that can saturate has done so; then the chair is moved and
 //! the laps go on. Of each cell the error against the new truth is followed from re-observation to
-//! re-observation. Filter theory says: it halves every `ln 2 / ln(1 + w / W_max)` of them.
+//! re-observation. By the theory it halves every `ln 2 / ln(1 + w / W_max)` of them.
 
 use super::{GhostGroup, GhostWatch, StaticNoise, static_noise};
 use portolan::geom::{Aabb, Grid};
@@ -15,9 +15,9 @@ use portolan_sim::{CHAIR_MOVE, LapConfig, World, apartment, lap};
 pub struct GhostSettings {
     /// Clamps of the weight, one run each.
     pub w_max: Vec<f32>,
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub resolution: f64,
-    /// Truncation (metres).
+    /// Truncation (meters).
     pub truncation: f64,
     /// How scans become observations.
     pub sweep: BeamSweep,
@@ -78,8 +78,8 @@ pub struct GhostRun {
     /// Those that had not reached `W_max`: their gain is higher than the clamp's, and they forget faster.
     pub unclamped: GhostGroup,
     /// Cells, here and at the chair's new place, of which at least one re-observation lay behind a surface, where the
-    /// weight tapers to 0: they learn slower than beams of full weight would teach them, and what they are told is
-    /// a distance along a beam, not the truth.
+    /// weight tapers to 0: they learn slower than from beams of full weight, and what they observe is a
+    /// distance along a beam, not the truth.
     pub tapered: GhostGroup,
     /// What this clamp costs where nothing moves, if it was asked for.
     pub static_noise: Option<StaticNoise>,

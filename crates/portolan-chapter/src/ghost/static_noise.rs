@@ -8,7 +8,7 @@ use portolan_sim::{LapConfig, apartment, lap};
 /// Noise of a map of a world in which nothing moves.
 ///
 /// A lidar that loses no beam makes maps as noisy as predicted (within some percent). Lost beams add to it, more so for
-/// large clamps: what single views say is biased, each in its own way (projective distances), and a view that is
+/// large clamps: single views are biased, each in its own way (projective distances), and a view that is
 /// missing in one lap moves the mean of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticNoise {
@@ -16,18 +16,18 @@ pub struct StaticNoise {
     pub w_max: f32,
     /// Saturated cells in front of surfaces that were followed.
     pub cells: usize,
-    /// Standard deviation of a single observation of such a cell, at full weight (metres).
+    /// Standard deviation of a single observation of such a cell, at full weight (meters).
     pub observation: f64,
     /// Median weight of an observation.
     pub weight: f64,
     /// Standard deviation of the cells' distances from lap to lap, each time at the same place of the lap, over all
-    /// places where the cell is observed (metres).
+    /// places where the cell is observed (meters).
     pub measured: f64,
-    /// `sqrt(sigma^2 / (2 W_max + w))` (metres).
+    /// `sqrt(sigma^2 / (2 W_max + w))` (meters).
     pub predicted: f64,
-    /// Zero crossings between neighbouring cells that were followed.
+    /// Zero crossings between neighboring cells that were followed.
     pub crossings: usize,
-    /// Standard deviation of their places from lap to lap, at the end of the lap (metres).
+    /// Standard deviation of their places from lap to lap, at the end of the lap (meters).
     pub crossing: f64,
 }
 
@@ -51,7 +51,7 @@ impl Moments {
 /// A cell in front of a surface.
 struct Front {
     cell: [i32; 2],
-    /// Of each scan of the lap, what it says about the cell over the laps.
+    /// Of each scan of the lap, its observations of the cell over the laps.
     said: Vec<Moments>,
     /// For each map the same of the estimate afterwards.
     estimates: Vec<Vec<Moments>>,
@@ -121,7 +121,7 @@ pub fn static_noise(
                     let Ok(f) = fronts.binary_search_by_key(cell, |f| f.cell) else { continue };
                     let front = &mut fronts[f];
                     front.estimates[m][i].add(event.after);
-                    // What is said does not depend on the clamp: one map tells it for all.
+                    // Observations do not depend on the clamp: one map's are those of all.
                     if m == 0 {
                         front.said[i].add(event.observation);
                         front.weight.add(event.weight_before * event.gain / (1.0 - event.gain));

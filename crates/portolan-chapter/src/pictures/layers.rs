@@ -35,11 +35,11 @@ pub enum Layer {
     CloseUp,
 }
 
-/// Distance at which the colour of the Euclidean field saturates (metres).
+/// Distance at which the color of the Euclidean field saturates (meters).
 const FAR: f64 = 1.5;
-/// Spacing of its level rings (metres).
+/// Spacing of its level rings (meters).
 const RING: f64 = 0.25;
-/// Error of the Euclidean field at which its colour saturates (metres).
+/// Error of the Euclidean field at which its color saturates (meters).
 pub(super) const ERROR: f64 = 0.10;
 /// Share of its full strength that the truncated field is drawn with, so that lines stay legible on it.
 const TSDF_STRENGTH: f64 = 0.62;
@@ -121,7 +121,7 @@ fn tree(canvas: &mut Canvas, view: &View, scene: &Scene) {
         let [right, bottom] = inside(high[0], low[1]);
         let p = scene.gallery.tree.occupancy(lattice.center(leaf.cell)).unwrap_or(f64::NAN);
         canvas.fill_rect(PixelRect::new(x, y, right - x, bottom - y), color::occupancy(p));
-        // Two sides of every leaf, one pixel wide: its neighbours bring the others.
+        // Two sides of every leaf, one pixel wide: its neighbors bring the others.
         let side = if p > 0.5 { line.with_alpha(0.35) } else { line };
         canvas.fill_rect(PixelRect::new(x, y, 1.0, bottom - y), side);
         canvas.fill_rect(PixelRect::new(x, bottom - 1.0, right - x, 1.0), side);
@@ -240,13 +240,13 @@ fn cell_lines(canvas: &mut Canvas, view: &View, grid: &Grid<2>) {
     canvas.segments(view, &lines, pen);
 }
 
-/// One colour per cell, by the cell's index.
+/// One color per cell, by the cell's index.
 fn cell_raster(canvas: &mut Canvas, view: &View, grid: &Grid<2>, color: impl Fn(usize) -> Color) {
     let (origin, r) = (grid.lattice.origin, grid.lattice.resolution);
     canvas.raster(view, grid.shape, origin, r, |[x, y]| color(y * grid.shape[0] + x));
 }
 
-/// One colour per pixel, by its place in the world.
+/// One color per pixel, by its place in the world.
 fn pixel_raster(canvas: &mut Canvas, view: &View, color: impl Fn([f64; 2]) -> Color) {
     let (low, _) = view.world_box();
     let r = 1.0 / view.scale()[0];

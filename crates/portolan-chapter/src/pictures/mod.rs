@@ -1,4 +1,4 @@
-//! Pictures of a run: every representation of one log, side by side or one by one, in the chapter's colours.
+//! Pictures of a run: every representation of one log, side by side or one by one, in the chapter's colors.
 
 mod drift;
 mod ghost;

@@ -15,13 +15,13 @@ pub struct CorrectionSettings {
     pub matching: MatchSettings,
     /// Scans nearer in the log than this do not close a loop.
     pub min_lag: usize,
-    /// Poses further apart than this, as far as is known, are no candidates (metres).
+    /// Poses further apart than this, as far as is known, are no candidates (meters).
     pub radius: f64,
     /// Candidates for each scan at most, nearest first.
     pub candidates: usize,
-    /// A match must be found from both sides: forth and back may differ by this (metres, radians).
+    /// A match must be found from both sides: forth and back may differ by this (meters, radians).
     pub round_trip: [f64; 2],
-    /// How often candidates are looked for, each time with the poses of the last optimisation.
+    /// How often candidates are looked for, each time with the poses of the last optimization.
     pub rounds: usize,
     /// What an edge that disagrees with the others may still pull.
     pub kernel: Kernel,
@@ -100,7 +100,7 @@ impl RefusedCandidates {
     }
 }
 
-/// One round of proposing, matching and optimising.
+/// One round of proposing, matching and optimizing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Round {
     /// Pairs that were matched.
@@ -109,7 +109,7 @@ pub struct Round {
     pub closures: usize,
     /// The others.
     pub refused: RefusedCandidates,
-    /// What the optimiser did.
+    /// What the optimizer did.
     pub report: Report,
 }
 
@@ -118,13 +118,13 @@ pub struct Round {
 pub struct CorrectedLap {
     /// The poses that odometry alone leads to.
     pub odometry: Vec<Pose<2>>,
-    /// The poses of the optimised graph.
+    /// The poses of the optimized graph.
     pub poses: Vec<Pose<2>>,
     /// The graph: vertex `k` is scan `k`, the first one is fixed; odometry first, then the closures.
     pub graph: PoseGraph<2>,
     /// The closures of the last round, in the order of their edges.
     pub closures: Vec<Closure>,
-    /// For each of them, whether the optimised poses agree with it (chi-square below 11.3, 99 % of three degrees).
+    /// For each of them, whether the optimized poses agree with it (chi-square below 11.3, 99 % of three degrees).
     pub agrees: Vec<bool>,
     /// What happened in each round.
     pub rounds: Vec<Round>,

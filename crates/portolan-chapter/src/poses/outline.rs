@@ -5,35 +5,35 @@ use portolan::geom::vector::{distance, dot, scale, sub};
 use portolan::scan::Scan;
 use portolan_sim::heading;
 
-/// Points within this of a point say how its surface runs (metres).
+/// Points within this of a point say how its surface runs (meters).
 const TANGENT_REACH: f64 = 0.2;
-/// At most so many neighbours on either side.
+/// At most so many neighbors on either side.
 const NEIGHBOURS: usize = 14;
-/// Neighbouring end points further apart than this do not lie on one surface, at the least (metres).
+/// Neighbouring end points further apart than this do not lie on one surface, at the least (meters).
 const GAP: f64 = 0.12;
-/// Edge of a cell of the grid (metres).
+/// Edge of a cell of the grid (meters).
 const CELL: f64 = 0.15;
 /// Parts of the turn for which the free range is kept.
 const PARTS: usize = 360;
 
-/// The end points of a planar scan in the sensor's frame. Normals are those of lines fitted to neighbouring beams,
-/// towards the sensor; a point whose neighbours do not lie on a line has none and is matched by no one.
+/// The end points of a planar scan in the sensor's frame. Normals are those of lines fitted to neighboring beams,
+/// towards the sensor; a point whose neighbors do not lie on a line has none and is matched by no one.
 #[derive(Clone, Debug)]
 pub struct Outline {
     points: Vec<[f64; 2]>,
     normals: Vec<Option<[f64; 2]>>,
-    /// Lower corner of the grid (metres) and its cells along x and y.
+    /// Lower corner of the grid (meters) and its cells along x and y.
     corner: [f64; 2],
     shape: [usize; 2],
     /// Where each cell's points begin in `members`; one more than cells.
     starts: Vec<u32>,
     members: Vec<u32>,
-    /// The shortest hit in each part of the turn and its neighbours (metres); 0 without one.
+    /// The shortest hit in each part of the turn and its neighbors (meters); 0 without one.
     free: Vec<f64>,
 }
 
 impl Outline {
-    /// The hits of a scan. Scans whose beams have no neighbours have no normals: nothing matches them. O(beams).
+    /// The hits of a scan. Scans whose beams have no neighbors have no normals: nothing matches them. O(beams).
     pub fn of(scan: &Scan<2>) -> Self {
         let hits: Vec<usize> = (0..scan.len()).filter(|&i| scan.beam(i).is_hit()).collect();
         let end = |i: usize| scale(scan.beam(i).direction, scan.beam(i).range);
@@ -53,12 +53,12 @@ impl Outline {
         outline
     }
 
-    /// End points (sensor's frame, metres), in the order of the beams.
+    /// End points (sensor's frame, meters), in the order of the beams.
     pub fn points(&self) -> &[[f64; 2]] {
         &self.points
     }
 
-    /// Unit normals towards the sensor, one per point; `None`: the neighbourhood is not straight.
+    /// Unit normals towards the sensor, one per point; `None`: the neighborhood is not straight.
     pub fn normals(&self) -> &[Option<[f64; 2]>] {
         &self.normals
     }
@@ -97,7 +97,7 @@ impl Outline {
         inside[1] * self.shape[0] + inside[0]
     }
 
-    /// The nearest point no further than `reach` (metres), with its distance.
+    /// The nearest point no further than `reach` (meters), with its distance.
     pub fn nearest(&self, p: [f64; 2], reach: f64) -> Option<(usize, f64)> {
         if self.points.is_empty() || !p.iter().all(|v| v.is_finite()) {
             return None;
@@ -135,12 +135,12 @@ impl Outline {
         }
     }
 
-    /// Whether the scan saw through a point, and at least `margin` metres beyond: nothing was there.
+    /// Whether the scan saw through a point, and at least `margin` meters beyond: nothing was there.
     pub fn sees_through(&self, p: [f64; 2], margin: f64) -> bool {
         distance(p, [0.0; 2]) + margin < self.free[part(p)]
     }
 
-    /// How far two poses are from each other: distance (metres) and turn (radians).
+    /// How far two poses are from each other: distance (meters) and turn (radians).
     pub(crate) fn apart(a: &Pose<2>, b: &Pose<2>) -> [f64; 2] {
         let difference = a.inverse() * *b;
         [distance(difference.translation, [0.0; 2]), heading(&difference).abs()]
@@ -167,7 +167,7 @@ fn free_ranges(points: &[[f64; 2]]) -> Vec<f64> {
     (0..PARTS).map(around).collect()
 }
 
-/// The normal of the line through the neighbourhood of beam `i`, by total least squares.
+/// The normal of the line through the neighborhood of beam `i`, by total least squares.
 fn normal(scan: &Scan<2>, i: usize) -> Option<[f64; 2]> {
     let end = |i: usize| scale(scan.beam(i).direction, scan.beam(i).range);
     let centre = end(i);

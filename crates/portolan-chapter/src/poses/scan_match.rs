@@ -9,11 +9,11 @@ use portolan_sim::{heading, planar};
 /// How scans are matched, and when a match is believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MatchSettings {
-    /// Points further than this from the reference have no partner, in the first iteration (metres).
+    /// Points further than this from the reference have no partner, in the first iteration (meters).
     pub reach: f64,
-    /// The same in the last ones (metres); it shrinks by a fifth each time.
+    /// The same in the last ones (meters); it shrinks by a fifth each time.
     pub final_reach: f64,
-    /// Residuals below this count in full (metres): about the noise.
+    /// Residuals below this count in full (meters): about the noise.
     pub inlier: f64,
     /// Iterations at most.
     pub iterations: usize,
@@ -23,13 +23,13 @@ pub struct MatchSettings {
     pub min_pairs: usize,
     /// Least share of the scan's points with a normal that must end within three times `inlier` of a partner.
     pub min_inlier_share: f64,
-    /// Largest root mean square of the inliers' residuals (metres).
+    /// Largest root mean square of the inliers' residuals (meters).
     pub max_rms: f64,
     /// Least share of the evidence that the weaker direction must have; a bare corridor has none along itself.
     pub min_balance: f64,
     /// Largest share of either scan's points where the other one saw through.
     pub max_contradicted_share: f64,
-    /// A match may not leave the guess by more than this (metres, radians).
+    /// A match may not leave the guess by more than this (meters, radians).
     pub max_correction: [f64; 2],
     /// Pairs share beams, normals and the shape of the world: the information of so many of them is that of one.
     pub pairs_per_independent: f64,
@@ -63,7 +63,7 @@ pub struct ScanMatch {
     pub information: Information<2>,
     /// Share of the scan's points with a normal that lie on the reference.
     pub inlier_share: f64,
-    /// Root mean square of the inliers' residuals (metres).
+    /// Root mean square of the inliers' residuals (meters).
     pub rms: f64,
     /// Iterations used.
     pub iterations: usize,
@@ -96,7 +96,7 @@ pub enum MatchRefusal {
     /// The scans lie on each other, but badly.
     #[error("residuals of {rms:.4} m are larger than the noise")]
     LargeResiduals {
-        /// Root mean square (metres).
+        /// Root mean square (meters).
         rms: f64,
     },
     /// One scan has surfaces where the other one saw free space.
@@ -108,7 +108,7 @@ pub enum MatchRefusal {
     /// The match went away from where it should have been.
     #[error("the match is {metres:.2} m and {radians:.3} rad from the guess")]
     FarFromGuess {
-        /// Distance (metres).
+        /// Distance (meters).
         metres: f64,
         /// Turn (radians).
         radians: f64,
@@ -118,15 +118,15 @@ pub enum MatchRefusal {
     Restless,
 }
 
-/// Steps smaller than this end the iterations (metres, radians): partners that change to and fro move the pose by
+/// Steps smaller than this end the iterations (meters, radians): partners that change to and fro move the pose by
 /// as much, and the noise is ten times larger.
 const STILL: f64 = 2e-4;
 
-/// How far behind a point the other scan must have seen for the point to be contradicted (metres).
+/// How far behind a point the other scan must have seen for the point to be contradicted (meters).
 const SEEN_BEYOND: f64 = 0.2;
 
 /// Matches a scan to a reference by point-to-line ICP (Censi 2008, with partners by nearest point and compatible
-/// normals instead of his bound on polar neighbours): pairs are taken within a reach that shrinks, residuals are
+/// normals instead of his bound on polar neighbors): pairs are taken within a reach that shrinks, residuals are
 /// distances along the reference's normals, weighted by Cauchy's kernel, and the pose moves by Gauss-Newton. O(iterations
 /// x points). The result is the same bytes on every machine.
 ///

@@ -23,7 +23,7 @@ pub struct NamedSeed {
 pub const LUCKY: NamedSeed =
     NamedSeed { name: "lucky", seed: 127, shows: "a lucky start: depth alone fits the held-out rays too" };
 
-/// Training residuals at the noise floor, held-out residuals of a metre.
+/// Training residuals at the noise floor, held-out residuals of a meter.
 pub const AMBIGUOUS: NamedSeed = NamedSeed {
     name: "ambiguous",
     seed: 136,
@@ -38,7 +38,7 @@ pub const PARKED: NamedSeed = NamedSeed {
 };
 
 /// Two channels fit all they are shown and leave density parked between gray surfaces: a dark clump in
-/// front of a bright wall has both the mean distance and the mean colour that were measured.
+/// front of a bright wall has both the mean distance and the mean color that were measured.
 pub const TWO_NOT_ENOUGH: NamedSeed = NamedSeed {
     name: "two-not-enough",
     seed: 175,
@@ -63,7 +63,7 @@ pub struct Experiment {
     pub scene: Scene,
     /// How to fit; its channels are those given to [`Experiment::run`].
     pub settings: Settings,
-    /// Steps of the optimiser.
+    /// Steps of the optimizer.
     pub steps: usize,
 }
 

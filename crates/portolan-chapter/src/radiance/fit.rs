@@ -93,7 +93,7 @@ impl Fit {
         &self.line
     }
 
-    /// What the optimiser moves: `θ` of every bin, then `φ`, as [`Prior`](super::Prior) describes them.
+    /// What the optimizer moves: `θ` of every bin, then `φ`, as [`Prior`](super::Prior) describes them.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
     }
@@ -108,7 +108,7 @@ impl Fit {
         self.steps
     }
 
-    /// One step of the optimiser: render every ray, send its residuals back, move the parameters.
+    /// One step of the optimizer: render every ray, send its residuals back, move the parameters.
     /// O(samples), no allocation (`benches/radiance.rs`).
     pub fn step(&mut self) -> Report {
         let report = self.descend();
@@ -173,7 +173,7 @@ impl Fit {
         self.measurements.iter().map(|(_, crossing)| crossing.count).sum()
     }
 
-    /// Bytes held by the field, the parameters, the optimiser and the scratch space.
+    /// Bytes held by the field, the parameters, the optimizer and the scratch space.
     pub fn memory_bytes(&self) -> usize {
         fn bytes<T>(v: &Vec<T>) -> usize {
             v.capacity() * size_of::<T>()

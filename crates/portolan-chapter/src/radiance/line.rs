@@ -1,13 +1,13 @@
 //! A radiance field on a line: bins of density and reflectance, and the rays that cross them.
 //!
-//! A thin layer over [`ray`](super::ray): it cuts a ray into samples and says which bin each came from. A
-//! field in the plane or in space does the same with cells.
+//! A thin layer over [`ray`](super::ray): it cuts a ray into samples and keeps which bin each came from. A
+//! field in 2-D or 3-D does the same with cells.
 
 use super::ray::{Background, Sample};
 
 /// Quantities that a bin has besides its depth: reflectance and the square of the distance.
 ///
-/// The square is no property of the bin; rendered like a colour it gives the second moment of the return.
+/// The square is no property of the bin; rendered like a color it gives the second moment of the return.
 pub const COLORS: usize = 2;
 
 /// Equal bins along a line; bin `i` covers `[i, i + 1) · resolution` from `origin`.

@@ -18,7 +18,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `ray` | the integral along one ray and its gradient; knows of samples, not of bins: a field of any dimension can use it |
+//! | `ray` | the integral along one ray and its gradient; in samples, not in bins: a field of any dimension can use it |
 //! | `line` | the field: bins on a line, and how a ray cuts them into samples |
 //! | `model` | noise, prior, parametrisation, measured channels |
 //! | `fit` | gradient descent and Adam |

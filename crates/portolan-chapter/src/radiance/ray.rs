@@ -7,12 +7,12 @@
 //! ```
 //!
 //! `α_i = 1 − exp(−σ_i δ_i)`, `T_i = Π_{j<i} (1 − α_j)`, and for anything that a sample has a value `v_i`
-//! of (its distance, its colour) the ray renders `v = Σ T_i α_i v_i + T_n v_far`: the expectation of `v`
+//! of (its distance, its color) the ray renders `v = Σ T_i α_i v_i + T_n v_far`: the expectation of `v`
 //! over where the ray ends *(Mildenhall et al. 2020, section 4; Max 1995)*. Nothing here knows what a
 //! sample was taken from: a field of any dimension hands in samples in the order of the ray and gets
 //! gradients back in the same order.
 
-/// What a field says about one stretch of a ray, with `C` colours.
+/// A field along one stretch of a ray, with `C` colors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<const C: usize> {
     /// Volume density `σ`, 1/m, not negative.
@@ -21,7 +21,7 @@ pub struct Sample<const C: usize> {
     pub length: f64,
     /// Distance `t` of the stretch from the origin of the ray, m.
     pub depth: f64,
-    /// Colours, or any other quantity that is rendered like one.
+    /// Colors, or any other quantity that is rendered like one.
     pub color: [f64; C],
 }
 
@@ -30,7 +30,7 @@ pub struct Sample<const C: usize> {
 pub struct Background<const C: usize> {
     /// Distance `t_far` of the far plane, m.
     pub depth: f64,
-    /// Colours of the far plane.
+    /// Colors of the far plane.
     pub color: [f64; C],
 }
 
@@ -48,7 +48,7 @@ pub struct Passage {
 pub struct Rendered<const C: usize> {
     /// Expected distance `Σ T_i α_i t_i + T_n t_far`, m.
     pub depth: f64,
-    /// Expected colours.
+    /// Expected colors.
     pub color: [f64; C],
     /// Share `T_n` that reaches the far plane.
     pub transmittance: f64,
@@ -59,7 +59,7 @@ pub struct Rendered<const C: usize> {
 pub struct Upstream<const C: usize> {
     /// By the rendered depth.
     pub depth: f64,
-    /// By the rendered colours.
+    /// By the rendered colors.
     pub color: [f64; C],
 }
 
@@ -68,7 +68,7 @@ pub struct Upstream<const C: usize> {
 pub struct SampleGradient<const C: usize> {
     /// By the density `σ`.
     pub density: f64,
-    /// By the colours.
+    /// By the colors.
     pub color: [f64; C],
 }
 
@@ -121,7 +121,7 @@ pub fn render<const C: usize>(
     out
 }
 
-/// Gradient of an objective by every sample's density and colours, given that by what the ray rendered.
+/// Gradient of an objective by every sample's density and colors, given that by what the ray rendered.
 ///
 /// With `v_i = ∂J/∂z t_i + ∂J/∂c · c_i`, one pass from the far end carries
 /// `B_k = Σ_{i>k} T_i α_i v_i + T_n v_far`:

@@ -37,7 +37,7 @@ impl Scene {
     /// to learn from and three held out, from ten origins, looking either way.
     ///
     /// The room on the left has a dark wall and a bright one, near the ends of what can be reflected: no
-    /// mixture of other colours makes them. The walls of the room on the right, and the far plane, are
+    /// mixture of other colors makes them. The walls of the room on the right, and the far plane, are
     /// gray, and gray can be mixed.
     pub fn corridor() -> Self {
         let ray = |origin, ascending| LineRay { origin, ascending };
@@ -92,7 +92,7 @@ impl Scene {
         (measure(&self.training), measure(&self.held_out))
     }
 
-    /// The bins with all surfaces of the scene more than `margin` metres away from their centre, outside of
+    /// The bins with all surfaces of the scene more than `margin` meters away from their center, outside of
     /// bodies.
     pub fn empty_bins(&self, margin: f64) -> impl Iterator<Item = usize> + '_ {
         let line = self.uniform(0.0);
@@ -103,7 +103,7 @@ impl Scene {
     }
 
     /// Optical depth `Σ σδ` that a field has in bins from which every surface of the scene is more than
-    /// `margin` metres away: matter where there is none.
+    /// `margin` meters away: matter where there is none.
     pub fn misplaced(&self, line: &Line, margin: f64) -> f64 {
         self.empty_bins(margin).map(|bin| line.density[bin] * line.resolution).sum()
     }
@@ -113,7 +113,7 @@ impl Scene {
         self.empty_bins(margin).max_by(|a, b| line.density[*a].total_cmp(&line.density[*b]))
     }
 
-    /// The field that an opaque scene has: `σδ` = 10 in every bin whose centre lies in a body.
+    /// The field that an opaque scene has: `σδ` = 10 in every bin whose center lies in a body.
     pub fn truth(&self) -> Line {
         let mut line = self.uniform(0.0);
         for bin in 0..line.bins() {

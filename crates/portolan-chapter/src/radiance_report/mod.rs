@@ -9,7 +9,7 @@ use crate::radiance::{Channels, Experiment, FitError, NAMED_SEEDS, NamedSeed, Ou
 use serde_json::Value;
 use std::path::Path;
 
-/// Surfaces nearer than this do not count as empty space (metres).
+/// Surfaces nearer than this do not count as empty space (meters).
 const MARGIN: f64 = 0.3;
 /// Steps into the second channel after which its terms are shown.
 const BEGUN: usize = 500;

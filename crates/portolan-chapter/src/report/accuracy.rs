@@ -7,7 +7,7 @@ use super::{Facts, Section};
 use crate::gallery::Gallery;
 use crate::pictures::{self, Layer, Scene};
 
-/// Median, p99, worst over, worst under in millimetres.
+/// Median, p99, worst over, worst under in millimeters.
 fn cells(error: Option<ErrorSummary>) -> Vec<String> {
     let mm = |v: f64| format!("{:.1}", 1e3 * v);
     match error {

@@ -1,7 +1,7 @@
-//! `report.html`: the chapter's argument with the numbers of this run, in one file that needs nothing else.
+//! `report.html`: the text's argument with the numbers of this run, in one file that needs nothing else.
 //!
 //! A report is a list of sections, each made by one function from the same [`Facts`]; a section that has nothing to
-//! say is left out.
+//! show is left out.
 
 mod accuracy;
 mod against_text;

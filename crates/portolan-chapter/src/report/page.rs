@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Section;
 
-/// Colours keep a contrast of at least 4.5 : 1 for text in both schemes.
+/// Colors keep a contrast of at least 4.5 : 1 for text in both schemes.
 const STYLE: &str = "
 :root{--paper:#fff;--ink:#1f2933;--muted:#55606b;--line:#d5dae0;--soft:#f4f6f8;--best:#0f6b4b;--accent:#6d3590;--warn:#8a4300}
 @media (prefers-color-scheme:dark){:root{--paper:#14181d;--ink:#e6eaee;--muted:#a3aeb9;--line:#37404a;--soft:#1e242b;--best:#63d3a6;--accent:#c79be6;--warn:#f2b27a}}

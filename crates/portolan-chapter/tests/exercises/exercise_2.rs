@@ -76,9 +76,9 @@ fn exercise_2_crossovers_of_our_node() {
     assert!((1.0..3.0).contains(&(records as f64 / counted)));
 }
 
-/// `V / S` (metres) from which a tree of leaves of `r` is smaller: `b c_d r`.
+/// `V / S` (meters) from which a tree of leaves of `r` is smaller: `b c_d r`.
 fn shape<const D: usize>(node_bytes: f64, r: f64) -> f64 {
-    // Of a world with one metre of volume for one of surface the crossover is `1 / (b c_d)`.
+    // Of a world with one meter of volume for one of surface the crossover is `1 / (b c_d)`.
     r / crossover_resolution::<D>(node_bytes, 1.0, 1.0)
 }
 

@@ -4,7 +4,6 @@ use crate::page::{check, cm};
 use portolan::cell::OccupancyModel;
 use portolan::geom::Grid;
 use portolan::map::{OccupancyGrid, Quadtree, Tsdf, TsdfConfig};
-use portolan::store::Store;
 use portolan::surface::{ContourSettings, marching_squares};
 use portolan_chapter::memory::{crossover_resolution, inner_only_node_bytes};
 use portolan_sim::{Lap, LapConfig, Random, World, apartment, lap};

@@ -44,7 +44,7 @@ fn exercise_6_bytes_cross_over_after_a_few_scans() {
 }
 
 /// What cloud and filter make of a chair that was moved between two laps: distance of the cloud and true distance at the
-/// place where it stood (metres), and the filter's occupancy there.
+/// place where it stood (meters), and the filter's occupancy there.
 fn after_the_move() -> (f64, f64, Option<f64>) {
     let world = apartment().world;
     let moved = world.with_moved("chair", CHAIR_MOVE);

@@ -3,7 +3,7 @@
 use crate::page::check;
 use portolan_chapter::radiance::{Channels, Experiment, NamedSeed, Outcome, PARKED, TWO_NOT_ENOUGH, Terms};
 
-/// What counts as near a surface when matter in empty space is looked for (metres).
+/// What counts as near a surface when matter in empty space is looked for (meters).
 const MARGIN: f64 = 0.3;
 /// Steps into the second channel after which its terms are read.
 const BEGUN: usize = 500;
