@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn errors_name_the_place() {
         for (text, part) in [
-            ("{\"type\":\n\"Circle\"}", "the type Circle is not known"),
+            ("{\"type\":\n\"Circle\"}", "the type Circle is not GeoJSON"),
             ("{\"type\":\"LineString\"}", "missing field `coordinates`"),
             ("{\"type\":\"LineString\",\n\"coordinates\":[[1]]}", "the GeoJSON is"),
             ("", "c.geojson: line 1: the GeoJSON is \"EOF"),

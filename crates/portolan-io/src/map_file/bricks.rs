@@ -1,9 +1,10 @@
 //! Bricks in chunks: a plane of keys, and a plane for each number of a cell.
 
 use portolan::cell::Cell;
-use portolan::geom::{BlockKey, Lattice, block_cells};
+use portolan::geom::{BlockKey, block_cells};
 use portolan::store::Bricks;
 
+use super::header::Entry;
 use super::part_name;
 use super::reading::{AGAIN, Reading};
 use crate::error::shown;
@@ -16,29 +17,21 @@ const BRICK_OVERHEAD: u64 = 96;
 /// Keys beyond this would leave the range of cell indices.
 const LARGEST_KEY: i32 = 1 << 27;
 
-/// A plane of bricks.
-#[derive(Clone, Copy)]
-pub(super) struct Plane {
-    /// Name of its chunks.
-    pub(super) name: &'static str,
-    /// Bytes of a cell.
-    pub(super) cell_bytes: usize,
-}
-
 impl Reading<'_> {
-    /// The bricks of a chunk, each made by `brick` of its part of each plane; `None`: a cell is not possible.
+    /// The bricks of a map, each made by `brick` of its part of each plane (name of the plane, bytes of a cell); `None`: a
+    /// cell is not possible.
     pub(super) fn bricks<C: Cell, const D: usize, const N: usize>(
         &mut self,
-        lattice: Lattice<D>,
-        tag: &str,
-        planes: [Plane; N],
+        entry: &Entry,
+        planes: [(&str, usize); N],
         brick: impl Fn([&[u8]; N]) -> Option<C::Brick>,
     ) -> Result<Bricks<C, D>, IoError> {
+        let (lattice, tag) = (self.lattice(entry)?, &*entry.chunk);
         let keys = self.keys(tag)?;
-        let lengths = planes.map(|plane| plane.cell_bytes * block_cells::<D>());
+        let lengths = planes.map(|(_, cell_bytes)| cell_bytes * block_cells::<D>());
         let mut parts = Vec::new();
-        for (plane, length) in planes.iter().zip(lengths) {
-            parts.push(self.parts_of_length(tag, plane.name, (keys.len() * length) as u64)?);
+        for ((name, _), length) in planes.iter().zip(lengths) {
+            parts.push(self.parts_of_length(tag, name, (keys.len() * length) as u64)?);
         }
         let mut store = Bricks::new(lattice);
         let mut keys = keys.into_iter();
@@ -58,7 +51,7 @@ impl Reading<'_> {
                     let field = format!("a cell of brick {:?} in chunk {}", key.0, shown(tag.as_bytes()));
                     return Err(self.bad(field, "not finite or negative", AGAIN));
                 };
-                self.possible(tag, store.insert(key, brick))?;
+                self.possible(&entry.map, store.insert(key, brick))?;
             }
         }
         Ok(store)

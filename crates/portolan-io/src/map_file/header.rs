@@ -4,7 +4,7 @@ use portolan::geom::{Grid, Lattice};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::kind::Kind;
+use super::kind::{Kind, Names};
 
 /// What the writer of a file noted about its maps; none of it is needed to read them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -35,8 +35,12 @@ pub struct MapHeader {
 /// A map as the header describes it.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Entry {
-    kind: String,
+    /// Kind of the map.
+    #[serde(rename = "kind")]
+    pub(super) map: String,
+    /// Kind of its cells.
     cell: String,
+    /// Tag of its chunks.
     pub(super) chunk: String,
     #[serde(flatten)]
     pub(super) place: Place,
@@ -66,13 +70,9 @@ impl Entry {
         place: Place,
         settings: &impl Serialize,
     ) -> serde_json::Result<Self> {
-        Ok(Self {
-            kind: kind.word::<D>().into(),
-            cell: kind.cell().into(),
-            chunk: kind.chunk().into(),
-            place,
-            settings: serde_json::from_value(serde_json::to_value(settings)?)?,
-        })
+        let Names { map, cell, chunk } = kind.names::<D>();
+        let settings = serde_json::from_value(serde_json::to_value(settings)?)?;
+        Ok(Self { map: map.into(), cell: cell.into(), chunk: chunk.into(), place, settings })
     }
 }
 

@@ -13,47 +13,37 @@ pub(super) enum Kind {
     ColorBricks,
 }
 
+/// The names of a kind in a file.
+pub(super) struct Names {
+    /// The map, in the header.
+    pub(super) map: &'static str,
+    /// Its cells, in the header.
+    pub(super) cell: &'static str,
+    /// The tag under which its chunks are written.
+    pub(super) chunk: &'static str,
+}
+
 impl Kind {
     const ALL: [Self; 6] =
         [Self::Grid, Self::Tree, Self::Tsdf, Self::OccupancyBricks, Self::TsdfBricks, Self::ColorBricks];
 
     /// The kind of an entry of the header; `None`: this version does not read it.
     pub(super) fn of<const D: usize>(entry: &Value) -> Option<Self> {
-        let known = |kind: &Self| entry["kind"] == kind.word::<D>() && entry["cell"] == kind.cell();
-        Self::ALL.into_iter().find(known)
+        Self::ALL.into_iter().find(|kind| {
+            let names = kind.names::<D>();
+            entry["kind"] == names.map && entry["cell"] == names.cell
+        })
     }
 
-    /// Its name in the header.
-    pub(super) fn word<const D: usize>(self) -> &'static str {
-        match self {
-            Self::Grid => "occupancy-grid",
-            Self::Tree if D == 2 => "quadtree",
-            Self::Tree => "octree",
-            Self::Tsdf => "tsdf",
-            Self::OccupancyBricks => "occupancy-bricks",
-            Self::TsdfBricks => "tsdf-bricks",
-            Self::ColorBricks => "color-bricks",
-        }
-    }
-
-    /// The name of its cells in the header.
-    pub(super) fn cell(self) -> &'static str {
-        match self {
-            Self::Grid | Self::Tree | Self::OccupancyBricks => "log-odds-i8",
-            Self::Tsdf | Self::TsdfBricks => "signed-distance-f32",
-            Self::ColorBricks => "color-u16",
-        }
-    }
-
-    /// The tag under which its chunks are written.
-    pub(super) fn chunk(self) -> &'static str {
-        match self {
-            Self::Grid => "GRID",
-            Self::Tree => "TREE",
-            Self::Tsdf => "TSDF",
-            Self::OccupancyBricks => "OBRICKS",
-            Self::TsdfBricks => "TBRICKS",
-            Self::ColorBricks => "CBRICKS",
-        }
+    pub(super) fn names<const D: usize>(self) -> Names {
+        let (map, cell, chunk) = match self {
+            Self::Grid => ("occupancy-grid", "log-odds-i8", "GRID"),
+            Self::Tree => (if D == 2 { "quadtree" } else { "octree" }, "log-odds-i8", "TREE"),
+            Self::Tsdf => ("tsdf", "signed-distance-f32", "TSDF"),
+            Self::OccupancyBricks => ("occupancy-bricks", "log-odds-i8", "OBRICKS"),
+            Self::TsdfBricks => ("tsdf-bricks", "signed-distance-f32", "TBRICKS"),
+            Self::ColorBricks => ("color-bricks", "color-u16", "CBRICKS"),
+        };
+        Names { map, cell, chunk }
     }
 }

@@ -8,7 +8,7 @@ use portolan::geom::{Lattice, Pose};
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use super::header::Place;
+use super::header::Entry;
 use super::{MapHeader, UnknownChunk, VERSION, part_name};
 use crate::error::shown;
 use crate::{Container, IoError};
@@ -103,8 +103,9 @@ impl<'a> Reading<'a> {
     }
 
     /// The lattice of a map, whose cell indices must be exact.
-    pub(super) fn lattice<const D: usize>(&self, map: &str, place: &Place) -> Result<Lattice<D>, IoError> {
+    pub(super) fn lattice<const D: usize>(&self, entry: &Entry) -> Result<Lattice<D>, IoError> {
         const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
+        let Entry { map, place, .. } = entry;
         let r = place.resolution;
         if !(r > 0.0 && r.is_finite()) {
             return self.possible(map, Err(format!("resolution is {r}: give metres, above zero")));

@@ -38,13 +38,6 @@ pub(super) struct TsdfSettings {
     pub(super) more: Map<String, Value>,
 }
 
-impl TsdfSettings {
-    /// Clamp of the weight.
-    pub(super) fn w_max(&self) -> f32 {
-        self.w_max.unwrap_or(f32::INFINITY)
-    }
-}
-
 /// Settings of a map of colors.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ColorSettings {

@@ -10,9 +10,9 @@ use serde_json::{Value, json};
 use super::bricks::{write_bricks, write_keys};
 use super::header::{Entry, Place};
 use super::kind::Kind;
-use super::maps::{saved_grid, saved_occupancy_bricks, saved_tree, saved_tsdf, saved_tsdf_bricks};
-use super::settings::ColorSettings;
-use super::{MapFile, VERSION, part_name};
+use super::maps::{of_grid, of_tree, of_tsdf};
+use super::settings::{ColorSettings, OccupancySettings, TsdfSettings, weights_word};
+use super::{ColorBricks, MapFile, OccupancyBricks, VERSION, part_name};
 use crate::{ContainerWriter, IoError};
 
 /// A dense plane is cut into chunks of this many bytes.
@@ -66,46 +66,54 @@ impl<const D: usize> MapFile<D> {
 
     fn entries(&self) -> serde_json::Result<Vec<Entry>> {
         let mut entries = Vec::new();
-        if let Some(map) = self.grid.as_ref().map(saved_grid) {
-            entries.push(Entry::new::<D>(Kind::Grid, Place::of_grid(map.store.grid()), &map.settings)?);
+        if let Some((store, settings)) = self.grid.as_ref().map(of_grid) {
+            entries.push(Entry::new::<D>(Kind::Grid, Place::of_grid(store.grid()), &settings)?);
         }
-        if let Some(map) = self.tree.as_ref().map(saved_tree) {
-            let place = Place { depth: Some(map.store.depth()), ..Place::of_lattice(map.store.lattice()) };
-            entries.push(Entry::new::<D>(Kind::Tree, place, &map.settings)?);
+        if let Some((store, settings)) = self.tree.as_ref().map(of_tree) {
+            let place = Place { depth: Some(store.depth()), ..Place::of_lattice(store.lattice()) };
+            entries.push(Entry::new::<D>(Kind::Tree, place, &settings)?);
         }
-        if let Some(map) = self.tsdf.as_ref().map(saved_tsdf) {
-            entries.push(Entry::new::<D>(Kind::Tsdf, Place::of_grid(map.store.grid()), &map.settings)?);
+        if let Some((store, settings)) = self.tsdf.as_ref().map(of_tsdf) {
+            entries.push(Entry::new::<D>(Kind::Tsdf, Place::of_grid(store.grid()), &settings)?);
         }
-        if let Some(map) = self.occupancy_bricks.as_ref().map(saved_occupancy_bricks) {
+        if let Some(OccupancyBricks { store, model, more }) = &self.occupancy_bricks {
+            let settings = OccupancySettings { model: *model, more: more.clone() };
+            let place = Place::of_lattice(store.lattice());
+            entries.push(Entry::new::<D>(Kind::OccupancyBricks, place, &settings)?);
+        }
+        if let Some(map) = &self.tsdf_bricks {
+            let settings = TsdfSettings {
+                truncation: map.truncation,
+                w_max: Some(map.w_max).filter(|w| w.is_finite()),
+                carve_weight: map.carve_weight,
+                weights: weights_word(map.weights).into(),
+                more: map.more.clone(),
+            };
             let place = Place::of_lattice(map.store.lattice());
-            entries.push(Entry::new::<D>(Kind::OccupancyBricks, place, &map.settings)?);
+            entries.push(Entry::new::<D>(Kind::TsdfBricks, place, &settings)?);
         }
-        if let Some(map) = self.tsdf_bricks.as_ref().map(saved_tsdf_bricks) {
-            let place = Place::of_lattice(map.store.lattice());
-            entries.push(Entry::new::<D>(Kind::TsdfBricks, place, &map.settings)?);
-        }
-        if let Some(map) = &self.color_bricks {
-            let settings = ColorSettings { w_max: map.w_max, more: map.more.clone() };
-            let place = Place::of_lattice(map.store.lattice());
+        if let Some(ColorBricks { store, w_max, more }) = &self.color_bricks {
+            let settings = ColorSettings { w_max: *w_max, more: more.clone() };
+            let place = Place::of_lattice(store.lattice());
             entries.push(Entry::new::<D>(Kind::ColorBricks, place, &settings)?);
         }
         Ok(entries)
     }
 
     fn write_dense(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
-        if let Some(map) = self.grid.as_ref().map(saved_grid) {
-            let plane: Vec<u8> = map.store.planes().iter().map(|v| v.0 as u8).collect();
-            write_plane(writer, Kind::Grid.chunk(), "occupancy", &plane)?;
+        if let Some((store, _)) = self.grid.as_ref().map(of_grid) {
+            let plane: Vec<u8> = store.planes().iter().map(|v| v.0 as u8).collect();
+            write_plane(writer, Kind::Grid.names::<D>().chunk, "occupancy", &plane)?;
         }
-        if let Some(map) = self.tree.as_ref().map(saved_tree) {
-            write_plane(writer, Kind::Tree.chunk(), "occupancy", &tree_bytes(map.store))?;
+        if let Some((store, _)) = self.tree.as_ref().map(of_tree) {
+            write_plane(writer, Kind::Tree.names::<D>().chunk, "occupancy", &tree_bytes(store))?;
         }
-        if let Some(map) = self.tsdf.as_ref().map(saved_tsdf) {
-            let planes = map.store.planes();
+        if let Some((store, _)) = self.tsdf.as_ref().map(of_tsdf) {
+            let planes = store.planes();
             for (name, plane) in [("distance", planes.distances()), ("weight", planes.weights())] {
                 let mut bytes = Vec::new();
                 put_floats(plane, &mut bytes);
-                write_plane(writer, Kind::Tsdf.chunk(), name, &bytes)?;
+                write_plane(writer, Kind::Tsdf.names::<D>().chunk, name, &bytes)?;
             }
         }
         Ok(())
@@ -113,7 +121,7 @@ impl<const D: usize> MapFile<D> {
 
     fn write_bricks(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
         if let Some(map) = &self.occupancy_bricks {
-            let tag = Kind::OccupancyBricks.chunk();
+            let tag = Kind::OccupancyBricks.names::<D>().chunk;
             write_keys(writer, tag, &map.store)?;
             write_bricks(writer, tag, "occupancy", &map.store, |brick, bytes| {
                 let cell = |i| brick.get(i).unwrap_or(LogOdds8::UNOBSERVED).0 as u8;
@@ -121,13 +129,13 @@ impl<const D: usize> MapFile<D> {
             })?;
         }
         if let Some(map) = &self.tsdf_bricks {
-            let tag = Kind::TsdfBricks.chunk();
+            let tag = Kind::TsdfBricks.names::<D>().chunk;
             write_keys(writer, tag, &map.store)?;
             write_bricks(writer, tag, "distance", &map.store, |b, bytes| put_floats(b.distances(), bytes))?;
             write_bricks(writer, tag, "weight", &map.store, |b, bytes| put_floats(b.weights(), bytes))?;
         }
         if let Some(map) = &self.color_bricks {
-            let tag = Kind::ColorBricks.chunk();
+            let tag = Kind::ColorBricks.names::<D>().chunk;
             write_keys(writer, tag, &map.store)?;
             write_bricks(writer, tag, "color", &map.store, |brick, bytes| {
                 bytes.extend(brick.words().as_flattened().iter().flat_map(|v| v.to_le_bytes()));

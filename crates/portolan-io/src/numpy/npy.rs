@@ -228,7 +228,7 @@ mod tests {
     fn what_is_wrong_is_named() {
         let good = bytes_of(&NpyArray::vector(&[1.0, 2.0]));
         let error = |bytes: &[u8]| parse_npy(bytes, "a.npy".as_ref()).unwrap_err().to_string();
-        assert!(error(&good[..good.len() - 1]).contains("the array is 15 bytes; 16 are announced"));
+        assert!(error(&good[..good.len() - 1]).contains("the array is 15 bytes; the header announces 16"));
         assert!(error(&[&good[..], b"x"].concat()).contains("the file length is longer"));
         assert!(error(b"PK\x03\x04abcd").contains("the magic"));
         let with = |from: &str, to: &str| {

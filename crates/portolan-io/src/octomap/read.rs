@@ -243,7 +243,7 @@ impl<R: BufRead> Nodes<'_, R> {
                     self.offset,
                     "the data after the last node",
                     value,
-                    "the file is damaged; cut that off",
+                    "the tree ends before it: cut it off",
                 )
             }
             Err(e) => Err(read_failed(self.path, self.packed, self.offset, e)),

@@ -251,7 +251,7 @@ fn damaged_files_are_refused_in_one_line() {
         (bt(18, &good), "the number of nodes is 17; the header announces 18"),
         (bt(16, &good), "byte 167: the number of nodes is at least 17; the header announces 16"),
         (bt(17, &good[..9]), "the number of nodes is 10 so far; the file ends"),
-        (longer, "byte 169: what follows the last node is \"?\""),
+        (longer, "byte 169: the data after the last node is \"?\""),
         (bt(2, &[3, 0]), "byte 138: the number of children of an inner node is 0"),
         (bt(1, &[0]), "the number of children of an inner node is 0"),
         (ot("OcTree", &chain(17, 0.5)), "the depth of a node is 17"),

@@ -80,7 +80,7 @@ fn unpack(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, IoError>
     }
     let Some(packed) = body[8..].get(..packed_size) else {
         let value = format!("{} bytes", body.len() - 8);
-        let advice = format!("{packed_size} are announced: the file is cut off");
+        let advice = format!("the header announces {packed_size}: the file is cut off");
         return Err(IoError::binary(path, at, "the packed data", value, advice));
     };
     lzf::unpack(packed, size).map_err(|k| {

@@ -188,9 +188,9 @@ mod tests {
     fn what_is_no_picture_is_refused() {
         let red = bytes_of(RED_JPEG);
         for (bytes, part) in [
-            (&b"GIF89a"[..], "the start of the color picture is \"GIF89a\"; give JPEG or PNG"),
+            (&b"GIF89a"[..], "the format of the color picture is \"GIF89a\"; give JPEG or PNG"),
             (&[0xff, 0xd8, 0xff, 0xd9], "the picture is damaged ("),
-            (b"", "the start of the color picture is missing"),
+            (b"", "the format of the color picture is missing"),
             (&red[..red.len() - 2], "the picture is damaged (it ends early); copy"),
             (&red, "the size of the picture is 8 x 8; the depth image is 4 x 4"),
         ] {

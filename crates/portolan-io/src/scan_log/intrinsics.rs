@@ -152,10 +152,7 @@ fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
         }
         [fx, 0.0, 0.0, skew, fy, 0.0, cx, cy, _] => ([fx, fy, cx, cy], skew),
         _ => {
-            return Err(unreadable(&format!(
-                "{} numbers that are not the layout of a camera matrix",
-                numbers.len()
-            )));
+            return Err(unreadable(&format!("{} numbers of another layout", numbers.len())));
         }
     };
     if skew.abs() > 1e-3 * fx.abs() {
@@ -238,7 +235,7 @@ mod tests {
         for (text, part) in [
             ("", "the camera matrix is 0 numbers"),
             ("1 2 3", "the camera matrix is 3 numbers"),
-            ("{", "no json"),
+            ("{", "not readable as json"),
             ("{}", "not in the json"),
             ("a b c d", "not all numbers"),
             ("481 -480 319.5 239.5", "fy is -480; give pixels"),

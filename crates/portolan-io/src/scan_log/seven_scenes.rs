@@ -188,7 +188,8 @@ mod tests {
         }
         let unread = log.unread_colors().unwrap();
         assert_eq!(unread.pictures, 3);
-        let part = "frame-000000.color.png: the start of the color picture is \"no pictu\"; give JPEG or PNG";
+        let part =
+            "frame-000000.color.png: the format of the color picture is \"no pictu\"; give JPEG or PNG";
         assert!(unread.first.contains(part), "{}", unread.first);
         // The one of another size alone.
         write_color(&color(0), [1, 2, 3]);

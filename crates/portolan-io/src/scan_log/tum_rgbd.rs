@@ -222,7 +222,7 @@ mod tests {
         std::fs::remove_file(folder.path().join("calibration.txt")).unwrap();
         let error = open(folder.path()).unwrap_err().to_string();
         assert!(
-            error.contains("the camera is not known; give fx,fy,cx,cy or a file with --intrinsics"),
+            error.contains("the camera is unknown; give fx,fy,cx,cy or a file with --intrinsics"),
             "{error}"
         );
         std::fs::remove_file(&truth).unwrap();
