@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use portolan::Answer;
 use portolan::cell::{Cell, LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel, Planes};
-use portolan::field::{SparseEsdf, SparseEsdfSettings};
+use portolan::field::{Esdf, EsdfSettings};
 use portolan::store::{Bricks, Store};
 use portolan::sweep::WeightModel;
 use portolan_io::MapFile;
@@ -46,7 +46,7 @@ fn a_2d_file_is_read() {
     assert_eq!(grid.observed_cells(), 1227);
     let tree = file.tree.as_ref().unwrap();
     assert_eq!(
-        (tree.tree().depth(), tree.tree().nodes(), *tree.model()),
+        (tree.store().depth(), tree.store().nodes(), *tree.model()),
         (6, 1197, OccupancyModel::default())
     );
     for (p, expected) in [
@@ -55,7 +55,7 @@ fn a_2d_file_is_read() {
         ([2.0, 2.93], 0.7835423546524841),
     ] {
         assert_close(probability(grid.store(), p), expected);
-        assert_close(probability(tree.tree(), p), expected);
+        assert_close(probability(tree.store(), p), expected);
     }
     assert_eq!(probability(grid.store(), [4.05, 1.2]), None);
 
@@ -91,8 +91,8 @@ fn a_3d_file_is_read() {
     let tsdf = file.tsdf_bricks.as_ref().unwrap();
     assert_eq!((tsdf.truncation, tsdf.w_max, tsdf.carve_weight), (0.15, 64.0, 0.3));
     assert_eq!((tsdf.weights, tsdf.store.len()), (WeightModel::Constant, 78));
-    let settings = SparseEsdfSettings { max_distance: 1.0, min_weight: 0.15, ..Default::default() };
-    let esdf = SparseEsdf::of(&tsdf.store, &settings);
+    let settings = EsdfSettings { max_distance: 1.0, min_weight: Some(0.15), ..Default::default() };
+    let esdf = Esdf::of(&tsdf.store, &settings);
     let Answer::Known(distance) = esdf.distance([0.0, 0.0, 1.48]) else { panic!("the wall is not there") };
     assert!((distance - 0.02).abs() < 1e-5, "{distance}");
     assert_eq!(observed(&tsdf.store), 13_862);

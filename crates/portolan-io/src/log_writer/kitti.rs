@@ -59,7 +59,7 @@ impl LogWriter {
 mod tests {
     use super::super::{LogLayout, LogWriter};
     use super::*;
-    use crate::space_log::{SpaceLog, SpaceLogKind, SpaceLogOptions};
+    use crate::scan_log::{ScanLog, ScanLogKind, ScanLogOptions};
     use portolan::scan::PointScan;
 
     #[test]

@@ -4,7 +4,7 @@ use portolan::cell::{
     Cell, ColorBrick, DistanceBrick, DistancePlanes, LogOdds8, OccupancyModel, Planes, SignedDistance,
 };
 use portolan::geom::{BlockKey, Grid, Lattice, Pose, block_cells};
-use portolan::map::{OccupancyGrid, OccupancyTree, Tsdf, TsdfConfig};
+use portolan::map::{OccupancyGrid, OccupancyTree, DenseTsdf, TsdfConfig};
 use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan::sweep::WeightModel;
 use serde_json::{Map, Value, json};
@@ -124,8 +124,8 @@ fn full<const D: usize>(seed: u64) -> MapFile<D> {
             ..Default::default()
         },
         grid: Some(OccupancyGrid::from_store(dense, model).unwrap()),
-        tree: Some(OccupancyTree::from_tree(Tree::from_bricks(&near).unwrap(), model).unwrap()),
-        tsdf: Some(Tsdf::from_store(Dense::from_planes(grid, planes).unwrap(), config).unwrap()),
+        tree: Some(OccupancyTree::from_store(Tree::from_bricks(&near).unwrap(), model).unwrap()),
+        tsdf: Some(DenseTsdf::from_stores(Dense::from_planes(grid, planes).unwrap(), None, config).unwrap()),
         occupancy_bricks: Some(occupancy),
         tsdf_bricks: Some(tsdf),
         color_bricks: Some(colors),
@@ -166,7 +166,7 @@ fn saved_again_the_bytes_are_the_same<const D: usize>() {
     let (a, b) = (file.grid.unwrap(), back.grid.unwrap());
     assert_eq!((a.store(), a.model()), (b.store(), b.model()));
     let (a, b) = (file.tree.unwrap(), back.tree.unwrap());
-    assert_eq!((a.tree().records(), a.model()), (b.tree().records(), b.model()));
+    assert_eq!((a.store().records(), a.model()), (b.store().records(), b.model()));
 
     let (a, b) = (file.occupancy_bricks.unwrap(), back.occupancy_bricks.unwrap());
     assert!(same_bricks(&a.store, &b.store) && a.model == b.model);
@@ -196,8 +196,8 @@ fn a_map_without_bricks_is_a_map<const D: usize>() {
 }
 
 fn infinite_weights_survive<const D: usize>() {
-    let config = TsdfConfig { cells: [4; D], w_max: f32::INFINITY, ..Default::default() };
-    let file = MapFile { tsdf: Some(Tsdf::new(config).unwrap()), ..Default::default() };
+    let config = TsdfConfig { w_max: f32::INFINITY, ..Default::default() };
+    let file = MapFile { tsdf: Some(DenseTsdf::covering(&Grid::new([0.0; D], config.resolution, [4; D]), config).unwrap()), ..Default::default() };
     let back = parse::<D>(file.to_bytes().unwrap()).unwrap();
     assert_eq!(back.tsdf.unwrap().config(), &config);
 }
