@@ -15,9 +15,9 @@ use clap::{Parser, ValueEnum};
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Lattice, Pose};
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
-use portolan::sweep::OccupancySweep;
 use portolan::scan::Frame;
 use portolan::surface::isosurface;
+use portolan::sweep::OccupancySweep;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use serde_json::{Value, json};
 

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline,
-    detect, read_geojson,
+    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline, detect, read_geojson,
 };
 
 use crate::dimension::{Dimension, Given};
 use crate::log::describe;
 use crate::mapping::available_memory;
+use crate::saved::SavedMap;
 
 /// What a file holds.
 pub(crate) enum Source {
@@ -38,8 +38,8 @@ pub(crate) enum Source {
 /// Opens a file or a folder.
 pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
     Ok(match detect(path)? {
-        FileKind::Portolan => of_map(&Container::read(path)?)?,
-        FileKind::PortolanFolder => of_map(&Container::read(path.join("map.portolan"))?)?,
+        FileKind::Portolan => of_map(path)?,
+        FileKind::PortolanFolder => of_map(&path.join("map.portolan"))?,
         FileKind::EsdfBin => Source::Esdf(EsdfFile::read(path)?),
         FileKind::MapServerYaml => Source::Server(MapServerMap::read(path)?),
         FileKind::Pgm => match yaml_beside(path) {
@@ -55,10 +55,10 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
     })
 }
 
-fn of_map(container: &Container) -> anyhow::Result<Source> {
-    Ok(match map_dimension(container)? {
-        2 => Source::Map(Box::new(MapFile::from_container(container, readable())?)),
-        _ => Source::SpaceMap(Box::new(MapFile::from_container(container, readable())?)),
+fn of_map(path: &Path) -> anyhow::Result<Source> {
+    Ok(match SavedMap::read(path, readable())? {
+        SavedMap::Two(file) => Source::Map2(file),
+        SavedMap::Three(file) => Source::Map3(file),
     })
 }
 

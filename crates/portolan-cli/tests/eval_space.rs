@@ -12,7 +12,7 @@ use portolan::geom::{BlockKey, Lattice, Pose};
 use portolan::scan::{Frame, Pinhole, Projection, RangeImage, RefusedBeams};
 use portolan::store::Bricks;
 use portolan::sweep::WeightModel;
-use portolan_io::{LogLayout, LogWriter, MapHeader, MapFile, TsdfBricks};
+use portolan_io::{LogLayout, LogWriter, MapFile, MapHeader, TsdfBricks};
 use serde_json::{Map, Value, json as value};
 use support::{arg, fail, json, succeed};
 

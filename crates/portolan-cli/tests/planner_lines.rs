@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
 use portolan::field::{SparseEsdf, SparseEsdfSettings};
-use portolan::map::{Tsdf3, TsdfConfig, Tsdf, Tsdf2, TsdfConfig, TsdfConfig};
+use portolan::map::{Tsdf, Tsdf2, Tsdf3, TsdfConfig};
 use portolan::plan::{Demand, Waypoints, check_path};
 use portolan::store::Bricks;
 

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use portolan::cell::{DistancePlanes, LogOdds8, LogOddsValue, OccupancyModel};
+use portolan::cell::{LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
 use portolan::field::EsdfGrid;
-use portolan::geom::{Grid, Pose};
+use portolan::geom::Pose;
 use portolan::map::OccupancyGrid;
 use portolan::store::{Dense, Tree};
 use portolan::surface::{Contour, ContourSettings, marching_cubes, marching_squares};
 use portolan_io::{
-    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, write_esdf,
-    write_map_server, write_octomap_bt, write_octomap_ot,
+    EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, write_esdf, write_map_server,
+    write_octomap_bt, write_octomap_ot,
 };
 use serde_json::json;
 
@@ -173,7 +173,7 @@ fn convert_map2(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Resul
         }
         (Target::Contour, None) => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
-            return write_lines(&contour_of(grid, esdf_of_cells(grid, &cells).samples())?, args);
+            return write_lines(&contour_of(&esdf_of_cells(grid, &cells))?, args);
         }
         _ => return Ok(false),
     }
@@ -182,7 +182,7 @@ fn convert_map2(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Resul
 
 /// `false`: the map lacks what the format needs, or the format is for 2-D.
 fn convert_map3(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Result<bool> {
-    match (target, &file.occupancy, &file.tsdf) {
+    match (target, &file.occupancy_bricks, &file.tsdf_bricks) {
         (Target::Portolan, ..) => file.write(&args.out)?,
         (Target::OctomapBt | Target::OctomapOt, Some(map), _) => {
             let Some(tree) = Tree::from_bricks(&map.store) else {
@@ -195,7 +195,7 @@ fn convert_map3(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Resul
             }
         }
         (Target::Mesh, _, Some(map)) => {
-            let colors = file.colors.as_ref().map(|c| &c.store);
+            let colors = file.color_bricks.as_ref().map(|c| &c.store);
             return write_mesh(&args.out, &marching_cubes(&map.store, colors, &mesh_settings(map.weights)));
         }
         _ => return Ok(false),
@@ -218,7 +218,7 @@ fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Re
         Target::Portolan => as_map_file(map, args)?.write(&args.out)?,
         Target::MapServer => write_map_server(yaml(&args.out), &map.grid, &map.cells)?,
         Target::Contour => {
-            let mut contour = contour_of(map.grid, esdf_of_cells(map.grid, &map.cells).samples())?;
+            let mut contour = contour_of(&esdf_of_cells(map.grid, &map.cells))?;
             let world_from_grid: Pose<2> = map.world_from_grid();
             if turned {
                 contour.vertices.iter_mut().for_each(|v| *v = world_from_grid.transform_point(*v));
@@ -248,21 +248,13 @@ fn convert_esdf(esdf: &EsdfGrid<2>, target: Target, args: &Args) -> anyhow::Resu
                 d if *d < 0.0 => MapCell::Occupied,
                 _ => MapCell::Free,
             };
-            let cells: Vec<_> = samples.iter().map(cell).collect();
-            write_map_server(yaml(&args.out), &grid, &cells)?;
+            let cells: Vec<_> = esdf.samples().iter().map(cell).collect();
+            write_map_server(yaml(&args.out), esdf.grid(), &cells)?;
         }
-        Target::Contour => return write_lines(&contour_of(grid, samples)?, args),
+        Target::Contour => return write_lines(&contour_of(esdf)?, args),
         _ => return Ok(false),
     }
     Ok(true)
-}
-
-fn esdf_of_cells(grid: Grid<2>, cells: &[MapCell]) -> EsdfGrid<2> {
-    EsdfGrid::from_mask(grid, |i| match cells[i] {
-        MapCell::Occupied => Some(true),
-        MapCell::Free => Some(false),
-        MapCell::Unknown => None,
-    })
 }
 
 /// Writes a distance field as `esdf.bin`, arrays or a costmap.
@@ -286,7 +278,7 @@ fn write_whole<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Resu
 }
 
 fn write_dense<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Result<()> {
-    // In space the status has always been written.
+    // In 3-D the status has always been written.
     let status = if D == 3 { Some(field.status_bytes()) } else { status_plane(field) };
     Ok(write_esdf(&args.out, field.grid(), field.samples(), status.as_deref())?)
 }
@@ -336,19 +328,14 @@ fn write_lines(contour: &Contour, args: &Args) -> anyhow::Result<bool> {
 
 /// The zero level set of a distance field.
 fn contour_of(esdf: &EsdfGrid<2>) -> anyhow::Result<Contour> {
-    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
-    let (distances, weights) = esdf.samples().iter().map(known).unzip();
-    let planes = DistancePlanes::from_parts(distances, weights);
-    let store = planes.and_then(|p| Dense::from_planes(*esdf.grid(), p));
-    let Some(store) = store else { bail!("the distance field has values that are not finite") };
-    let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
+    let tsdf = tsdf_of_samples(*esdf.grid(), esdf.samples())?;
     Ok(marching_squares(&tsdf, &ContourSettings::of(&tsdf)))
 }
 
 /// The cells as an occupancy grid whose cells are as sure as they can be.
 fn as_map_file(map: &MapServerMap, args: &Args) -> anyhow::Result<MapFile<2>> {
     let model = OccupancyModel::default();
-    let mut grid = OccupancyGrid::covering(map.grid, model)?;
+    let mut grid = OccupancyGrid::covering(&map.grid, model)?;
     let (free, occupied) = (grid.rule().min, grid.rule().max);
     let cells = map.cells.iter().map(|c| match c {
         MapCell::Free => LogOdds8(free),

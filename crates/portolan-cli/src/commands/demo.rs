@@ -9,9 +9,8 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use portolan::geom::{Grid, Pose};
-use portolan::map::{BeamSweep, TsdfConfig};
-use portolan::scan::{RangeLimits, Scan, ScanStats};
-use portolan::sweep::WeightModel;
+use portolan::map::TsdfConfig;
+use portolan::scan::{Scan, ScanStats};
 use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
 use portolan_chapter::pictures::{self, Scene};
 use portolan_chapter::report::{self, Facts};
@@ -21,9 +20,10 @@ use portolan_sim::{LapConfig, Lidar, SEED};
 use self::found::Found;
 use super::gallery;
 use crate::arguments::ForgettingArgs;
-use crate::esdf::EsdfArg;
+use crate::dimension::Dimension;
 use crate::json;
-use crate::mapping::{Artefacts, Derived, FusionReport, MapKind, Maps, Settings, fuse};
+use crate::log::RangeArgs;
+use crate::mapping::{Artifacts, Derived, FusionReport, Limits, Settings, fuse_2d, mapper_2d, store_2d};
 use crate::output::Output;
 use crate::progress::Progress;
 use crate::saved::SavedMap;
@@ -101,9 +101,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (mut drift, scans) = run.timed("simulate", || Drift::drive(&world, &config, args.poses.into()))?;
     let settings = settings(&config.lidar, args.forgetting.w_max());
     let grid = gallery::apartment_grid(RESOLUTION);
-    let (mut file, fusion, bytes) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
+    let (mut file, fusion) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
     describe(&mut file, &settings, &config, &fusion.stats);
-    let derived = run.timed("derive", || Derived::of(&file, &settings));
+    let derived = run.timed("derive", || Derived::of(&file, &settings, usize::MAX));
     run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings)))?;
     let gallery =
         run.timed("gallery", || gallery::measure(&scans, &grid, &settings, PROBES, Some(&world)))?;
@@ -122,7 +122,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             let title = format!("The Apartment · cells of 5 cm · {} scans", scans.len());
             let artifacts = Artifacts { file: &file, derived: &derived, dense: None, camera: false, title };
             let written = run.timed("map_files", || {
-                saved::write(&file, &args.out.join("map.portolan"))?;
+                file.write(&args.out.join("map.portolan"))?;
                 artifacts.write(&args.out)
             })?;
             run.files.extend(written.files);
@@ -150,7 +150,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         grid,
         world: &world,
         fusion,
-        bytes,
         file,
         derived,
         gallery: &gallery,
@@ -227,7 +226,7 @@ fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), made)
 }
 
-/// Free space weighs as much as a surface, as in the chapter (`map` gives it less).
+/// Free space weighs as much as a surface, as in the textbook (`map` gives it less).
 fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
     let mut settings = Settings::default();
     settings.shape.resolution = RESOLUTION;
@@ -241,11 +240,11 @@ fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
 }
 
 /// What the contours of the three sets of poses are made with.
-fn config_of(settings: &Settings) -> TsdfConfig {
+fn config_of(settings: &Settings) -> TsdfConfig<2> {
     TsdfConfig {
-        resolution: settings.resolution,
-        truncation: settings.truncation,
-        w_max: settings.w_max,
+        resolution: settings.resolution(),
+        truncation: settings.truncation(),
+        w_max: settings.w_max(),
         ..Default::default()
     }
 }
@@ -256,15 +255,15 @@ fn fused(
     grid: &Grid<2>,
     scans: &[(Pose<2>, Scan<2>)],
     output: Output,
-) -> anyhow::Result<(SavedMap, FusionReport, BTreeMap<&'static str, usize>)> {
-    let mut maps = Maps2::new(settings, grid)?;
-    let progress = Progress::new(scans.len(), "fusing", output);
+) -> anyhow::Result<(SavedMap, FusionReport)> {
+    let limits = Limits { memory: usize::MAX, log: "the Apartment", map: "" };
     let mut file = MapFile::<2>::default();
-    let fusion = fuse_2d(&mut maps, scans, &mut file.poses, &progress);
-    let bytes = maps.bytes();
+    let mut mapper = mapper_2d(&mut file, settings, grid, &limits)?;
+    let progress = Progress::new(scans.len(), "fusing", output);
+    let fusion = fuse_2d(&mut mapper, scans, &mut file.poses, &progress);
     file.poses = scans.iter().map(|(pose, _)| *pose).collect();
-    (file.grid, file.tree, file.tsdf) = (maps.grid, maps.tree, maps.tsdf);
-    Ok((SavedMap::Two(Box::new(file)), fusion, bytes))
+    store_2d(mapper, settings, grid, &mut file)?;
+    Ok((SavedMap::Two(Box::new(file)), fusion))
 }
 
 /// Writes into the file's header what it is made of.

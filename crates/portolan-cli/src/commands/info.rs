@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use portolan::Status;
 use portolan::field::EsdfGrid;
-use portolan::geom::{Aabb, Grid};
+use portolan::geom::Aabb;
 use portolan::store::Store;
-use portolan_io::{CarmenLog, EsdfFile, FileKind, MapCell, MapFile, MapServerMap, detect};
-use portolan_io::{OctomapTree, Polyline, detect_no_return};
+use portolan_io::{EsdfFile, FileKind, MapCell, MapServerMap, OctomapTree, Polyline, detect};
 use serde_json::{Value, json};
 
 use crate::arguments::shown_bytes;
@@ -92,48 +91,6 @@ fn about(source: &Source) -> Value {
         Source::Log2(log) => logs::of_2d(log),
         Source::Log3(log) => logs::of_3d(log),
     }
-}
-
-fn of_map(file: &MapFile<2>) -> Value {
-    let header = &file.header;
-    let mut maps = json!({});
-    if let Some(map) = &file.grid {
-        maps["grid"] = json!({
-            "cell": "log odds, one byte",
-            "extent": json::grid(map.store().grid()),
-            "observed": map.observed_cells(),
-            "bytes": map.memory_bytes(),
-        });
-    }
-    if let Some(map) = &file.tree {
-        maps["tree"] = json!({
-            "cell": "log odds, one byte",
-            "extent": json::aabb(&map.tree().grid().aabb()),
-            "depth": map.tree().depth(),
-            "nodes": map.tree().nodes(),
-            "bytes": map.memory_bytes(),
-        });
-    }
-    if let Some(map) = &file.tsdf {
-        maps["tsdf"] = json!({
-            "cell": "signed distance and weight, f32",
-            "extent": json::grid(map.grid()),
-            "truncation": map.config().truncation,
-            "w_max": map.config().w_max.is_finite().then_some(map.config().w_max),
-            "observed": map.observed_cells(0.0),
-            "bytes": map.memory_bytes(),
-        });
-    }
-    json!({
-        "logs": header.logs,
-        "scans": header.scans,
-        "hold_out": header.hold_out,
-        "every": header.every,
-        "settings": header.settings,
-        "statistics": header.statistics,
-        "poses": file.poses.len(),
-        "maps": maps,
-    })
 }
 
 fn of_esdf<const D: usize>(field: &EsdfGrid<D>) -> Value {

@@ -13,11 +13,11 @@ use portolan_io::{detect_no_return, write_atomic};
 use crate::arguments::{box3, bytes};
 use crate::dimension::{Dimension, Given, ONLY_3D};
 use crate::error::bad_call;
+use crate::json;
 use crate::log::{self, Log, LogArgs};
-use crate::mapping::{Artifacts, Derived, Limits, MapKind, Mapper, Settings, Summary, report, title};
+use crate::mapping::{Artifacts, Derived, Limits, MapKind, Run, Settings, Summary, report, title};
 use crate::output::Output;
 use crate::progress::Progress;
-use crate::{json, saved};
 use crate::saved::SavedMap;
 
 #[derive(clap::Args)]
@@ -64,23 +64,24 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (log_name, map_name) = (args.log.display().to_string(), args.map_path().display().to_string());
     let memory = usize::try_from(args.memory).unwrap_or(usize::MAX);
     let limits = Limits { memory, log: &log_name, map: &map_name };
-    let mut mapper = Mapper::new(&log, &fused, &settings, before, &limits)?;
+    let mut run = Run::new(&log, &fused, &settings, before, &limits)?;
     stages.end("prepare");
 
-    let progress = Progress::new(mapper.scans(), "fusing", args.output);
-    let fusion = mapper.fuse(threads, &progress);
+    let progress = Progress::new(run.scans(), "fusing", args.output);
+    let fusion = run.fuse(threads, &progress);
     drop(progress);
     stages.end("fuse");
     if let (0, (_, Some(error))) = (fusion.stats.scans, &fusion.unreadable) {
         // Not one scan could be used: the first error says more than an empty map.
         bail!("{error}");
     }
-    let mut bytes = mapper.bytes();
-    let (mut file, extent) = mapper.finish();
+    let (mut file, extent) = run.finish(&settings)?;
+    stages.end("store");
+    let mut bytes = file.bytes();
     describe(&mut file, &settings, &log, &fusion.stats);
     args.make_folder()?;
     // Before anything is derived from it: whatever happens then, what was fused is saved.
-    saved::write(&file, &args.map_path())?;
+    file.write(&args.map_path())?;
     stages.end("save");
 
     let derived = Derived::of(&file, &settings, memory);
@@ -139,7 +140,7 @@ impl Args {
     /// The map to go on with. Without one, a folder that cannot be written to is found out before the work.
     fn saved_map(&self, dimension: Dimension) -> anyhow::Result<Option<SavedMap>> {
         if self.append {
-            return saved::read(&self.map_path(), self.memory, dimension).map(Some);
+            return SavedMap::read_to_append(&self.map_path(), self.memory, dimension).map(Some);
         }
         if self.out.exists() && !self.out.is_dir() {
             bail!("{}: is a file, not a folder; name a folder for the results", self.out.display());

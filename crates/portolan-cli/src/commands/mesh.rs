@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use portolan::surface::{Ambiguity, ContourSettings, MeshSettings, marching_cubes, marching_squares};
-use portolan_io::{MapFile};
+use portolan_io::MapFile;
 use serde_json::json;
 
 use crate::arguments::weight_or_zero;

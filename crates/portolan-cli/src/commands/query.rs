@@ -7,12 +7,11 @@ use anyhow::bail;
 use portolan::Answer;
 use portolan::field::{Esdf, EsdfGrid, EsdfMethod, UnknownSpace};
 use portolan::geom::Pose;
-use portolan::map::Occupancy;
-use portolan::sweep::OccupancySweep;
+use portolan::map;
 use portolan::store::Store;
 use portolan_io::{
-    AnswerRow, EsdfFile, HELD_BACK, Input, MapCell, MapFile, MapServerMap, OctomapTree, QueryPoints,
-    certified_reach, write_answer, write_answer_header,
+    AnswerRow, EsdfFile, HELD_BACK, Input, MapFile, MapServerMap, OctomapTree, QueryPoints, certified_reach,
+    write_answer, write_answer_header,
 };
 use serde_json::{Value, json};
 
@@ -168,7 +167,7 @@ fn dense<const D: usize>(esdf: EsdfGrid<D>) -> Distance<D> {
 impl Fields {
     fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
-            Source::Map(file) => Self::Two(of_map(*file, args)),
+            Source::Map2(file) => Self::Two(of_map2(*file, args)),
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)),
             Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)),
             Source::Server(map) => Self::Two(of_server(map)),
@@ -218,7 +217,7 @@ fn of_map2(file: MapFile<2>, args: &Args) -> Field<2> {
 fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     let max_distance =
         args.max_distance.unwrap_or_else(|| Settings::of_saved(&file.header.settings).max_distance);
-    let field = file.tsdf.as_ref().map(|map| {
+    let field = file.tsdf_bricks.as_ref().map(|map| {
         let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
         how.method = args.esdf.unwrap_or_default().method();
         how.unknown = args.unknown == Some(UnknownArg::Pessimistic);
@@ -229,9 +228,9 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     });
     let (distance, clearance) =
         field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
-    let occupancy: Occupancy<3> = match (file.occupancy, file.tsdf) {
+    let occupancy: Occupancy<3> = match (file.occupancy_bricks, file.tsdf_bricks) {
         (Some(map), _) => {
-            let map = Occupancy::from_store(map.store, map.model, OccupancySweep::Auto)?;
+            let map = map::Occupancy::<3>::from_store(map.store, map.model)?;
             Box::new(move |p| map.probability(p))
         }
         (None, Some(map)) => Box::new(move |p| match map.store.lattice().cell_of(p) {
@@ -277,15 +276,6 @@ fn of_octomap(file: OctomapTree) -> Field<3> {
 /// P(occupied) of log odds.
 fn logistic(log_odds: f32) -> f64 {
     1.0 / (1.0 + (-f64::from(log_odds)).exp())
-}
-
-/// The distance field of a map_server map, in its own frame.
-pub(super) fn esdf_of_server(map: &MapServerMap) -> EsdfGrid<2> {
-    EsdfGrid::from_mask(map.grid, |i| match map.cells[i] {
-        MapCell::Occupied => Some(true),
-        MapCell::Free => Some(false),
-        MapCell::Unknown => None,
-    })
 }
 
 impl<const D: usize> Field<D> {

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use portolan::map::{Tsdf3, TsdfConfig};
-use portolan_io::{Container, MapFile, map_dimension, FileKind, detect};
-use portolan_studio::engine::{Limits, Logs, PlaneLog, SpaceSource, check};
+use portolan_io::{Container, FileKind, MapFile, detect, map_dimension};
+use portolan_studio::engine::{Limits, Logs, Source2d, Source3d, check};
 use portolan_studio::server::{Server, Settings};
 use serde_json::json;
 
@@ -119,8 +119,8 @@ impl Args {
             ..TsdfConfig::default()
         };
         let tsdf = Tsdf3::from_stores(held.store, file.color_bricks.map(|c| c.store), config)?;
-        let space = SpaceSource::Map { name: name(path), tsdf: Box::new(tsdf) };
-        Ok(Logs { space, ..Logs::default() })
+        let space = Source3d::Map { name: name(path), tsdf: Box::new(tsdf) };
+        Ok(Logs { source_3d: space, ..Logs::default() })
     }
 
     fn log_2d(&self, path: &Path) -> anyhow::Result<Logs> {
@@ -135,7 +135,7 @@ impl Args {
                 scans.len()
             );
         }
-        Ok(Logs { plane: PlaneLog::Recorded { name: name(path), scans }, ..Logs::default() })
+        Ok(Logs { source_2d: Source2d::Recorded { name: name(path), scans }, ..Logs::default() })
     }
 
     fn log_3d(&self, path: &Path) -> anyhow::Result<Logs> {
@@ -144,7 +144,7 @@ impl Args {
         let log = log::read_3d(path, &self.source, true)?;
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
         Ok(Logs {
-            space: SpaceSource::Recorded { log: Box::new(log.every(every)), filter },
+            source_3d: Source3d::Recorded { log: Box::new(log.every(every)), filter },
             ..Logs::default()
         })
     }
@@ -163,9 +163,9 @@ impl Args {
         let Err(refusal) = check(logs, self.limits_of_a_tab()) else { return Ok(()) };
         let log = self.log.as_deref().map_or("the simulation".into(), Path::to_string_lossy);
         let error = anyhow!("{log}: {refusal}, or give each tab more --memory");
-        Err(match &logs.plane {
-            PlaneLog::Recorded { scans, .. } => with_outlier(error, scans),
-            PlaneLog::Apartment => error,
+        Err(match &logs.source_2d {
+            Source2d::Recorded { scans, .. } => with_outlier(error, scans),
+            Source2d::Apartment => error,
         })
     }
 
@@ -226,17 +226,17 @@ impl Args {
 const LINE: &str = "the simulated line";
 
 fn shown_in_2d(logs: &Logs) -> String {
-    match &logs.plane {
-        PlaneLog::Apartment => "the simulated Apartment".into(),
-        PlaneLog::Recorded { name, scans } => format!("{name}, {} scans", scans.len()),
+    match &logs.source_2d {
+        Source2d::Apartment => "the simulated Apartment".into(),
+        Source2d::Recorded { name, scans } => format!("{name}, {} scans", scans.len()),
     }
 }
 
 fn shown_in_3d(logs: &Logs) -> String {
-    match &logs.space {
-        SpaceSource::Building => "the simulated building".into(),
-        SpaceSource::Recorded { log, .. } => format!("{}, {} scans", log.name(), log.len()),
-        SpaceSource::Map { name, .. } => name.clone(),
+    match &logs.source_3d {
+        Source3d::Building => "the simulated building".into(),
+        Source3d::Recorded { log, .. } => format!("{}, {} scans", log.name(), log.len()),
+        Source3d::Map { name, .. } => name.clone(),
     }
 }
 

@@ -26,9 +26,7 @@ fn log_format(word: &str) -> Result<LogFormat, String> {
     match ScanLogKind::from_word(word) {
         _ if word == "carmen" => Ok(LogFormat::Carmen),
         Some(kind) => Ok(LogFormat::Space(kind)),
-        None => {
-            Err(format!("must be one of carmen, {}", ScanLogKind::ALL.map(ScanLogKind::word).join(", ")))
-        }
+        None => Err(format!("must be one of carmen, {}", ScanLogKind::ALL.map(ScanLogKind::word).join(", "))),
     }
 }
 

@@ -8,14 +8,15 @@ use std::time::Instant;
 use portolan::cell::LogOddsRule;
 use portolan::geom::Aabb;
 use portolan_io::{
-    IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server,
-    write_octomap_bt, write_octomap_ot, write_svg,
+    IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server, write_octomap_bt,
+    write_octomap_ot, write_svg,
 };
 
 use super::files::{dense_esdf, polylines, write_mesh};
 use super::{Derived, DistanceField, cells_for_map_server, picture, preview};
-use crate::stale::remove_stale;
+use crate::esdf::status_plane;
 use crate::saved::SavedMap;
+use crate::stale::remove_stale;
 
 /// Everything that is written.
 pub(crate) struct Artifacts<'a> {
@@ -71,7 +72,7 @@ impl Artifacts<'_> {
 
     fn write_octree(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
         let SavedMap::Three(file) = self.file else { return Ok(()) };
-        let (Some(tree), Some(map)) = (&self.derived.octree, &file.occupancy) else { return Ok(()) };
+        let (Some(tree), Some(map)) = (&self.derived.octree, &file.occupancy_bricks) else { return Ok(()) };
         let rule = LogOddsRule::<i8>::new(&map.model)?;
         let bt = write_octomap_bt(folder.join("octree.bt"), tree);
         let ot = write_octomap_ot(folder.join("octree.ot"), tree, rule.quantum);
@@ -90,11 +91,11 @@ impl Artifacts<'_> {
         let path = folder.join("esdf.bin");
         match &self.derived.esdf {
             None => return Ok(()),
-            Some(DistanceField::Two(esdf, status)) => {
-                write_esdf(path, esdf.grid(), esdf.samples(), status.as_deref())?;
+            Some(DistanceField::Two(esdf)) => {
+                write_esdf(path, esdf.grid(), esdf.samples(), status_plane(esdf).as_deref())?;
             }
             Some(DistanceField::Three(esdf)) => match dense_esdf(esdf, self.dense.as_ref()) {
-                Ok(dense) => write_esdf(path, &dense.grid, &dense.distances, Some(&dense.status))?,
+                Ok(dense) => write_esdf(path, dense.grid(), dense.samples(), Some(&dense.status_bytes()))?,
                 Err(why) => {
                     written.notes.push(format!("esdf.bin was not written: {why}"));
                     return Ok(());
@@ -118,9 +119,7 @@ impl Artifacts<'_> {
     fn write_picture(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
         let start = Instant::now();
         let (stage, name, png) = match self.file {
-            SavedMap::Two(file) => {
-                ("picture", "map.png", picture::of_map(file, self.derived, &self.title))
-            }
+            SavedMap::Two(file) => ("picture", "map.png", picture::of_map(file, self.derived, &self.title)),
             SavedMap::Three(file) => {
                 let mesh = self.derived.mesh.as_ref();
                 let png = mesh.and_then(|mesh| preview::of_mesh(mesh, &file.poses, self.camera, &self.title));

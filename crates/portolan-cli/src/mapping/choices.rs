@@ -1,7 +1,6 @@
 //! Values of settings that are chosen from a list.
 
 use portolan::map::BeamSweep;
-use portolan::sweep::OccupancySweep;
 use portolan::sweep::WeightModel;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -75,18 +74,9 @@ impl SweepArg {
         }
     }
 
-    /// As the library's 2-D maps have it.
-    pub(super) fn in_2d(self) -> BeamSweep {
+    /// As the library's 2-D distances have it.
+    pub(super) fn beams(self) -> BeamSweep {
         if self == Self::March { BeamSweep::March } else { BeamSweep::CellCentre }
-    }
-
-    /// As the library's 3-D occupancy has it.
-    pub(super) fn in_3d(self) -> OccupancySweep {
-        match self {
-            Self::Exact => OccupancySweep::Exact,
-            Self::Projective => OccupancySweep::Projective,
-            _ => OccupancySweep::Auto,
-        }
     }
 }
 

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use portolan::cell::LogOdds8;
-use portolan::field::{Esdf, SparseEsdf};
-use portolan::map::{DerivedField, Tsdf};
+use portolan::field::{Esdf, EsdfGrid};
+use portolan::map::Tsdf2;
 use portolan::store::{Store, Tree};
 use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, ThinWalls};
 use portolan::surface::{doubled_length, marching_cubes, marching_squares, thin_walls};
@@ -14,7 +14,7 @@ use portolan_io::{MapFile, TsdfBricks};
 use super::recipe::{esdf_settings, mesh_settings};
 use super::{MapKind, Settings};
 use crate::arguments::shown_bytes;
-use crate::esdf::{dense_esdf_2d, status_plane};
+use crate::esdf::dense_esdf_2d;
 use crate::saved::SavedMap;
 
 /// Contours nearer to each other than this and facing the same way are one wall seen twice (metres).
@@ -41,10 +41,10 @@ pub(crate) struct ContourChecked {
 
 /// The distance field of a map.
 pub(crate) enum DistanceField {
-    /// 2-D, with the status of its cells where the reach of the method ends within the map.
-    Two(Esdf<2>, Option<Vec<u8>>),
+    /// 2-D, its cells.
+    Two(EsdfGrid<2>),
     /// 3-D.
-    Three(SparseEsdf<3>),
+    Three(Esdf<3>),
 }
 
 impl Derived {
@@ -64,33 +64,29 @@ impl Derived {
             derived.contour = Some(derived.timed("contour_checks", |_| ContourChecked::of(contour, tsdf)));
         }
         if settings.wants(MapKind::Esdf) {
-            derived.esdf = derived.timed("esdf", |_| {
-                let dense = dense_esdf_2d(tsdf, settings.esdf);
-                let status = status_plane(&dense).map(<[u8]>::to_vec);
-                let samples = Esdf::from_samples(dense.grid, dense.distances).ok();
-                samples.map(|esdf| DistanceField::Two(esdf, status))
-            });
+            let esdf = derived.timed("esdf", |_| dense_esdf_2d(tsdf, settings.esdf));
+            derived.esdf = Some(DistanceField::Two(esdf));
         }
         derived
     }
 
     fn of_3d(file: &MapFile<3>, settings: &Settings, memory: usize) -> Self {
         let mut derived = Self::default();
-        if let Some(map) = &file.occupancy {
+        if let Some(map) = &file.occupancy_bricks {
             derived.octree = derived.timed("octree", |_| Tree::from_bricks(&map.store));
             if derived.octree.is_none() {
                 derived.notes.push("the octree was not made: the map spans more than 2^28 cells".to_owned());
             }
         }
-        let Some(tsdf) = &file.tsdf else { return derived };
+        let Some(tsdf) = &file.tsdf_bricks else { return derived };
         if settings.wants(MapKind::Mesh) {
-            let colors = file.colors.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
+            let colors = file.color_bricks.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
             let how = mesh_settings(tsdf.weights);
             derived.mesh = Some(derived.timed("mesh", |_| marching_cubes(&tsdf.store, colors, &how)));
         }
         if settings.wants(MapKind::Esdf) {
-            let held =
-                tsdf.store.memory_bytes() + file.occupancy.as_ref().map_or(0, |o| o.store.memory_bytes());
+            let held = tsdf.store.memory_bytes()
+                + file.occupancy_bricks.as_ref().map_or(0, |o| o.store.memory_bytes());
             derived.esdf = derived.timed("esdf", |derived| derived.esdf_3d(tsdf, settings, memory, held));
         }
         derived
@@ -113,7 +109,7 @@ impl Derived {
         }
         let mut how = esdf_settings(tsdf.weights, tsdf.carve_weight, settings.max_distance);
         how.method = settings.esdf.method();
-        Some(DistanceField::Three(SparseEsdf::of(&tsdf.store, &how)))
+        Some(DistanceField::Three(Esdf::of(&tsdf.store, &how)))
     }
 
     fn timed<T>(&mut self, name: &'static str, work: impl FnOnce(&mut Self) -> T) -> T {
@@ -144,7 +140,7 @@ impl ContourChecked {
 impl DistanceField {
     fn memory_bytes(&self) -> usize {
         match self {
-            Self::Two(esdf, _) => esdf.memory_bytes(),
+            Self::Two(esdf) => esdf.memory_bytes(),
             Self::Three(esdf) => esdf.memory_bytes(),
         }
     }

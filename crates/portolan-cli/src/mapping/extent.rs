@@ -28,8 +28,8 @@ pub(crate) enum Extent {
 impl Extent {
     /// Of a map in bricks.
     pub(super) fn of_bricks(file: &MapFile<3>) -> Self {
-        let occupancy = file.occupancy.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
-        let tsdf = file.tsdf.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
+        let occupancy = file.occupancy_bricks.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
+        let tsdf = file.tsdf_bricks.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
         Self::Three(occupancy.union(tsdf))
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use portolan::field::{DenseEsdf, SparseEsdf};
+use portolan::field::{Esdf, EsdfGrid};
 use portolan::geom::{Aabb, Grid};
 use portolan::surface::{Contour, Mesh};
 use portolan_io::{Polyline, SvgStyle, write_geojson, write_glb, write_obj, write_ply_mesh, write_svg};
@@ -50,7 +50,7 @@ pub(crate) fn write_mesh(path: &Path, mesh: &Mesh) -> anyhow::Result<bool> {
 }
 
 /// The field, or a box of it, as arrays; else why `esdf.bin` cannot hold it.
-pub(crate) fn dense_esdf(esdf: &SparseEsdf<3>, bounds: Option<&Aabb<3>>) -> Result<DenseEsdf<3>, String> {
+pub(crate) fn dense_esdf(esdf: &Esdf<3>, bounds: Option<&Aabb<3>>) -> Result<EsdfGrid<3>, String> {
     let wanted = bounds.map_or_else(|| esdf.grid(), |bounds| esdf.grid_within(bounds));
     let grid = wanted.ok_or("nothing was observed there")?;
     let most = (LARGEST_DENSE - 64) / DENSE_CELL;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
-use portolan::geom::Pose;
 use portolan::Mapper;
+use portolan::geom::Pose;
 use portolan::map::{MapError, ScanKind};
 use portolan::mapper::Fused;
 use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
@@ -124,7 +124,7 @@ pub(crate) fn fuse_2d(
 ) -> FusionReport {
     let scans = scans.iter().enumerate().map(|(i, (pose, scan))| (i, *pose, Ok(scan)));
     // On a worker thread: from there the maps of a scan are shared out to the others without a detour.
-    rayon::scope(|_| fuse(mapper, scans, "", poses, progress))
+    rayon::scope(|_| fuse::<2, Scan<2>, _>(mapper, scans, "", poses, progress))
 }
 
 /// Frames of a 3-D log.

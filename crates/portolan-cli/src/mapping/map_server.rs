@@ -16,13 +16,13 @@ const MOST_CELLS: usize = 1 << 28;
 pub(crate) fn seen_by_tree(map: &Quadtree) -> Option<Grid<2>> {
     let mut low = [i32::MAX; 2];
     let mut high = [i32::MIN; 2];
-    map.tree().for_each_leaf(|leaf| {
+    map.store().for_each_leaf(|leaf| {
         for k in 0..2 {
             low[k] = low[k].min(leaf.cell[k]);
             high[k] = high[k].max(leaf.cell[k] + (1 << leaf.height));
         }
     });
-    let lattice = map.tree().grid().lattice;
+    let lattice = map.store().grid().lattice;
     let shape = [0, 1].map(|k| high[k].saturating_sub(low[k]).max(0) as usize);
     (low[0] < high[0]).then(|| Grid::new(lattice.corner(low), lattice.resolution, shape))
 }

@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::choices::{MapKind, SweepArg, WeightsArg, word};
-use super::recipe::{self, CARVE_WEIGHT};
 use crate::arguments::{Bounds, ForgettingArgs, bodies, body, bounds, length, share};
 use crate::dimension::{Dimension, ONLY_3D, option};
 use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::log::{LimitArgs, NoReturnArgs, RangeArgs, Selection};
+use portolan::mapper::{CARVE_WEIGHT, MapperSettings};
 
 /// What shapes the cells: a map can only be gone on with under the same values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
@@ -113,6 +113,11 @@ impl Default for Shape {
     }
 }
 
+/// Clamp of the weight of distances.
+const W_MAX: f32 = 64.0;
+/// Distances of 3-D fields are found up to here (metres).
+const MAX_DISTANCE: f64 = 1.0;
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -123,7 +128,7 @@ impl Default for Settings {
             bounds: None,
             maps: Vec::new(),
             esdf: EsdfArg::default(),
-            max_distance: recipe::MAX_DISTANCE,
+            max_distance: MAX_DISTANCE,
         }
     }
 }
@@ -136,7 +141,7 @@ impl Settings {
         let readable = |(key, value): &(&String, &Value)| Self::deserialize(alone(key, value)).is_ok();
         let fields = saved.iter().filter(readable).map(|(key, value)| (key.clone(), value.clone()));
         let saved = Self::deserialize(Value::Object(fields.collect())).unwrap_or_default();
-        if saved.max_distance > 0.0 { saved } else { Self { max_distance: recipe::MAX_DISTANCE, ..saved } }
+        if saved.max_distance > 0.0 { saved } else { Self { max_distance: MAX_DISTANCE, ..saved } }
     }
 
     /// With what depends on the dimension and on other settings filled in, where it was left open.
@@ -144,9 +149,9 @@ impl Settings {
         use MapKind::{Contour, Esdf, Mesh, Tsdf};
         self.dimension = dimension;
         let shape = &mut self.shape;
-        shape.truncation.get_or_insert(recipe::three_cells(shape.resolution));
+        shape.truncation.get_or_insert(three_cells(shape.resolution));
         shape.sweep.get_or_insert(SweepArg::usual(dimension));
-        shape.forgetting = ForgettingArgs::of(shape.forgetting.w_max().unwrap_or(recipe::W_MAX));
+        shape.forgetting = ForgettingArgs::of(shape.forgetting.w_max().unwrap_or(W_MAX));
         if self.maps.is_empty() {
             let made = |kind: &&MapKind| kind.only().is_none_or(|only| only == dimension);
             self.maps = MapKind::value_variants().iter().filter(made).copied().collect();
@@ -188,11 +193,11 @@ impl Settings {
     }
 
     pub(crate) fn truncation(&self) -> f64 {
-        self.shape.truncation.unwrap_or(recipe::three_cells(self.shape.resolution))
+        self.shape.truncation.unwrap_or(three_cells(self.shape.resolution))
     }
 
     pub(crate) fn w_max(&self) -> f32 {
-        self.shape.forgetting.w_max().unwrap_or(recipe::W_MAX)
+        self.shape.forgetting.w_max().unwrap_or(W_MAX)
     }
 
     pub(crate) fn sweep(&self) -> SweepArg {
@@ -259,6 +264,11 @@ impl Settings {
         }
         Ok(())
     }
+}
+
+/// The library's truncation for cells of this edge (metres).
+fn three_cells(resolution: f64) -> f64 {
+    MapperSettings::<3>::new(resolution).truncation()
 }
 
 fn four_digits<S: Serializer>(weight: &f32, out: S) -> Result<S::Ok, S::Error> {

@@ -10,8 +10,8 @@ use super::memory::peak_memory;
 use super::{Derived, FusionReport, Settings};
 use crate::arguments::shown_bytes;
 use crate::dimension::Dimension;
+use crate::json;
 use crate::log::Log;
-use crate::{json, saved};
 use crate::saved::SavedMap;
 
 /// Everything that a run found out.

@@ -4,7 +4,7 @@ use portolan::cell::{
     Cell, ColorBrick, DistanceBrick, DistancePlanes, LogOdds8, OccupancyModel, Planes, SignedDistance,
 };
 use portolan::geom::{BlockKey, Grid, Lattice, Pose, block_cells};
-use portolan::map::{OccupancyGrid, OccupancyTree, DenseTsdf, TsdfConfig};
+use portolan::map::{DenseTsdf, OccupancyGrid, OccupancyTree, TsdfConfig};
 use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan::sweep::WeightModel;
 use serde_json::{Map, Value, json};
@@ -197,7 +197,10 @@ fn a_map_without_bricks_is_a_map<const D: usize>() {
 
 fn infinite_weights_survive<const D: usize>() {
     let config = TsdfConfig { w_max: f32::INFINITY, ..Default::default() };
-    let file = MapFile { tsdf: Some(DenseTsdf::covering(&Grid::new([0.0; D], config.resolution, [4; D]), config).unwrap()), ..Default::default() };
+    let file = MapFile {
+        tsdf: Some(DenseTsdf::covering(&Grid::new([0.0; D], config.resolution, [4; D]), config).unwrap()),
+        ..Default::default()
+    };
     let back = parse::<D>(file.to_bytes().unwrap()).unwrap();
     assert_eq!(back.tsdf.unwrap().config(), &config);
 }

@@ -2,10 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::bail;
-use portolan::cell::DistancePlanes;
 use portolan::field::{EsdfGrid, UnknownSpace};
-use portolan::geom::Grid;
 use portolan::handover::{Inflation, lowest_between};
 use portolan_io::{MapMode, write_costmap};
 
@@ -78,7 +75,7 @@ impl CostArgs {
                          --unknown pessimistic (such a column is unknown)",
                     ));
                 };
-                let layer = in_the_plane(field, heights, unknown)?;
+                let layer = in_2d(field, heights, unknown)?;
                 (*layer.grid(), how.costs(layer.samples()))
             }
         };
@@ -93,19 +90,8 @@ impl CostArgs {
     }
 }
 
-/// Distances in the plane to what stands between two heights.
-fn in_the_plane(
-    field: &EsdfGrid<3>,
-    heights: [f64; 2],
-    unknown: UnknownSpace,
-) -> anyhow::Result<EsdfGrid<2>> {
-    let (grid, lowest): (Grid<2>, _) = lowest_between(field.grid(), field.samples(), heights, unknown)?;
-    let known = |d: &f32| if d.is_nan() { (0.0, 0.0) } else { (*d, 1.0) };
-    let (distances, weights) = lowest.iter().map(known).unzip();
-    let planes = DistancePlanes::from_parts(distances, weights);
-    let Some(store) = planes.and_then(|p| Dense::from_planes(grid, p)) else {
-        bail!("the distance field has values that are not finite")
-    };
-    let tsdf = Tsdf::from_store(store, TsdfConfig::default())?;
-    Ok(dense_plane_esdf(&tsdf, EsdfArg::Accurate))
+/// 2-D distances to what stands between two heights.
+fn in_2d(field: &EsdfGrid<3>, heights: [f64; 2], unknown: UnknownSpace) -> anyhow::Result<EsdfGrid<2>> {
+    let (grid, lowest) = lowest_between(field.grid(), field.samples(), heights, unknown)?;
+    Ok(dense_esdf_2d(&tsdf_of_samples(grid, &lowest)?, EsdfArg::Accurate))
 }

@@ -4,13 +4,10 @@ use anyhow::bail;
 use portolan::field::{Esdf, EsdfGrid};
 use portolan::geom::{Aabb, Grid};
 use portolan_io::EsdfFile;
-use serde_json::Value;
 
-use super::{Args, esdf_of_cells, esdf_of_server};
-use crate::arguments::Bounds;
-use crate::error::bad_call;
-use crate::esdf::{EsdfArg, dense_plane_esdf};
-use crate::mapping::cells_for_map_server;
+use super::Args;
+use crate::esdf::{dense_esdf_2d, esdf_of_cells};
+use crate::mapping::{Settings, cells_for_map_server, dense_esdf, esdf_settings};
 use crate::source::Source;
 
 /// A field of either dimension.
@@ -30,7 +27,7 @@ impl Field {
                 }
                 None => {
                     let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(None) };
-                    Self::Two(in_plane(esdf_of_cells(grid, &cells), args)?)
+                    Self::Two(in_2d(esdf_of_cells(grid, &cells), args)?)
                 }
             },
             Source::Server(map) => {
@@ -42,24 +39,23 @@ impl Field {
                         args.out.display()
                     );
                 }
-                Self::Two(in_plane(esdf_of_server(map), args)?)
+                Self::Two(in_2d(esdf_of_cells(map.grid, &map.cells), args)?)
             }
-            Source::Esdf(EsdfFile::Two(field)) => Self::Two(in_plane(field.clone(), args)?),
+            Source::Esdf(EsdfFile::Two(field)) => Self::Two(in_2d(field.clone(), args)?),
             Source::Esdf(EsdfFile::Three(field)) => {
                 let dense = field.clone();
-                Self::Three(match space_bounds(args)? {
+                Self::Three(match bounds_3d(args)? {
                     Some(bounds) => cropped(dense, &bounds, args)?,
                     None => dense,
                 })
             }
             Source::Map3(file) => {
-                let Some(map) = &file.tsdf else { return Ok(None) };
-                let settings = &file.header.settings;
-                let saved = settings.get("max_distance").and_then(Value::as_f64).filter(|d| *d > 0.0);
-                let mut how =
-                    esdf_settings(map.weights, map.carve_weight, args.max_distance.or(saved).unwrap_or(1.0));
-                how.method = args.esdf.or(EsdfArg::of_settings(settings)).unwrap_or_default().method();
-                match dense_esdf(&Esdf::of(&map.store, &how), space_bounds(args)?.as_ref()) {
+                let Some(map) = &file.tsdf_bricks else { return Ok(None) };
+                let saved = Settings::of_saved(&file.header.settings);
+                let max_distance = args.max_distance.unwrap_or(saved.max_distance);
+                let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
+                how.method = args.esdf.unwrap_or(saved.esdf).method();
+                match dense_esdf(&Esdf::of(&map.store, &how), bounds_3d(args)?.as_ref()) {
                     Ok(dense) => Self::Three(dense),
                     Err(why) => {
                         bail!("{}: {}", args.input.display(), why.replace("--dense", "--bounds"))
@@ -71,7 +67,7 @@ impl Field {
     }
 }
 
-fn in_plane(dense: EsdfGrid<2>, args: &Args) -> anyhow::Result<EsdfGrid<2>> {
+fn in_2d(dense: EsdfGrid<2>, args: &Args) -> anyhow::Result<EsdfGrid<2>> {
     match args.bounds {
         None => Ok(dense),
         Some(bounds) => cropped(dense, &bounds.in_2d("the map")?, args),

@@ -1,19 +1,16 @@
 //! What `demo` says: for machines and for people.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::geom::Grid;
 use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
 use portolan_chapter::gallery::Gallery;
-use portolan_io::MapFile;
 use portolan_sim::{LapConfig, World};
 use serde_json::{Value, json};
 
 use super::Run;
 use crate::json;
 use crate::mapping::{Derived, FusionReport, Settings};
-use crate::{json, saved};
 use crate::saved::SavedMap;
 
 /// Everything that a run found out.
@@ -23,8 +20,6 @@ pub(super) struct Found<'a> {
     pub(super) grid: Grid<2>,
     pub(super) world: &'a World,
     pub(super) fusion: FusionReport,
-    /// Bytes of each map, measured.
-    pub(super) bytes: BTreeMap<&'static str, usize>,
     pub(super) file: SavedMap,
     pub(super) derived: Derived,
     pub(super) gallery: &'a Gallery,
@@ -37,7 +32,7 @@ impl Found<'_> {
     pub(super) fn to_json(&self, run: &Run) -> Value {
         let stats = json::stats(&self.fusion.stats);
         let lidar = &self.config.lidar;
-        let mut bytes = self.bytes.clone();
+        let mut bytes = self.file.bytes();
         bytes.extend(self.derived.bytes());
         let contour = self.derived.contour.as_ref().map(|c| {
             json!({
@@ -67,7 +62,7 @@ impl Found<'_> {
             "settings": self.settings.to_json(),
             "scans": {
                 "in_log": self.config.scans, "held_out": 0, "fused": self.fusion.stats.scans,
-                "refused_poses": self.fusion.stats.refused_poses, "in_map": saved::header(&self.file).scans,
+                "refused_poses": self.fusion.stats.refused_poses, "in_map": self.file.header().scans,
             },
             "beams": stats["beams"],
             "refused_beams": stats["refused_beams"],
@@ -78,7 +73,7 @@ impl Found<'_> {
             "ghost": self.forgetting.map(Forgetting::to_json),
             "bytes": bytes,
             "seconds": seconds,
-            "logs": saved::header(&self.file).logs,
+            "logs": self.file.header().logs,
             "warnings": self.warnings(),
             "files": run.files,
         })

@@ -8,14 +8,14 @@ use portolan::surface::{
     CompareSettings, Mesh, MeshSettings, Reference, SurfaceComparison, SurfaceDistances, compare_surfaces,
     marching_cubes,
 };
-use portolan_io::{PlyMesh, PointCloudFile, MapFile, TsdfBricks, open, read_ply_mesh, read_points};
+use portolan_io::{MapFile, PlyMesh, PointCloudFile, TsdfBricks, open, read_ply_mesh, read_points};
 use serde_json::{Value, json};
 
 use super::{Args, Part, no_tsdf, predict};
 use crate::mapping::mesh_settings;
 
 pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Part>> {
-    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
     let settings = MeshSettings { normals: false, colors: false, ..mesh_settings(tsdf.weights) };
     let mesh = marching_cubes(&tsdf.store, None, &settings);
     let (triangles, area) = (mesh.triangles.len(), mesh.area());
@@ -38,13 +38,13 @@ fn compare(
     args: &Args,
     mesh: &Mesh,
     tsdf: &TsdfBricks<3>,
-    min_weight: f32,
+    min_weight: Option<f32>,
     path: &Path,
 ) -> anyhow::Result<Part> {
     let reference = Owned::read(path)?;
     let keep = |p: [f64; 3]| {
         let cell = tsdf.store.lattice().cell_of(p).and_then(|cell| tsdf.store.cell(cell));
-        !args.crop || cell.is_some_and(|c| c.weight >= min_weight)
+        !args.crop || cell.is_some_and(|c| min_weight.is_none_or(|w| c.weight >= w))
     };
     let how = CompareSettings::default();
     let Some(comparison) = compare_surfaces(mesh, reference.borrow(), &how, keep) else {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::bail;
-use portolan::map::Tsdf;
+use portolan::map::{Thresholds, Tsdf2};
 use portolan::store::Store;
 use portolan::surface::{
     PredictionScore, RangeNoise, RangePredictions, RayCast, RayCastSettings, RayCaster, cast_ray,
@@ -15,7 +15,7 @@ use super::spread::Spread;
 use super::{Args, Part};
 use crate::error::bad_call;
 use crate::log::{self, LimitArgs, RangeArgs, Selection};
-use crate::mapping::{Settings, free_weight};
+use crate::mapping::Settings;
 use crate::progress::Progress;
 
 /// Rays are followed up to this range (metres), unless the map was made with less.
@@ -100,7 +100,7 @@ pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf2) 
     let scans = log::scans(&log, &task.indices(log.len())?, &limits.limits(&log));
     let resolution = tsdf.grid().lattice.resolution;
     let settings = RayCastSettings {
-        min_weight: portolan::field::EsdfSettings::of(tsdf).min_weight,
+        min_weight: Some(tsdf.thresholds().observed),
         unknown_tolerance: 2.0 * resolution,
         ..RayCastSettings::default()
     };
@@ -124,14 +124,19 @@ pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf2) 
 }
 
 /// Predicts 3-D scans.
-pub(super) fn in_3d(args: &Args, path: &Path, header: &MapHeader, tsdf: &TsdfBricks<3>) -> anyhow::Result<Part> {
+pub(super) fn in_3d(
+    args: &Args,
+    path: &Path,
+    header: &MapHeader,
+    tsdf: &TsdfBricks<3>,
+) -> anyhow::Result<Part> {
     let task = Task::new(args, path, header);
     let log = log::read_3d(path, &args.source, false)?;
     let filter = task.range().filter(task.settings.shape.self_filter.clone())?;
     let indices = task.indices(log.len())?;
     let resolution = tsdf.store.lattice().resolution;
     let settings = RayCastSettings {
-        min_weight: free_weight(tsdf.weights, tsdf.carve_weight),
+        min_weight: Some(Thresholds::of(tsdf.weights, tsdf.carve_weight).observed),
         max_range: filter.max_range.min(FARTHEST),
         // Where free space was not fused, all of it is unknown.
         unknown_tolerance: if task.settings.shape.carve { 2.0 * resolution } else { f64::INFINITY },

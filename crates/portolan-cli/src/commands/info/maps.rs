@@ -1,7 +1,6 @@
 //! `info` of a map.portolan.
 
 use portolan::cell::{Cell, Planes};
-use portolan::map::MapRepr;
 use portolan::store::{Bricks, Store};
 use portolan_io::{MapFile, MapHeader};
 use serde_json::{Value, json};
@@ -36,9 +35,9 @@ pub(super) fn of_2d(file: &MapFile<2>) -> Value {
     if let Some(map) = &file.tree {
         maps["tree"] = json!({
             "cell": "log odds, one byte",
-            "extent": json::aabb(&map.tree().grid().aabb()),
-            "depth": map.tree().depth(),
-            "nodes": map.tree().nodes(),
+            "extent": json::aabb(&map.store().grid().aabb()),
+            "depth": map.store().depth(),
+            "nodes": map.store().nodes(),
             "bytes": map.memory_bytes(),
         });
     }
@@ -57,15 +56,15 @@ pub(super) fn of_2d(file: &MapFile<2>) -> Value {
 
 pub(super) fn of_3d(file: &MapFile<3>) -> Value {
     let mut maps = json!({});
-    if let Some(map) = &file.occupancy {
+    if let Some(map) = &file.occupancy_bricks {
         maps["tree"] = of_bricks("log odds, one byte", &map.store);
     }
-    if let Some(map) = &file.tsdf {
+    if let Some(map) = &file.tsdf_bricks {
         maps["tsdf"] = of_bricks("signed distance and weight, f32", &map.store);
         maps["tsdf"]["truncation"] = json!(map.truncation);
         maps["tsdf"]["w_max"] = json!(map.w_max.is_finite().then_some(map.w_max));
     }
-    if let Some(map) = &file.colors {
+    if let Some(map) = &file.color_bricks {
         maps["colors"] = of_bricks("red, green, blue, weight, 16 bits each", &map.store);
     }
     of_header(3, &file.header, file.poses.len(), maps)

@@ -164,7 +164,8 @@ impl Projective {
             // What is free has weights of its own too.
             octants = Octants { mixed: octants.mixed | octants.free, ..Octants::default() };
         }
-        if let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight)) {
+        if let (Ok(distance), Ok(weight)) = (distance.try_into(), TryInto::<&mut [f32; _]>::try_into(weight))
+        {
             observe_block(&self.lookup(projector), &self.centers(self.keys[i]), octants, distance, weight);
         }
     }

@@ -99,8 +99,7 @@ impl<S: ?Sized> HitMissSweep<S> {
         self.misses.clear();
         let (bounds, most) = (limits.bounds.as_ref(), limits.most_blocks);
         let longest = LONGEST_RAY_CELLS * lattice.resolution;
-        let further: Vec<Ray> =
-            rays.view.and_then(|view| free_reach(view, longest)).into_iter().collect();
+        let further: Vec<Ray> = rays.view.and_then(|view| free_reach(view, longest)).into_iter().collect();
         let (exact, misses) = (&mut self.exact, &mut self.misses);
         let (planned, ()) = parallel::join(
             || exact.plan(lattice, bounds, rays.count, &rays.ray, &further, most),
