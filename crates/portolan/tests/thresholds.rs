@@ -81,13 +81,10 @@ fn defaults_fit<const D: usize, M: Wall<D>>() {
         );
 
         let bricks = map.bricks();
-        let rays = RayCaster::new(&bricks, RayCastSettings::of(&map));
-        let (origin, ahead) =
-            ([0.5; D].map(|v| 0.02 * v), std::array::from_fn(|k| f64::from(u8::from(k == 0))));
-        let settings = RayCastSettings { blind: 0.5, ..*rays.settings() };
-        let hit = RayCaster::new(&bricks, settings).cast(origin, ahead);
+        let ahead = std::array::from_fn(|k| f64::from(u8::from(k == 0)));
+        let settings = RayCastSettings { blind: 0.5, ..RayCastSettings::of(&map) };
+        let hit = RayCaster::new(&bricks, settings).cast([0.01; D], ahead);
         assert!(matches!(hit, RayCast::Hit(s) if (s - 3.99).abs() < 0.02), "{hit:?}");
-        // The wall and the free space before it are one known region.
         let mut frontiers = FrontierMap::new(FrontierSettings::of(&map));
         frontiers.update(&bricks);
         assert!(!frontiers.frontiers().is_empty());
