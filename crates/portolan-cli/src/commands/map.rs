@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     drop(progress);
     stages.end("fuse");
     if let (0, (_, Some(error))) = (fusion.stats.scans, &fusion.unreadable) {
-        // Not one scan could be used: the first error says more than an empty map.
+        // Not one scan could be used: the first error is of more use than an empty map.
         bail!("{error}");
     }
     let mut bytes = mapper.bytes();
@@ -119,7 +119,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes into the file's header what it is made of.
+/// Writes the log, the settings and the counts into the header.
 fn describe(file: &mut AnyMapFile, settings: &Settings, log: &Log, stats: &ScanStats) {
     let header = saved::header_mut(file);
     header.logs.push(log.name());

@@ -1,8 +1,8 @@
-//! From scans to files, in 2-D and 3-D: what `map` is made of.
+//! From scans to files, in 2-D and 3-D: the parts of `map`.
 //!
 //! | step | file |
 //! |---|---|
-//! | what is asked for | `settings.rs`, `choices.rs` |
+//! | options and saved settings | `settings.rs`, `choices.rs` |
 //! | numbers that fit the maps to each other | `recipe.rs` |
 //! | scans and empty or saved maps | `mapper.rs`, `extent.rs`, `grow.rs` |
 //! | one scan into every map | `maps.rs`, `fuse.rs` |

@@ -16,7 +16,7 @@ const MARGIN: f64 = 28.0;
 const TITLE: f64 = 40.0;
 const LEGEND: f64 = 46.0;
 
-/// The picture of a map as PNG bytes; `None` where there is no map to show.
+/// The picture of a map as PNG bytes; `None`: the file holds no map.
 pub(crate) fn of_map(file: &MapFile, derived: &Derived, title: &str) -> Option<Vec<u8>> {
     let (grid, shown) = shown_part(file)?;
     let [width, height] = shown.extent();
@@ -45,8 +45,8 @@ pub(crate) fn of_map(file: &MapFile, derived: &Derived, title: &str) -> Option<V
     // The scale bar stands beside the legend, not on the map.
     let below = PixelRect::new(MARGIN, frame.bottom() + 10.0, frame.width, LEGEND);
     let [scale_x, scale_y] = view.scale();
-    let metres = [below.width / scale_x, below.height / scale_y];
-    canvas.scale_bar(&View::stretch([0.0; 2], metres, below.inset(0.0, 0.0, 0.0, 4.0)));
+    let meters = [below.width / scale_x, below.height / scale_y];
+    canvas.scale_bar(&View::stretch([0.0; 2], meters, below.inset(0.0, 0.0, 0.0, 4.0)));
     canvas.legend(below.inset(0.0, 4.0, 0.3 * below.width, 0.0), &legend, Font::new(16));
     Some(canvas.encode_png())
 }
@@ -73,7 +73,7 @@ fn shown_part(file: &MapFile) -> Option<(Grid<2>, Aabb<2>)> {
     Some((grid, seen.grown(6.0 * grid.lattice.resolution)))
 }
 
-/// The colour of every cell: occupancy in light tones, and over it the signed distance near surfaces.
+/// The color of every cell: occupancy in light tones, and over it the signed distance near surfaces.
 fn cell_colors(file: &MapFile, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<Color> {
     let mut colors = vec![color::UNKNOWN; grid.len()];
     if let Some(map) = &file.grid {
@@ -109,7 +109,7 @@ fn cell_colors(file: &MapFile, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<C
     colors
 }
 
-/// From the paper of surely free space over the tone of what is not known to a dark grey.
+/// From the paper of surely free space over the tone of what is not known to a dark gray.
 fn occupancy_color(p: f64) -> Color {
     if p < 0.5 {
         // The lower clamp is 0.12: one miss is a third of the way, three are nearly all of it.

@@ -13,7 +13,7 @@ use super::choices::SweepArg;
 pub(crate) const CARVE_WEIGHT: f32 = 0.3;
 /// Largest weight of a cell.
 pub(crate) const W_MAX: f32 = 64.0;
-/// Distances of a 3-D esdf are kept up to here (metres).
+/// Distances of a 3-D esdf are kept up to here (meters).
 pub(crate) const MAX_DISTANCE: f64 = 1.0;
 /// Cells around everything that was seen, besides the truncation, in a dense map.
 pub(super) const MARGIN_CELLS: f64 = 4.0;
