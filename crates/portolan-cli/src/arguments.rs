@@ -18,12 +18,12 @@ fn number_that(text: &str, fits: impl Fn(f64) -> bool, must_be: &str) -> Result<
 
 /// A length above zero.
 pub(crate) fn length(text: &str) -> Result<f64, String> {
-    number_that(text, |v| v > 0.0 && v.is_finite(), "a positive, finite length in metres, like 0.05")
+    number_that(text, |v| v > 0.0 && v.is_finite(), "a positive, finite length in meters, like 0.05")
 }
 
 /// A length of zero or more.
 pub(crate) fn length_or_zero(text: &str) -> Result<f64, String> {
-    number_that(text, |v| v >= 0.0 && v.is_finite(), "a finite length in metres, not negative")
+    number_that(text, |v| v >= 0.0 && v.is_finite(), "a finite length in meters, not negative")
 }
 
 /// A weight above zero; `inf` is one.
@@ -67,8 +67,8 @@ impl ForgettingArgs {
         Self { w_max: Some(w_max), half_life: None }
     }
 
-    /// The largest weight, where one was asked for. A half-life goes first: where there are both, the weight is that of a
-    /// saved map.
+    /// The largest weight, where it was given. A half-life comes first: where both are set, the weight is that of a saved
+    /// map.
     pub(crate) fn w_max(&self) -> Option<f32> {
         self.half_life.map(|n| TsdfRule::w_max_for_half_life(n, 1.0) as f32).or(self.w_max)
     }
@@ -152,42 +152,42 @@ fn corners<const D: usize>(min: [f64; D], max: [f64; D]) -> Result<Aabb<D>, Stri
     ordered.then(|| Aabb::new(min, max)).ok_or_else(|| "must have its smaller corner first".to_owned())
 }
 
-/// `x0,y0,x1,y1` or `x0,y0,z0,x1,y1,z1` in metres.
+/// `x0,y0,x1,y1` or `x0,y0,z0,x1,y1,z1` in meters.
 pub(crate) fn bounds(text: &str) -> Result<Bounds, String> {
     match numbers(text)?[..] {
         [x0, y0, x1, y1] => corners([x0, y0], [x1, y1]).map(Bounds::Two),
         [x0, y0, z0, x1, y1, z1] => corners([x0, y0, z0], [x1, y1, z1]).map(Bounds::Three),
-        _ => Err("must be four or six numbers: x0,y0,x1,y1 or x0,y0,z0,x1,y1,z1 in metres".to_owned()),
+        _ => Err("must be four or six numbers: x0,y0,x1,y1 or x0,y0,z0,x1,y1,z1 in meters".to_owned()),
     }
 }
 
-/// `low:high` in metres.
+/// `low:high` in meters.
 pub(crate) fn heights(text: &str) -> Result<[f64; 2], String> {
-    let (low, high) = text.split_once(':').ok_or("must be two heights LOW:HIGH in metres")?;
+    let (low, high) = text.split_once(':').ok_or("must be two heights LOW:HIGH in meters")?;
     match [number(low)?, number(high)?] {
         [low, high] if low <= high && low.is_finite() && high.is_finite() => Ok([low, high]),
         _ => Err("must be finite heights, the lower one first".to_owned()),
     }
 }
 
-/// `x,y,z` in metres.
+/// `x,y,z` in meters.
 pub(crate) fn point3(text: &str) -> Result<[f64; 3], String> {
     match numbers(text)?[..] {
         [x, y, z] => Ok([x, y, z]),
-        _ => Err("must be three numbers x,y,z in metres".to_owned()),
+        _ => Err("must be three numbers x,y,z in meters".to_owned()),
     }
 }
 
-/// `x0,y0,z0,x1,y1,z1` in metres.
+/// `x0,y0,z0,x1,y1,z1` in meters.
 pub(crate) fn box3(text: &str) -> Result<Aabb<3>, String> {
     match bounds(text) {
         Ok(Bounds::Three(b)) => Ok(b),
         Err(e) => Err(e),
-        Ok(Bounds::Two(_)) => Err("must be six numbers x0,y0,z0,x1,y1,z1 in metres".to_owned()),
+        Ok(Bounds::Two(_)) => Err("must be six numbers x0,y0,z0,x1,y1,z1 in meters".to_owned()),
     }
 }
 
-/// A box `x0,y0,z0,x1,y1,z1` or a sphere `x,y,z,radius` in metres.
+/// A box `x0,y0,z0,x1,y1,z1` or a sphere `x,y,z,radius` in meters.
 pub(crate) fn body(text: &str) -> Result<Body, String> {
     body_of(&numbers(text)?)
 }
@@ -196,7 +196,7 @@ fn body_of(numbers: &[f64]) -> Result<Body, String> {
     match *numbers {
         [x, y, z, radius] if radius > 0.0 => Ok(Body::Sphere { center: [x, y, z], radius }),
         [x0, y0, z0, x1, y1, z1] => corners([x0, y0, z0], [x1, y1, z1]).map(Body::Box),
-        _ => Err("must be a box x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius in metres".to_owned()),
+        _ => Err("must be a box x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius in meters".to_owned()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! How distance fields are made of maps.
+//! Distance fields of 2-D maps, and the methods of both dimensions.
 
 use anyhow::Context;
 use portolan::cell::DistancePlanes;

@@ -98,7 +98,7 @@ pub(crate) fn space_log_stats(stats: &ScanLogStats) -> Value {
     })
 }
 
-/// A box in metres.
+/// A box in meters.
 pub(crate) fn aabb<const D: usize>(b: &Aabb<D>) -> Value {
     json!({ "min": b.min.to_vec(), "max": b.max.to_vec(), "size": b.extent().to_vec() })
 }

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::arguments::shown_bytes;
 use crate::output::Output;
 
-/// A bar over `length` steps; hidden where stderr is no terminal or the user wants quiet. The bar removes
+/// A bar over `length` steps; hidden where stderr is not a terminal, and with --quiet. The bar removes
 /// itself when it is dropped.
 pub(crate) struct Progress {
     bar: ProgressBar,

@@ -1,4 +1,4 @@
-//! Any file that holds a map or something made of one, opened by what it is.
+//! Files with a log, a map or something derived from a map, opened by their kind.
 
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,7 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
         FileKind::CarmenLog => Source::Log2(Box::new(CarmenLog::read(path)?)),
         FileKind::ScanLog(_) => Source::Log3(Box::new(ScanLog::open(path, &ScanLogOptions::default())?)),
-        FileKind::Unknown(what) => bail!("{}: not recognised: {what}", path.display()),
+        FileKind::Unknown(what) => bail!("{}: not recognized: {what}", path.display()),
         kind => bail!("{}: is {}, which cannot be read yet", path.display(), describe(&kind)),
     })
 }
@@ -88,14 +88,14 @@ impl Source {
     /// What lowers the trust in it.
     pub(crate) fn warning(&self) -> Option<String> {
         if let Self::Octomap(file) = self {
-            let colors = "its colours are not read, and are missing in what is written from it";
+            let colors = "its colors are not read, and are missing in what is written from it";
             return file.colors_left_out().then(|| colors.into());
         }
         let Self::Server(map) = self else { return None };
         let cells = map.unknown_gray_taken_for_free;
         (cells > 0).then(|| {
             format!(
-                "{cells} cells have the grey of unknown (205 or 206) but count as free, because free_thresh is above \
+                "{cells} cells have the gray of unknown (205 or 206) but count as free, because free_thresh is above \
                  0.196; lower it to keep them unknown"
             )
         })

@@ -369,7 +369,7 @@ fn what_was_seen_once_is_known_under_every_weighting() {
     std::fs::write(&log, log_lines(0, 1)).unwrap();
     let [x, y, theta] = support::pose(0);
     let points = folder.path().join("points.csv");
-    // Half a metre ahead of the sensor.
+    // Half a meter ahead of the sensor.
     std::fs::write(&points, format!("{},{}\n", x + 0.5 * theta.cos(), y + 0.5 * theta.sin())).unwrap();
     for weights in ["constant", "range", "incidence", "range-incidence"] {
         for carve_weight in ["1", "0.3", "0.05"] {

@@ -16,7 +16,7 @@ use portolan_io::{LogLayout, LogWriter, MapFile, MapHeader, TsdfBricks};
 use serde_json::{Map, Value, json as value};
 use support::{arg, fail, json, succeed};
 
-/// Where the map has its wall (x, metres); the truth has it at 1.
+/// Where the map has its wall (x, meters); the truth has it at 1.
 const WALL: f64 = 1.03;
 
 /// A map of a wall of 1.6 x 1.6 m and the free space before it, at 10 cm.

@@ -28,7 +28,7 @@ fn real_log(name: &str) -> Option<PathBuf> {
 
 /// What a map must reach.
 struct Limits {
-    /// Median of |predicted - measured range| (metres).
+    /// Median of |predicted - measured range| (meters).
     median: f64,
     /// Share of the predicted ranges that are within two cells.
     within_two_cells: f64,

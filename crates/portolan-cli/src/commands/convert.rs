@@ -47,10 +47,10 @@ pub(crate) struct Args {
     /// Method of the distance field [default: as the map was made, else accurate]
     #[arg(long, value_enum)]
     esdf: Option<EsdfArg>,
-    /// Largest distance of the distance field (metres) [default: as the map was made]
+    /// Largest distance of the distance field (meters) [default: as the map was made]
     #[arg(long, value_name = "M", value_parser = length, help_heading = ONLY_3D)]
     max_distance: Option<f64>,
-    /// Write only this box of the distance field: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (metres)
+    /// Write only this box of the distance field: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (meters)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     bounds: Option<Bounds>,
     #[command(flatten)]
@@ -284,7 +284,7 @@ fn write_dense<const D: usize>(field: &EsdfGrid<D>, args: &Args) -> anyhow::Resu
 }
 
 impl Args {
-    /// Whether what is written is made of a distance field, whatever the source is.
+    /// Whether the target is made from a distance field, whatever the source.
     fn takes_field(&self, target: Target, source: &Source) -> bool {
         match target {
             Target::Arrays => true,

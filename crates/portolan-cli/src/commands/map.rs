@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     drop(progress);
     stages.end("fuse");
     if let (0, (_, Some(error))) = (fusion.stats.scans, &fusion.unreadable) {
-        // Not one scan could be used: the first error says more than an empty map.
+        // Not one scan could be used: the first error is of more use than an empty map.
         bail!("{error}");
     }
     let (mut file, extent) = run.finish(&settings)?;
@@ -121,7 +121,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes into the file's header what it is made of.
+/// Writes the log, the settings and the counts into the header.
 fn describe(file: &mut SavedMap, settings: &Settings, log: &Log, stats: &ScanStats) {
     let header = file.header_mut();
     header.logs.push(log.name());

@@ -34,10 +34,10 @@ use crate::source::{Source, open};
 pub(crate) struct Args {
     /// A folder that `map` wrote, a map.portolan, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot
     map: PathBuf,
-    /// CSV of x,y (2-D) or x,y,z (3-D) in metres; - reads standard input
+    /// CSV of x,y (2-D) or x,y,z (3-D) in meters; - reads standard input
     #[arg(long, value_name = "FILE")]
     points: PathBuf,
-    /// 3-D maps: largest distance to find (metres) [default: as the map was made]
+    /// 3-D maps: largest distance to find (meters) [default: as the map was made]
     #[arg(long, value_name = "M", value_parser = length)]
     max_distance: Option<f64>,
     /// Method of the distances of a map.portolan; only accurate ones have bounds [default: accurate]
@@ -146,7 +146,7 @@ type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>
 struct Certified<const D: usize> {
     field: Esdf<D>,
     unknown: UnknownSpace,
-    /// Bounds are given up to this distance (metres).
+    /// Bounds are given up to this distance (meters).
     limit: f64,
 }
 

@@ -44,7 +44,7 @@ pub(crate) struct LogArgs {
     /// lidar (the Tr of calib.txt is not applied)
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
-    /// Format of LOG, where it is not recognised: carmen (2-D); seven-scenes, tum, redwood, bigbird, kitti, stanford,
+    /// Format of LOG, where it is not recognized: carmen (2-D); seven-scenes, tum, redwood, bigbird, kitti, stanford,
     /// scan-graph, clouds (3-D)
     #[arg(long, value_name = "KIND", value_parser = log_format)]
     pub(crate) format: Option<LogFormat>,
@@ -52,14 +52,14 @@ pub(crate) struct LogArgs {
     /// transposed-rotation (Stanford, BigBIRD), column-major, opengl-camera
     #[arg(long, value_name = "WORD", value_parser = pose_convention, help_heading = ONLY_3D)]
     pub(crate) pose_convention: Option<PoseConvention>,
-    /// Point clouds: origin of the rays in the frame of the points, x,y,z (metres) [default: the file's viewpoint, else
+    /// Point clouds: origin of the rays in the frame of the points, x,y,z (meters) [default: the file's viewpoint, else
     /// 0,0,0]
     #[arg(long, value_name = "POINT", value_parser = point3, allow_hyphen_values = true, help_heading = ONLY_3D)]
     pub(crate) origin: Option<[f64; 3]>,
     /// Depth images: intrinsics of the camera, as fx,fy,cx,cy (pixels) or a file
     #[arg(long, value_name = "CAMERA", help_heading = ONLY_3D)]
     pub(crate) intrinsics: Option<String>,
-    /// Depth images: units per metre, 1000 for millimetres
+    /// Depth images: units per meter, 1000 for millimeters
     #[arg(long, value_name = "N", value_parser = length, allow_negative_numbers = true, help_heading = ONLY_3D)]
     pub(crate) depth_scale: Option<f64>,
     /// Largest difference in time between a scan and its pose (seconds) [default: 0.02]
@@ -68,7 +68,7 @@ pub(crate) struct LogArgs {
 }
 
 impl LogArgs {
-    /// The dimension of the log's scans. What is not recognised counts as 2-D: that reader reports what is wrong.
+    /// The dimension of the log's scans. What is not recognized counts as 2-D: that reader reports what is wrong.
     pub(crate) fn dimension(&self, path: &Path) -> anyhow::Result<Dimension> {
         Ok(match self.format {
             Some(LogFormat::Carmen) => Dimension::Two,
@@ -112,11 +112,11 @@ impl LogArgs {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default)]
 pub(crate) struct RangeArgs {
-    /// Readings up to this range are refused (metres) [default: 0]
+    /// Readings up to this range are refused (meters) [default: 0]
     #[arg(long, value_name = "M", value_parser = length_or_zero, allow_negative_numbers = true)]
     #[serde(serialize_with = "or_zero")]
     pub(crate) min_range: Option<f64>,
-    /// Returns beyond this range do not count as surfaces; the beam is free up to here (metres) [default: no limit]
+    /// Returns beyond this range do not count as surfaces; the beam is free up to here (meters) [default: no limit]
     #[arg(long, value_name = "M", value_parser = length, allow_negative_numbers = true)]
     #[serde(serialize_with = "finite")]
     pub(crate) max_range: Option<f64>,
@@ -126,11 +126,11 @@ pub(crate) struct RangeArgs {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default)]
 pub(crate) struct NoReturnArgs {
-    /// Readings of this range or more mean "no echo" (metres) [default: detected from the readings of the log]
+    /// Readings of this range or more mean "no echo" (meters) [default: detected from the readings of the log]
     #[arg(long, value_name = "M", value_parser = length, allow_negative_numbers = true, help_heading = ONLY_2D)]
     #[serde(serialize_with = "finite", skip_deserializing)]
     pub(crate) no_return: Option<f64>,
-    /// Range up to which a beam without echo counts as free (metres) [default: 0, nothing]
+    /// Range up to which a beam without echo counts as free (meters) [default: 0, nothing]
     #[arg(long, value_name = "M", value_parser = length_or_zero, allow_negative_numbers = true)]
     #[arg(help_heading = ONLY_2D)]
     #[serde(serialize_with = "or_zero")]
@@ -150,7 +150,7 @@ impl RangeArgs {
     /// The filter for 3-D scans.
     ///
     /// # Errors
-    /// Limits between which there is no range.
+    /// A lower limit that is not below the upper one.
     pub(crate) fn filter(&self, body: Vec<Body>) -> anyhow::Result<FrameFilter> {
         let open = FrameFilter::default();
         let filter = FrameFilter {

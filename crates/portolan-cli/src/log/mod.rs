@@ -107,7 +107,7 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
         (stats.poses_without_scan, "poses belong to no scan"),
         (stats.scans_without_pose, "scans have no pose and were left out"),
         (stats.unmatched_times, "scans have no pose near in time and were left out"),
-        (stats.scans_without_color, "scans have no colour picture"),
+        (stats.scans_without_color, "scans have no color picture"),
     ];
     let mut warnings: Vec<_> =
         counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
@@ -115,10 +115,10 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
         warnings.push(format!("{} poses could not be used (first: {first})", stats.refused_poses.len()));
     }
     if let Some(why) = &stats.colors_left_out {
-        warnings.push(format!("colours were left out: {why}"));
+        warnings.push(format!("colors were left out: {why}"));
     }
     if let Some(lost) = log.unread_colors() {
-        warnings.push(format!("{} colour pictures could not be read (first: {})", lost.pictures, lost.first));
+        warnings.push(format!("{} color pictures could not be read (first: {})", lost.pictures, lost.first));
     }
     warnings
 }
@@ -179,7 +179,7 @@ pub(crate) fn scans(log: &CarmenLog, indices: &[usize], limits: &RangeLimits) ->
     indices.iter().map(|&i| (log.raw(i).world_from_laser, log.raw(i).to_scan(limits))).collect()
 }
 
-/// Length of the sensor's path over all scans (metres).
+/// Length of the sensor's path over all scans (meters).
 pub(crate) fn path_length(log: &CarmenLog) -> f64 {
     let at = |i: usize| log.raw(i).world_from_laser.translation;
     (1..log.len()).map(|i| distance(at(i - 1), at(i))).sum()

@@ -46,7 +46,7 @@ impl MapKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum SweepArg {
-    /// 2-D: distances at cell centres, ranges interpolated between beams
+    /// 2-D: distances at cell centers, ranges interpolated between beams
     CellCentre,
     /// 2-D: the textbook's march along beams
     March,

@@ -17,7 +17,7 @@ use crate::arguments::shown_bytes;
 use crate::esdf::dense_esdf_2d;
 use crate::saved::SavedMap;
 
-/// Contours nearer to each other than this and facing the same way are one wall seen twice (metres).
+/// Contours nearer to each other than this and facing the same way are one wall seen twice (meters).
 const DOUBLED_REACH: f64 = 0.15;
 
 /// Surfaces, distance field and octree, as far as they are wanted and there is a map to derive them from.

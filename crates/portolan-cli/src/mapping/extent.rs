@@ -42,7 +42,7 @@ impl Extent {
     }
 }
 
-/// The box of all bricks of a store (metres).
+/// The box of all bricks of a store (meters).
 pub(crate) fn brick_extent<C: Cell>(store: &Bricks<C, 3>) -> Aabb<3> {
     let mut extent = Aabb::EMPTY;
     for (key, _) in store.bricks_by_age() {

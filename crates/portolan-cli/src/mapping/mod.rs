@@ -1,4 +1,4 @@
-//! From scans to files, in 2-D and 3-D: what `map` is made of.
+//! From scans to files, in 2-D and 3-D: the parts of `map`.
 //!
 //! | step | file |
 //! |---|---|

@@ -45,8 +45,8 @@ pub(crate) fn of_map(file: &MapFile<2>, derived: &Derived, title: &str) -> Optio
     // The scale bar stands beside the legend, not on the map.
     let below = PixelRect::new(MARGIN, frame.bottom() + 10.0, frame.width, LEGEND);
     let [scale_x, scale_y] = view.scale();
-    let metres = [below.width / scale_x, below.height / scale_y];
-    canvas.scale_bar(&View::stretch([0.0; 2], metres, below.inset(0.0, 0.0, 0.0, 4.0)));
+    let meters = [below.width / scale_x, below.height / scale_y];
+    canvas.scale_bar(&View::stretch([0.0; 2], meters, below.inset(0.0, 0.0, 0.0, 4.0)));
     canvas.legend(below.inset(0.0, 4.0, 0.3 * below.width, 0.0), &legend, Font::new(16));
     Some(canvas.encode_png())
 }
@@ -109,7 +109,7 @@ fn cell_colors(file: &MapFile<2>, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Ve
     colors
 }
 
-/// From the paper of surely free space over the tone of what is not known to a dark grey.
+/// From the paper of surely free space over the tone of what is not known to a dark gray.
 fn occupancy_color(p: f64) -> Color {
     if p < 0.5 {
         // The lower clamp is 0.12: one miss is a third of the way, three are nearly all of it.

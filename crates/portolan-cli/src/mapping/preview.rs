@@ -5,10 +5,10 @@ use portolan::geom::vector::sub;
 use portolan::surface::Mesh;
 use portolan_draw::{MeshView, Preview, Sensor, preview};
 
-/// Sensors that the views are chosen from: more say nothing new.
+/// Sensors that the views are chosen from: more add nothing new.
 const MOST_SENSORS: usize = 200;
 
-/// The sheet as PNG bytes; `None`: there is no surface. `camera`: sensors look along z with y down, else along x with z up.
+/// The sheet as PNG bytes; `None`: the mesh is empty. `camera`: sensors look along z with y down, else along x with z up.
 pub(crate) fn of_mesh(mesh: &Mesh, poses: &[Pose<3>], camera: bool, title: &str) -> Option<Vec<u8>> {
     if mesh.triangles.is_empty() {
         return None;

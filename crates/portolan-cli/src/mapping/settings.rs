@@ -20,11 +20,11 @@ use portolan::mapper::{CARVE_WEIGHT, MapperSettings};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default)]
 pub(crate) struct Shape {
-    /// Edge of a cell (metres) [default with --append: that of the map]
+    /// Edge of a cell (meters) [default with --append: that of the map]
     #[arg(long, value_name = "R", value_parser = length, allow_negative_numbers = true)]
     #[arg(required = false, required_unless_present = "append")]
     pub(crate) resolution: f64,
-    /// Truncation distance: signed distances are stored up to here on either side of a surface (metres) [default: three
+    /// Truncation distance: signed distances are stored up to here on either side of a surface (meters) [default: three
     /// cells]
     #[arg(long, value_name = "T", value_parser = length, allow_negative_numbers = true)]
     pub(crate) truncation: Option<f64>,
@@ -49,11 +49,11 @@ pub(crate) struct Shape {
     #[arg(required = false)]
     #[serde(serialize_with = "four_digits")]
     pub(crate) carve_weight: f32,
-    /// Do not fuse colour
+    /// Do not fuse color
     #[arg(long = "no-color", action = clap::ArgAction::SetFalse, help_heading = ONLY_3D)]
     pub(crate) color: bool,
     /// Leave out readings inside this part of the sensor's frame, which belong to the robot itself: a box
-    /// x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius (metres); may be given several times
+    /// x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius (meters); may be given several times
     #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true, help_heading = ONLY_3D)]
     #[serde(with = "bodies")]
     pub(crate) self_filter: Vec<Body>,
@@ -79,7 +79,7 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     #[serde(serialize_with = "or_one")]
     pub(crate) every: Option<u64>,
-    /// Map only this box: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (metres)
+    /// Map only this box: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (meters)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     #[serde(skip_deserializing)]
     pub(crate) bounds: Option<Bounds>,
@@ -90,7 +90,7 @@ pub(crate) struct Settings {
     /// Method of the esdf [default: accurate]
     #[arg(long, value_enum, required = false)]
     pub(crate) esdf: EsdfArg,
-    /// Largest distance of the esdf (metres) [default: 1]
+    /// Largest distance of the esdf (meters) [default: 1]
     #[arg(long, value_name = "M", value_parser = length, required = false, help_heading = ONLY_3D)]
     pub(crate) max_distance: f64,
 }
@@ -169,7 +169,7 @@ impl Settings {
         self.maps.contains(&kind)
     }
 
-    /// Refuses sweeps, maps and bounds of the other dimension, and limits between which there is no range.
+    /// Refuses sweeps, maps and bounds of the other dimension, and a lower limit of range that is not below the upper one.
     pub(crate) fn check(&self, dimension: Dimension) -> anyhow::Result<()> {
         if let Some(sweep) = self.shape.sweep.filter(|sweep| sweep.only() != dimension) {
             return Err(dimension.refused(&format!("--sweep {}", word(&sweep)), "the log"));

@@ -17,7 +17,7 @@ pub(crate) enum Layout {
     /// distance, status, origin, resolution, shape: indexed [x, y, z]
     #[default]
     Plain,
-    /// GPMP2: data with a row for every y, a column for every x, a matrix for every z; origin is the centre of cell 0
+    /// GPMP2: data with a row for every y, a column for every x, a matrix for every z; origin is the center of cell 0
     Gpmp2,
     /// CasADi and acados: values for `interpolant`, the first axis fastest, and the knots x, y, z
     Casadi,
@@ -78,7 +78,7 @@ pub(crate) struct ArrayArgs {
     /// NaN there; the other layouts cannot hold unknown cells
     #[arg(long, value_enum)]
     pub(super) unknown: Option<UnknownArg>,
-    /// Largest distance to write (metres); larger ones are cut to it [default: the largest of the field]
+    /// Largest distance to write (meters); larger ones are cut to it [default: the largest of the field]
     #[arg(long, value_name = "M", value_parser = length)]
     far: Option<f64>,
     /// Precision of the distances [default: f32; gpmp2 and casadi f64, curobo f16]
@@ -192,7 +192,7 @@ impl ArrayArgs {
         arrays
     }
 
-    /// Names of the layout and of what unknown cells became, for whoever opens the file.
+    /// Names of the layout and of what unknown cells became, as arrays.
     fn labels(&self) -> [(&'static str, NpyArray); 2] {
         let layout = match self.layout {
             Layout::Plain => "plain",

@@ -18,7 +18,7 @@ pub(crate) enum Mode {
     Raw,
     /// Occupied (lethal and inscribed), free, unknown
     Trinary,
-    /// Shades of grey, without unknown
+    /// Shades of gray, without unknown
     Scale,
 }
 
@@ -26,10 +26,10 @@ pub(crate) enum Mode {
 #[derive(Clone, Copy, Debug, clap::Args)]
 #[command(next_help_heading = "Costmaps of Nav2 (.yaml with its .pgm)")]
 pub(crate) struct CostArgs {
-    /// Inflation radius (metres), up to which costs decay with the distance; writes a costmap
+    /// Inflation radius (meters), up to which costs decay with the distance; writes a costmap
     #[arg(long, value_name = "M", value_parser = length_or_zero)]
     inflate: Option<f64>,
-    /// Inscribed radius of the robot (metres), up to which the cost is 253 [default: 0]
+    /// Inscribed radius of the robot (meters), up to which the cost is 253 [default: 0]
     #[arg(long, value_name = "M", value_parser = length_or_zero, requires = "inflate")]
     inscribed: Option<f64>,
     /// cost_scaling_factor: how fast costs decay (1/m) [default: 3]
@@ -38,7 +38,7 @@ pub(crate) struct CostArgs {
     /// Mode of map_server [default: raw with --inflate, else trinary]
     #[arg(long, value_enum)]
     mode: Option<Mode>,
-    /// 3-D maps: use the obstacles between these heights, LOW:HIGH (metres), and measure distances in 2-D
+    /// 3-D maps: use the obstacles between these heights, LOW:HIGH (meters), and measure distances in 2-D
     #[arg(long, value_name = "LOW:HIGH", value_parser = heights, allow_hyphen_values = true)]
     z: Option<[f64; 2]>,
 }

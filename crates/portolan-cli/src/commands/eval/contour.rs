@@ -48,7 +48,7 @@ fn compare(contour: &Contour, path: &Path) -> anyhow::Result<Part> {
     Ok(Part { key: "reference", value, text })
 }
 
-/// Samples along segments are this far apart at most (metres).
+/// Samples along segments are this far apart at most (meters).
 const SPACING: f64 = 0.02;
 /// More samples than this are thinned out.
 const MOST_SAMPLES: f64 = 500_000.0;

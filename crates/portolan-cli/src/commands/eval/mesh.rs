@@ -22,7 +22,7 @@ pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Par
     let mut parts = vec![Part {
         key: "surface",
         value: json!({ "triangles": triangles, "area": area }),
-        text: format!("surface: {area:.1} square metres in {triangles} triangles\n"),
+        text: format!("surface: {area:.1} square meters in {triangles} triangles\n"),
     }];
     if let Some(path) = &args.scans {
         parts.push(predict::in_3d(args, path, &file.header, tsdf)?);

@@ -40,10 +40,10 @@ impl<'a> SegmentIndex<'a> {
 
     /// Distance to the nearest segment; `None` without segments.
     pub(super) fn nearest_distance(&self, p: [f64; 2]) -> Option<f64> {
-        let centre = self.bucket(p);
+        let center = self.bucket(p);
         // Rings that miss all buckets are passed over, those behind them need not be looked at.
-        let off = |k: usize| (self.range[0][k] - centre[k]).max(centre[k] - self.range[1][k]).max(0);
-        let far = |k: usize| (centre[k] - self.range[0][k]).max(self.range[1][k] - centre[k]);
+        let off = |k: usize| (self.range[0][k] - center[k]).max(center[k] - self.range[1][k]).max(0);
+        let far = |k: usize| (center[k] - self.range[0][k]).max(self.range[1][k] - center[k]);
         if self.segments.is_empty() {
             return None;
         }
@@ -52,11 +52,11 @@ impl<'a> SegmentIndex<'a> {
             if (ring - 1) as f64 * self.edge > best {
                 break;
             }
-            for x in (centre[0] - ring).max(self.range[0][0])..=(centre[0] + ring).min(self.range[1][0]) {
-                let on_side = (x - centre[0]).abs() == ring;
+            for x in (center[0] - ring).max(self.range[0][0])..=(center[0] + ring).min(self.range[1][0]) {
+                let on_side = (x - center[0]).abs() == ring;
                 let step = if on_side || ring == 0 { 1 } else { 2 * ring };
-                let mut y = centre[1] - ring;
-                while y <= centre[1] + ring {
+                let mut y = center[1] - ring;
+                while y <= center[1] + ring {
                     for &i in self.buckets.get(&[x, y]).into_iter().flatten() {
                         let [a, b] = self.segments[i as usize];
                         best = best.min(point_segment(p, a, b).0);

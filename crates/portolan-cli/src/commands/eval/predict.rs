@@ -18,9 +18,9 @@ use crate::log::{self, LimitArgs, RangeArgs, Selection};
 use crate::mapping::Settings;
 use crate::progress::Progress;
 
-/// Rays are followed up to this range (metres), unless the map was made with less.
+/// Rays are followed up to this range (meters), unless the map was made with less.
 const FARTHEST: f64 = 100.0;
-/// Close before its sensor a scan sees what no other has: unknown space up to here is passed over (metres).
+/// Close before its sensor a scan sees what no other has: unknown space up to here is passed over (meters).
 const BLIND: f64 = 0.5;
 
 /// Which scans of the log are predicted, and how they are read.
