@@ -42,7 +42,7 @@ fn lap_in_a_tree() -> (Quadtree, usize) {
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
     let mut tree = Quadtree::covering(&grid, OccupancyModel::default()).unwrap();
     for (pose, scan) in lap(&world, &LapConfig::default()) {
-        tree.integrate(&pose, &scan);
+        tree.integrate(&pose, &scan).unwrap();
     }
     tree.compact();
     (tree, grid.len())
@@ -66,7 +66,7 @@ fn exercise_2_crossovers_of_our_node() {
 
     // And measured: the lap in a tree at 5 cm. It refines along furniture and along the border of the unknown too.
     let (tree, cells) = lap_in_a_tree();
-    let records = tree.tree().inner_nodes();
+    let records = tree.store().inner_nodes();
     let counted = s / 0.05;
     println!(
         "measured: {records} inner records, {counted:.0} by the walls; {} bytes, {:.2} of a byte a cell",

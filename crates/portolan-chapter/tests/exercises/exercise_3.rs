@@ -1,21 +1,17 @@
 //! Exercise 3: the zero crossing of observations along slanted beams.
 
 use crate::page::{check, mm};
-use portolan::map::{Tsdf, TsdfConfig};
+use portolan::geom::Grid;
+use portolan::map::{Tsdf2, TsdfConfig};
 
 /// What the map of a wall at `y = 0` believes along the normal when beams of these angles (radians) were fused with these
 /// weights, their ranges off by `errors`: cell centres at `(k + 1/2) r`, up to tau on both sides.
 fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf2 {
-    let config = TsdfConfig {
-        cells: [1, 2 * (tau / r).ceil() as usize],
-        resolution: r,
-        origin: [0.0, -r * (tau / r).ceil()],
-        truncation: tau,
-        w_max: f32::INFINITY,
-        ..Default::default()
-    };
-    let mut map = Tsdf2::new(config).unwrap();
-    for j in 0..config.cells[1] as i32 {
+    let half = (tau / r).ceil();
+    let grid = Grid::new([0.0, -r * half], r, [1, 2 * half as usize]);
+    let config = TsdfConfig { truncation: tau, w_max: f32::INFINITY, ..TsdfConfig::default() };
+    let mut map = Tsdf2::covering(&grid, config).unwrap();
+    for j in 0..grid.shape[1] as i32 {
         let y = map.grid().lattice.center([0, j])[1];
         for &(theta, weight, error) in beams {
             let d = y / theta.cos() + error;

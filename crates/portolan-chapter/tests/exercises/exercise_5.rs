@@ -3,7 +3,7 @@
 use crate::page::{check, cm};
 use portolan::cell::OccupancyModel;
 use portolan::geom::Grid;
-use portolan::map::{OccupancyGrid, Quadtree, Tsdf, TsdfConfig};
+use portolan::map::{OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::surface::{ContourSettings, marching_squares};
 use portolan_chapter::memory::{crossover_resolution, inner_only_node_bytes};
 use portolan_sim::{Lap, LapConfig, Random, World, apartment, lap};
@@ -12,9 +12,9 @@ const R: f64 = 0.05;
 
 /// Levels that a probe descends below the root, over the observed area.
 fn levels(tree: &Quadtree) -> f64 {
-    let depth = tree.tree().depth();
+    let depth = tree.store().depth();
     let (mut area, mut sum) = (0.0, 0.0);
-    tree.tree().for_each_leaf(|leaf| {
+    tree.store().for_each_leaf(|leaf| {
         let cells = f64::from(1u32 << leaf.height).powi(2);
         area += cells;
         sum += cells * f64::from(depth - leaf.height);
@@ -47,7 +47,7 @@ fn ratio_in_a_box(log: &Lap, times: usize) -> f64 {
     let grid = Grid::new([0.0; 2], R, [240 * times, 180 * times]);
     let mut tree = Quadtree::covering(&grid, OccupancyModel::default()).unwrap();
     for (pose, scan) in log {
-        tree.integrate(pose, scan);
+        tree.integrate(pose, scan).unwrap();
     }
     tree.compact();
     tree.memory_bytes() as f64 / grid.len() as f64
@@ -58,13 +58,13 @@ fn exercise_5_on_the_page() {
     let world = apartment().world;
     let log = lap(&world, &LapConfig::default());
     let cells = Grid::new([0.0; 2], R, [240, 180]);
-    let mut grid = OccupancyGrid::covering(cells, OccupancyModel::default()).unwrap();
+    let mut grid = OccupancyGrid::covering(&cells, OccupancyModel::default()).unwrap();
     let mut tree = Quadtree::covering(&cells, OccupancyModel::default()).unwrap();
-    let mut tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&cells)).unwrap();
+    let mut tsdf = Tsdf2::covering(&cells, TsdfConfig::default()).unwrap();
     for (pose, scan) in &log {
-        grid.integrate(pose, scan);
-        tree.integrate(pose, scan);
-        tsdf.integrate(pose, scan, true);
+        grid.integrate(pose, scan).unwrap();
+        tree.integrate(pose, scan).unwrap();
+        tsdf.integrate(pose, scan).unwrap();
     }
     let contour = marching_squares(&tsdf, &ContourSettings::default());
     let levels = levels(&tree);

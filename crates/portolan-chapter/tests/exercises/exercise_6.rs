@@ -3,7 +3,7 @@
 use crate::page::{check, mm};
 use portolan::field::esdf_from_tsdf;
 use portolan::geom::Grid;
-use portolan::map::{Cloud, Tsdf, TsdfConfig};
+use portolan::map::{Cloud, Tsdf2, TsdfConfig};
 use portolan_chapter::MapRepr;
 use portolan_chapter::gallery::{GallerySettings, Row, run};
 use portolan_draw::shown_bytes;
@@ -16,7 +16,7 @@ const POINT_BYTES: usize = 2 * 16 + 4;
 fn scans_until_larger() -> (usize, usize) {
     let world = apartment().world;
     let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
-    let tsdf = Tsdf2::new(TsdfConfig::default().with_grid(&grid)).unwrap();
+    let tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
     let field = esdf_from_tsdf(&tsdf, 0.5, 1.5).memory_bytes();
     let mut points = 0;
     let scans = lap(&world, &LapConfig::default());
@@ -49,11 +49,11 @@ fn after_the_move() -> (f64, f64, Option<f64>) {
     let world = apartment().world;
     let moved = world.with_moved("chair", CHAIR_MOVE);
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
-    let mut tsdf = Tsdf2::new(TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }.with_grid(&grid)).unwrap();
+    let mut tsdf = Tsdf2::covering(&grid, TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }).unwrap();
     let mut cloud = Cloud::new();
     for (k, world) in [&world, &moved].into_iter().enumerate() {
         for (pose, scan) in lap(world, &LapConfig { first_index: 200 * k as u64, ..Default::default() }) {
-            tsdf.integrate(&pose, &scan, true);
+            tsdf.integrate(&pose, &scan).unwrap();
             cloud.integrate(&pose, &scan);
         }
     }
