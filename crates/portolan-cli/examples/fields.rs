@@ -14,7 +14,8 @@ use std::time::Instant;
 
 use anyhow::{Context, ensure};
 use clap::{Parser, Subcommand};
-use portolan::field::{Esdf, FieldSlots, Interpolation, MaskTransform, Status};
+use portolan::Status;
+use portolan::field::{EsdfGrid, FieldSlots, Interpolation, MaskTransform};
 use portolan::geom::Grid;
 use serde_json::{Value, json};
 
@@ -83,7 +84,7 @@ fn main() -> anyhow::Result<()> {
             let points: Vec<f64> =
                 read(points)?.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
             let grid = Grid::new([0.0; 3], *resolution, [shape[0], shape[1], shape[2]]);
-            let esdf = Esdf::from_samples(grid, samples)?;
+            let esdf = EsdfGrid::from_samples(grid, samples)?;
             let interpolation = if *cubic { Interpolation::Cubic } else { Interpolation::Linear };
             query(&esdf, points.as_chunks().0, interpolation, args.repeats)
         }
@@ -117,7 +118,7 @@ fn transform<const D: usize>(
     Ok((seconds, mask.len(), squared.iter().flat_map(|v| v.to_le_bytes()).collect(), Value::Null))
 }
 
-fn query(esdf: &Esdf<3>, points: &[[f64; 3]], interpolation: Interpolation, repeats: usize) -> Timed {
+fn query(esdf: &EsdfGrid<3>, points: &[[f64; 3]], interpolation: Interpolation, repeats: usize) -> Timed {
     let mut distance = vec![0.0; points.len()];
     let mut gradient = vec![[0.0; 3]; points.len()];
     let mut status = vec![Status::default(); points.len()];

@@ -40,7 +40,6 @@ enum Workload {
 enum Sweep {
     Auto,
     Exact,
-    Projective,
 }
 
 /// One workload, timed: prints one JSON line.
@@ -105,14 +104,13 @@ fn timed<T>(repeats: usize, mut run: impl FnMut() -> anyhow::Result<T>) -> anyho
     Ok((seconds, last.context("a repeat")?))
 }
 
-fn fused(args: &Args, frames: &[(Pose<3>, Frame)]) -> anyhow::Result<Occupancy> {
+fn fused(args: &Args, frames: &[(Pose<3>, Frame)]) -> anyhow::Result<Occupancy<3>> {
     let sweep = match args.sweep {
         Sweep::Auto => OccupancySweep::Auto,
         Sweep::Exact => OccupancySweep::Exact,
-        Sweep::Projective => OccupancySweep::Projective,
     };
     let lattice = Lattice::new([0.0; 3], args.resolution);
-    let mut map = Occupancy::new(lattice, OccupancyModel::default(), sweep)?;
+    let mut map = Occupancy::<3>::new(lattice, OccupancyModel::default())?.with_sweep(sweep);
     for (pose, frame) in frames {
         map.integrate(pose, frame)?;
     }

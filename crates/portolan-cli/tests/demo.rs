@@ -65,13 +65,13 @@ fn check_poses(poses: &Value) {
 /// 200 poses, 199 motions, and the closures; the poses are those of the minimum.
 fn check_graph(g2o: &[u8]) {
     let file = portolan_graph::read_g2o(g2o, "pose_graph.g2o").unwrap();
-    let portolan_graph::AnyGraph::Plane(mut graph) = file.graph else { panic!("not in the plane") };
+    let portolan_graph::AnyGraph::Se2(mut graph) = file.graph else { panic!("not 2-D") };
     assert!(!file.vertices_made && file.unknown.is_empty());
     assert_eq!(graph.vertices().iter().filter(|v| v.fixed).count(), 1);
     assert!(graph.vertices().len() == 200 && graph.edges().len() > 199 + 100);
     let written: Vec<_> = graph.vertices().iter().map(|v| v.world_from_vertex).collect();
-    let kernel = portolan_sim::CorrectionSettings::default().kernel;
-    graph.optimise(&portolan_graph::Settings { kernel, ..Default::default() }).unwrap();
+    let kernel = portolan_chapter::poses::CorrectionSettings::default().kernel;
+    graph.optimize(&portolan_graph::Settings { kernel, ..Default::default() }).unwrap();
     for (before, after) in written.iter().zip(graph.vertices()) {
         assert!(before.translation_to(&after.world_from_vertex) < 1e-3);
     }

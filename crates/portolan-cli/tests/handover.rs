@@ -48,20 +48,20 @@ fn plain_arrays_are_indexed_x_y_in_both_orders() {
     let out = folder.path().join("out");
     map(&log, &out, &[]);
     let EsdfFile::Two(field) = EsdfFile::read(out.join("esdf.bin")).unwrap() else { panic!() };
-    let [nx, ny] = field.grid.shape;
+    let [nx, ny] = field.grid().shape;
     for (order, strides) in [("c", [ny, 1]), ("f", [1, nx])] {
         let npz = folder.path().join(format!("{order}.npz"));
         succeed(["convert", arg(&out), arg(&npz), "--order", order]);
         let distance = array(&npz, "distance");
         assert_eq!((&distance.shape[..], distance.fortran), (&[nx, ny][..], order == "f"));
         let (values, status) = (numbers(&distance), numbers(&array(&npz, "status")));
-        for i in 0..field.grid.len() {
-            let [x, y] = field.grid.cell(i).map(|c| c as usize);
+        for i in 0..field.grid().len() {
+            let [x, y] = field.grid().cell(i).map(|c| c as usize);
             let at = x * strides[0] + y * strides[1];
-            assert_eq!((values[at] as f32).to_bits(), field.distances[i].to_bits());
-            assert_eq!(status[at] == 0.0, field.distances[i].is_nan());
+            assert_eq!((values[at] as f32).to_bits(), field.samples()[i].to_bits());
+            assert_eq!(status[at] == 0.0, field.samples()[i].is_nan());
         }
-        assert_eq!(numbers(&array(&npz, "origin")), field.grid.lattice.origin);
+        assert_eq!(numbers(&array(&npz, "origin")), field.grid().lattice.origin);
         assert_eq!(numbers(&array(&npz, "resolution")), [0.05]);
         assert_eq!(array(&npz, "order"), NpyArray::text(&order.to_uppercase()));
     }
@@ -142,7 +142,7 @@ fn costmaps_are_the_formula_over_the_distances() {
     let how = Inflation { inscribed_radius: 0.22, inflation_radius: 0.55, cost_scaling_factor: 10.0 };
     let image = Pgm::read(yaml.with_extension("pgm")).unwrap();
     let mut kinds = [0; 4];
-    for (pixel, d) in image.pixels.chunks(image.width).rev().flatten().zip(&field.distances) {
+    for (pixel, d) in image.pixels.chunks(image.width).rev().flatten().zip(field.samples()) {
         let expected = Inflation::percent(how.cost(f64::from(*d)));
         assert_eq!(*pixel, expected.map_or(255, u16::from));
         kinds[match expected {
@@ -154,7 +154,7 @@ fn costmaps_are_the_formula_over_the_distances() {
     }
     assert!(kinds.iter().all(|n| *n > 100), "{kinds:?}");
     let map = MapServerMap::read(&yaml).unwrap();
-    assert_eq!(map.grid, field.grid);
+    assert_eq!(map.grid, *field.grid());
     let bad = ["convert", arg(&out), arg(&yaml), "--inflate", "0.1", "--inscribed", "0.2"];
     assert!(fail(2, bad).contains("the inflation radius"));
     let scale = ["convert", arg(&out), arg(&yaml), "--inflate", "0.5", "--mode", "scale"];

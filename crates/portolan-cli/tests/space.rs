@@ -56,7 +56,7 @@ fn a_lidar_log_becomes_all_maps() {
     let answer = &answers["answers"][0];
     assert_eq!(answer["status"], "known");
     assert!(answer["occupancy"].as_f64().unwrap() < 0.3);
-    let world = portolan_sim::space::building_world(portolan_sim::SEED).world;
+    let world = portolan_sim::building::building_world(portolan_sim::SEED).world;
     let truth = world.signed_distance([row[3], row[7], row[11]]);
     let distance = answer["distance"].as_f64().unwrap();
     assert!(distance > truth - 0.15 && distance < truth + 1.0, "{answer} {truth}");

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use portolan::geom::Pose;
 use portolan::scan::{Beam, BeamKind, Scan};
-use portolan_studio::engine::{Clock, Limits, Logs, PlaneLog, Session, Wire};
+use portolan_studio::engine::{Clock, Limits, Logs, Session, Source2d, Wire};
 use serde_json::{Value, json};
 
 mod support;
@@ -35,8 +35,8 @@ fn points([x0, y0]: [f64; 2], [w, h]: [f64; 2]) -> Vec<[f64; 2]> {
     some.chain([[1e12, 0.0], [-3.0, 1e6]]).collect()
 }
 
-fn compare(plane: PlaneLog, statuses: &[&str]) {
-    let logs = Arc::new(Logs { plane, ..Logs::default() });
+fn compare(source_2d: Source2d, statuses: &[&str]) {
+    let logs = Arc::new(Logs { source_2d, ..Logs::default() });
     let mut session = Session::new(&logs, Limits::default(), &Clock::new(|| 0.0));
     let (opened, _) = ask(&mut session, "clearance", json!({ "op": "open", "have": null }));
     let (header, mut file) = ask(&mut session, "fusion", json!({ "op": "export", "file": "map" }));
@@ -70,7 +70,7 @@ fn compare(plane: PlaneLog, statuses: &[&str]) {
 
 #[test]
 fn of_the_apartment() {
-    compare(PlaneLog::Apartment, &["known", "unknown", "outside"]);
+    compare(Source2d::Apartment, &["known", "unknown", "outside"]);
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn of_a_plain_that_is_wider_than_distances_are_kept() {
     let (bearings, beams): (Vec<_>, Vec<_>) = (0..720).map(beam).unzip();
     let scans = vec![(Pose::<2>::new(0.0, 0.0, 0.0), Scan::from_fan(&bearings, beams))];
     compare(
-        PlaneLog::Recorded { name: "plain".into(), scans },
+        Source2d::Recorded { name: "plain".into(), scans },
         &["known", "saturated", "unknown", "outside"],
     );
 }

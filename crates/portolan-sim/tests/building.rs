@@ -5,6 +5,7 @@
 use portolan::geom::Lattice;
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::{MeshSettings, marching_cubes};
+use portolan::sweep::OccupancySweep;
 use portolan_sim::building::{
     BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, building_log, free_points, score_free,
     score_surface, seen_surface, surface_errors, surface_points,
@@ -78,7 +79,7 @@ fn vertices(map: &Tsdf3) -> Vec<[f64; 3]> {
     (0..mesh.vertices.len()).map(|i| mesh.vertex_world(i)).collect()
 }
 
-fn tsdf_of(log: &BuildingLog, config: TsdfConfig) -> Tsdf3 {
+fn tsdf_of(log: &BuildingLog, config: TsdfConfig<3>) -> Tsdf3 {
     let mut map = Tsdf3::new(config).unwrap();
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();

@@ -83,7 +83,7 @@ mod update {
     #[divan::bench(args = [false, true])]
     fn tsdf_bricks(bencher: Bencher, carve: bool) {
         let config = TsdfConfig { carve, ..Default::default() };
-        let new = || Tsdf2::new(config).expect("a valid map");
+        let new = || Tsdf::<2>::new(config).expect("a valid map");
         bencher.counter(scans()).bench(|| in_bricks(new(), |map, pose, scan| map.integrate(pose, scan)));
     }
 

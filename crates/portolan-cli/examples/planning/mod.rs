@@ -6,9 +6,9 @@ use std::collections::BinaryHeap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use portolan::field::{ClearanceField, EsdfSettings, SparseEsdf, SparseEsdfSettings, UnknownSpace};
+use portolan::field::{ClearanceField, Esdf, EsdfSettings, UnknownSpace};
 use portolan::geom::{Aabb, Grid, Pose, vector};
-use portolan::map::{Tsdf, TsdfConfig};
+use portolan::map::{Tsdf2, TsdfConfig};
 use portolan::plan::{Demand, PathCheck, Waypoints, check_path};
 use portolan::scan::{RangeLimits, Scan};
 use portolan::surface::{Contour, ContourSettings, marching_squares};
@@ -19,7 +19,7 @@ use portolan_io::{CarmenLog, detect_no_return};
 pub(crate) struct Place {
     pub(crate) name: String,
     pub(crate) grid: Grid<2>,
-    pub(crate) field: SparseEsdf<2>,
+    pub(crate) field: Esdf<2>,
     pub(crate) contour: Contour,
     pub(crate) way: Vec<[f64; 2]>,
 }
@@ -55,17 +55,12 @@ impl Place {
             scan.hits_world(pose).for_each(|p| seen.include(p));
         }
         let grid = Grid::covering(seen.grown(0.5), 0.05).context("the log has no box")?;
-        let mut tsdf = Tsdf::new(TsdfConfig::default().with_grid(&grid))?;
+        let mut tsdf = Tsdf2::covering(&grid, TsdfConfig::default())?;
         for (pose, scan) in &scans {
-            tsdf.integrate(pose, scan, true);
+            tsdf.integrate(pose, scan)?;
         }
-        let how = SparseEsdfSettings {
-            min_weight: EsdfSettings::of(&tsdf).min_weight,
-            max_distance: 2.0,
-            unknown: true,
-            ..SparseEsdfSettings::default()
-        };
-        let field = SparseEsdf::of_tsdf(&tsdf, &how);
+        let how = EsdfSettings { max_distance: 2.0, unknown: true, ..EsdfSettings::default() };
+        let field = Esdf::of(&tsdf, &how);
         let contour = marching_squares(&tsdf, &ContourSettings::of(&tsdf));
         let way = scans.iter().map(|(pose, _)| pose.translation).collect();
         Ok(Self { name, grid, field, contour, way })

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use portolan_io::{LogLayout, LogWriter};
-use portolan_sim::space::{BuildingConfig, DepthCamera, SpaceLidar, SpaceSensor, building};
+use portolan_sim::building::{BuildingConfig, BuildingSensor, DepthCamera, SpinningLidar, building_log};
 use tempfile::TempDir;
 
 /// A short walk with a small lidar, as KITTI has it.
 pub(crate) fn lidar_log() -> (TempDir, PathBuf) {
-    let lidar = SpaceLidar { rings: 24, columns: 360, ..SpaceLidar::default() };
+    let lidar = SpinningLidar { rings: 24, columns: 360, ..SpinningLidar::default() };
     written(
-        SpaceSensor::Lidar(lidar),
+        BuildingSensor::Lidar(lidar),
         6,
         LogLayout::Kitti { camera_from_lidar: portolan::geom::Pose::IDENTITY },
     )
@@ -18,13 +18,13 @@ pub(crate) fn lidar_log() -> (TempDir, PathBuf) {
 
 /// A short walk with a small depth camera, as 7-Scenes has it.
 pub(crate) fn camera_log() -> (TempDir, PathBuf) {
-    written(SpaceSensor::Camera(DepthCamera::default().scaled(0.25)), 5, LogLayout::SevenScenes)
+    written(BuildingSensor::Camera(DepthCamera::default().scaled(0.25)), 5, LogLayout::SevenScenes)
 }
 
-fn written(sensor: SpaceSensor, scans: usize, layout: LogLayout) -> (TempDir, PathBuf) {
+fn written(sensor: BuildingSensor, scans: usize, layout: LogLayout) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log");
-    let log = building(&BuildingConfig { scans: 8 * scans, sensor, ..BuildingConfig::default() });
+    let log = building_log(&BuildingConfig { scans: 8 * scans, sensor, ..BuildingConfig::default() });
     let mut writer = LogWriter::create(&path, layout).unwrap();
     for ((pose, frame), time) in log.scans.iter().zip(&log.times).take(scans) {
         writer.push(pose, *time, frame).unwrap();
