@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     stages.end("prepare");
 
     let progress = Progress::new(run.scans(), "fusing", args.output);
-    let fusion = run.fuse(threads, &progress);
+    let fusion = run.fuse(&settings, threads, &progress);
     drop(progress);
     stages.end("fuse");
     if let (0, (_, Some(error))) = (fusion.stats.scans, &fusion.unreadable) {

@@ -13,6 +13,7 @@ use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
 use portolan_io::IoError;
 use portolan_io::scan_log::ScanLog;
 
+use super::{MapKind, Settings};
 use crate::progress::Progress;
 
 /// Frames that are read ahead.
@@ -54,6 +55,19 @@ impl FusionReport {
         }
         // What the filter left out does not reach the maps.
         ScanStats { beams: *counts, ..last }
+    }
+
+    /// Grid and tree of a 2-D run are made of one map: both have had its observations.
+    pub(crate) fn name_occupancy(&mut self, settings: &Settings) {
+        let Some(&cells) = self.observations.get("grid") else { return };
+        if settings.wants(MapKind::Tree) {
+            self.observations.insert("tree", cells);
+        }
+        if !settings.wants(MapKind::Grid) {
+            self.observations.remove("grid");
+            let seconds = self.seconds.remove("grid");
+            self.seconds.extend(seconds.map(|seconds| ("tree", seconds)));
+        }
     }
 
     fn leave_out(&mut self, why: String) {

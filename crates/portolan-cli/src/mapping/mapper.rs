@@ -93,9 +93,13 @@ impl<'a> Run<'a> {
     }
 
     /// Fuses all scans, in order.
-    pub(crate) fn fuse(&mut self, threads: usize, progress: &Progress) -> FusionReport {
+    pub(crate) fn fuse(&mut self, settings: &Settings, threads: usize, progress: &Progress) -> FusionReport {
         match self {
-            Self::Two { scans, mapper, file, .. } => fuse_2d(mapper, scans, &mut file.poses, progress),
+            Self::Two { scans, mapper, file, .. } => {
+                let mut report = fuse_2d(mapper, scans, &mut file.poses, progress);
+                report.name_occupancy(settings);
+                report
+            }
             Self::Three { frames, mapper, file } => {
                 fuse_3d(mapper, frames, &mut file.poses, threads, progress)
             }
