@@ -96,7 +96,7 @@ fn a_lap_that_was_fused_in_the_studio_is_read_by_the_other_commands() {
     let folder = tempfile::tempdir().unwrap();
     let studio = Studio::start(&[]);
     assert_eq!(studio.said["views"]["fusion"], "the simulated Apartment");
-    assert_eq!(studio.said["views"]["space"], "the simulated building");
+    assert_eq!(studio.said["views"]["3d"], "the simulated building");
     let mut page = studio.open();
     page.ask("fusion", json!({ "op": "seek", "scan": 200 }));
     let (esdf, map) = (folder.path().join("esdf.bin"), folder.path().join("map.portolan"));
@@ -150,10 +150,10 @@ fn a_recorded_3d_log_makes_the_surface_that_map_makes() {
 
         let studio = Studio::start(&[&[arg(&log)], limits].concat());
         let mut page = studio.open();
-        while page.ask("space", json!({ "op": "seek", "frame": scans })).0["at"] != scans {}
-        while page.ask("space", json!({ "op": "mesh" })).0["mesh"]["pending"] != 0 {}
+        while page.ask("3d", json!({ "op": "seek", "frame": scans })).0["at"] != scans {}
+        while page.ask("3d", json!({ "op": "mesh" })).0["mesh"]["pending"] != 0 {}
         let exported = folder.path().join("studio.ply");
-        page.export("space", "ply", &exported);
+        page.export("3d", "ply", &exported);
         let shown = surface(&exported);
         assert!(shown == surface(&made.join("mesh.ply")), "{limits:?}");
         assert!(!made_before.contains(&shown), "limits change what is seen: {limits:?}");

@@ -260,7 +260,7 @@ fn fused(
     let mut file = MapFile::<2>::default();
     let mut mapper = mapper_2d(&mut file, settings, grid, &limits)?;
     let progress = Progress::new(scans.len(), "fusing", output);
-    let mut fusion = fuse_2d(&mut mapper, scans, &mut file.poses, &progress);
+    let mut fusion = fuse_2d(&mut mapper, scans, limits.log, &mut file.poses, &progress);
     fusion.name_occupancy(settings);
     file.poses = scans.iter().map(|(pose, _)| *pose).collect();
     store_2d(mapper, settings, grid, &mut file)?;

@@ -119,8 +119,8 @@ impl Args {
             ..TsdfConfig::default()
         };
         let tsdf = Tsdf3::from_stores(held.store, file.color_bricks.map(|c| c.store), config)?;
-        let space = Source3d::Map { name: name(path), tsdf: Box::new(tsdf) };
-        Ok(Logs { source_3d: space, ..Logs::default() })
+        let source_3d = Source3d::Map { name: name(path), tsdf: Box::new(tsdf) };
+        Ok(Logs { source_3d, ..Logs::default() })
     }
 
     fn log_2d(&self, path: &Path) -> anyhow::Result<Logs> {
@@ -203,19 +203,19 @@ impl Args {
 
     /// The address, and which views show what.
     fn announce(&self, server: &Server, logs: &Logs) -> anyhow::Result<()> {
-        let (plane, space) = (shown_in_2d(logs), shown_in_3d(logs));
+        let (in_2d, in_3d) = (shown_in_2d(logs), shown_in_3d(logs));
         let url = server.url();
         if self.output.json {
             // In one line, so that its end is known while the program goes on serving.
             let document = json!({
                 "url": url,
-                "views": { "fusion": plane, "gallery": plane, "clearance": plane, "radiance": LINE, "space": space },
+                "views": { "fusion": in_2d, "gallery": in_2d, "clearance": in_2d, "radiance": LINE, "3d": in_3d },
             });
             writeln!(io::stdout(), "{document}")?;
             return Ok(io::stdout().flush()?);
         }
         let text = format!(
-            "portolan studio: {url}\n  Fusion, Gallery, Clearance: {plane}\n  Radiance: {LINE}\n  Space: {space}\n\
+            "portolan studio: {url}\n  Fusion, Gallery, Clearance: {in_2d}\n  Radiance: {LINE}\n  3-D: {in_3d}\n\
              Ctrl-C stops it.\n"
         );
         self.output.print(&json!(null), text)

@@ -1,13 +1,12 @@
-//! Scans into maps: one loop for both dimensions.
+//! Scans into maps, and what became of them.
 
-use std::borrow::Borrow;
 use std::collections::BTreeMap;
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
 use portolan::Mapper;
 use portolan::geom::Pose;
-use portolan::map::{MapError, ScanKind};
+use portolan::map::MapError;
 use portolan::mapper::Fused;
 use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
 use portolan_io::IoError;
@@ -18,6 +17,8 @@ use crate::progress::Progress;
 
 /// Frames that are read ahead.
 const AHEAD: usize = 3;
+/// 2-D scans that each map goes through by itself: enough that threads seldom wait for each other.
+const BATCH: usize = 64;
 
 /// What fusing did.
 #[derive(Debug, Default)]
@@ -37,8 +38,8 @@ pub(crate) struct FusionReport {
 }
 
 impl FusionReport {
-    /// The maps have taken a scan: notes what each did. Gives the counts of the map that comes last.
-    fn add<const D: usize>(&mut self, fused: &Fused, scan: &impl LogScan<D>) -> ScanStats {
+    /// The maps have taken a scan, taken at this pose: notes what each did. The counts of the map that comes last.
+    fn add<const D: usize>(&mut self, fused: &Fused) -> ScanStats {
         let occupancy = if D == 2 { "grid" } else { "tree" };
         let maps = [(occupancy, fused.occupancy), ("tsdf", fused.distances)];
         for ((name, stats), seconds) in maps.into_iter().zip(fused.seconds) {
@@ -47,14 +48,17 @@ impl FusionReport {
                 *self.observations.entry(name).or_default() += stats.cells;
             }
         }
-        let last = fused.stats();
-        let Some(counts) = scan.counts() else { return last };
-        // Points that share a row and column with a nearer one, or lie outside of all.
-        if scan.has_loose_points() {
-            self.without_pixel += last.beams.dropped.saturating_sub(counts.dropped);
+        fused.stats()
+    }
+
+    /// The maps did not take a scan; why. `false` where a map is full and fusing ends.
+    fn refuse(&mut self, error: &MapError, log: &str, scan: usize) -> bool {
+        if let MapError::Full(_) = error {
+            self.full = Some(error.to_string());
+            return false;
         }
-        // What the filter left out does not reach the maps.
-        ScanStats { beams: *counts, ..last }
+        self.leave_out(format!("{log}: scan {scan}: {error}"));
+        true
     }
 
     /// Grid and tree of a 2-D run are made of one map: both have had its observations.
@@ -76,69 +80,33 @@ impl FusionReport {
     }
 }
 
-/// A scan of a log: its number, its pose, and its readings, where they could be read.
-type Read<const D: usize, S> = (usize, Pose<D>, Result<S, IoError>);
-
-/// A scan of a log, and what a filter counted of it before the maps see it.
-trait LogScan<const D: usize> {
-    type Kind: ScanKind<D> + Sync;
-
-    fn scan(&self) -> &Self::Kind;
-
-    fn counts(&self) -> Option<&BeamCounts>;
-
-    /// Whether points have lost rows and columns on the way into the maps.
-    fn has_loose_points(&self) -> bool;
-}
-
-impl LogScan<2> for Scan<2> {
-    type Kind = Self;
-
-    fn scan(&self) -> &Self {
-        self
-    }
-
-    fn counts(&self) -> Option<&BeamCounts> {
-        None
-    }
-
-    fn has_loose_points(&self) -> bool {
-        false
-    }
-}
-
-/// A frame of a log and what its filter counted.
-struct Filtered {
-    frame: Frame,
-    counts: BeamCounts,
-}
-
-impl LogScan<3> for Filtered {
-    type Kind = Frame;
-
-    fn scan(&self) -> &Frame {
-        &self.frame
-    }
-
-    fn counts(&self) -> Option<&BeamCounts> {
-        Some(&self.counts)
-    }
-
-    fn has_loose_points(&self) -> bool {
-        matches!(&self.frame, Frame::Points(scan) if scan.image.is_none())
-    }
-}
-
 /// Fuses 2-D scans, in order. The result does not depend on the number of threads.
 pub(crate) fn fuse_2d(
     mapper: &mut Mapper<2>,
     scans: &[(Pose<2>, Scan<2>)],
+    log: &str,
     poses: &mut Vec<Pose<2>>,
     progress: &Progress,
 ) -> FusionReport {
-    let scans = scans.iter().enumerate().map(|(i, (pose, scan))| (i, *pose, Ok(scan)));
-    // On a worker thread: from there the maps of a scan are shared out to the others without a detour.
-    rayon::scope(|_| fuse::<2, Scan<2>, _>(mapper, scans, "", poses, progress))
+    let mut report = FusionReport::default();
+    let start = Instant::now();
+    for (k, batch) in scans.chunks(BATCH).enumerate() {
+        let fused = mapper.integrate_all(batch, &|| start.elapsed().as_secs_f64());
+        for (i, (fused, (pose, _))) in fused.into_iter().zip(batch).enumerate() {
+            match fused {
+                Ok(fused) => {
+                    let stats = report.add::<2>(&fused);
+                    poses.extend((stats.scans > 0).then_some(pose));
+                    report.stats += stats;
+                }
+                Err(error) if report.refuse(&error, log, k * BATCH + i) => {}
+                Err(_) => return report,
+            }
+            progress.add(1);
+        }
+        progress.holding(|| mapper.memory_bytes());
+    }
+    report
 }
 
 /// Frames of a 3-D log.
@@ -148,13 +116,12 @@ pub(crate) struct Frames<'a> {
     pub(crate) filter: FrameFilter,
 }
 
+/// A frame: its number, its pose, and what is left of its readings and what the filter counted, where they could be read.
+type Read = (usize, Pose<3>, Result<(Frame, BeamCounts), IoError>);
+
 impl Frames<'_> {
-    fn read(&self, &i: &usize) -> Read<3, Filtered> {
-        let filtered = self.log.frame(i).map(|frame| {
-            let (frame, counts) = self.filter.apply(frame);
-            Filtered { frame, counts }
-        });
-        (i, *self.log.pose(i), filtered)
+    fn read(&self, &i: &usize) -> Read {
+        (i, *self.log.pose(i), self.log.frame(i).map(|frame| self.filter.apply(frame)))
     }
 }
 
@@ -173,44 +140,40 @@ pub(crate) fn fuse_3d(
         return fuse(mapper, read, &name, poses, progress);
     }
     std::thread::scope(|scope| {
-        let (send, receive) = sync_channel::<Read<3, Filtered>>(AHEAD);
+        let (send, receive) = sync_channel::<Read>(AHEAD);
         // Sending fails where fusing has ended early.
         scope.spawn(move || read.try_for_each(|frame| send.send(frame)));
         fuse(mapper, receive.into_iter(), &name, poses, progress)
     })
 }
 
-/// The loop. Poses of scans that were fused are added to `poses`.
-fn fuse<const D: usize, L: LogScan<D>, S: Borrow<L>>(
-    mapper: &mut Mapper<D>,
-    scans: impl Iterator<Item = Read<D, S>>,
+/// The loop. Poses of frames that were fused are added to `poses`.
+fn fuse(
+    mapper: &mut Mapper<3>,
+    frames: impl Iterator<Item = Read>,
     log: &str,
-    poses: &mut Vec<Pose<D>>,
+    poses: &mut Vec<Pose<3>>,
     progress: &Progress,
 ) -> FusionReport {
     let mut report = FusionReport::default();
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
     let mut waiting = clock();
-    for (i, pose, scan) in scans {
+    for (i, pose, read) in frames {
         *report.seconds.entry("frames").or_default() += clock() - waiting;
-        let fused = scan.map(|scan| {
-            let scan: &L = scan.borrow();
-            let fused = mapper.integrate_timed(&pose, scan.scan(), &clock)?;
-            Ok(report.add(&fused, scan))
-        });
-        match fused {
-            Ok(Ok(stats)) => {
-                if stats.scans > 0 {
-                    poses.push(pose);
+        match read.map(|(frame, counts)| (mapper.integrate_timed(&pose, &frame, &clock), frame, counts)) {
+            Ok((Ok(fused), frame, counts)) => {
+                let stats = report.add::<3>(&fused);
+                // Points that share a row and column with a nearer one, or lie outside of all.
+                if matches!(&frame, Frame::Points(scan) if scan.image.is_none()) {
+                    report.without_pixel += stats.beams.dropped.saturating_sub(counts.dropped);
                 }
-                report.stats += stats;
+                poses.extend((stats.scans > 0).then_some(pose));
+                // What the filter left out does not reach the maps.
+                report.stats += ScanStats { beams: counts, ..stats };
             }
-            Ok(Err(full @ MapError::Full(_))) => {
-                report.full = Some(full.to_string());
-                break;
-            }
-            Ok(Err(error)) => report.leave_out(format!("{log}: scan {i}: {error}")),
+            Ok((Err(error), ..)) if report.refuse(&error, log, i) => {}
+            Ok((Err(_), ..)) => break,
             Err(error) => report.leave_out(error.to_string()),
         }
         progress.add(1);

@@ -30,8 +30,18 @@ pub(crate) struct Limits<'a> {
 
 /// Scans that are to be fused, and the maps for them.
 pub(crate) enum Run<'a> {
-    Two { scans: Vec<(Pose<2>, Scan<2>)>, grid: Grid<2>, mapper: Box<Mapper<2>>, file: Box<MapFile<2>> },
-    Three { frames: Frames<'a>, mapper: Box<Mapper<3>>, file: Box<MapFile<3>> },
+    Two {
+        log: String,
+        scans: Vec<(Pose<2>, Scan<2>)>,
+        grid: Grid<2>,
+        mapper: Box<Mapper<2>>,
+        file: Box<MapFile<2>>,
+    },
+    Three {
+        frames: Frames<'a>,
+        mapper: Box<Mapper<3>>,
+        file: Box<MapFile<3>>,
+    },
 }
 
 impl<'a> Run<'a> {
@@ -66,7 +76,7 @@ impl<'a> Run<'a> {
             .map_err(|error| with_outlier(error, &scans))?;
         let mut file = before.unwrap_or_default();
         let mapper = Box::new(mapper_2d(&mut file, settings, &grid, limits)?);
-        Ok(Self::Two { scans, grid, mapper, file })
+        Ok(Self::Two { log: limits.log.to_owned(), scans, grid, mapper, file })
     }
 
     /// Maps in bricks, which grow with what is seen: frames are read while they are fused.
@@ -95,8 +105,8 @@ impl<'a> Run<'a> {
     /// Fuses all scans, in order.
     pub(crate) fn fuse(&mut self, settings: &Settings, threads: usize, progress: &Progress) -> FusionReport {
         match self {
-            Self::Two { scans, mapper, file, .. } => {
-                let mut report = fuse_2d(mapper, scans, &mut file.poses, progress);
+            Self::Two { log, scans, mapper, file, .. } => {
+                let mut report = fuse_2d(mapper, scans, log, &mut file.poses, progress);
                 report.name_occupancy(settings);
                 report
             }

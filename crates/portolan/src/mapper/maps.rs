@@ -6,6 +6,7 @@ use crate::geom::{Lattice, Pose};
 use crate::map::{MapError, Occupancy, ScanKind, Tsdf};
 use crate::parallel;
 use crate::scan::ScanStats;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// An occupancy map and signed distances of the same scans, and what is derived from them.
 ///
@@ -54,6 +55,12 @@ pub struct Fused {
 }
 
 impl Fused {
+    fn of(occupancy: Option<Timed>, distances: Option<Timed>) -> Result<Self, MapError> {
+        let seconds = [&occupancy, &distances].map(|timed| timed.as_ref().map_or(0.0, |timed| timed.1));
+        let occupancy = occupancy.map(|timed| timed.0).transpose()?;
+        Ok(Self { occupancy, distances: distances.map(|timed| timed.0).transpose()?, seconds })
+    }
+
     /// Of the map that comes last; what became of the beams is the same in both.
     pub fn stats(&self) -> ScanStats {
         self.distances.or(self.occupancy).unwrap_or_default()
@@ -153,53 +160,62 @@ impl<const D: usize> Mapper<D> {
         self.maps.tsdf.iter_mut().for_each(|map| map.set_bounds(bounds));
     }
 
+    /// Fuses scans in their order, as [`Mapper::integrate`] does one by one: the same bytes. In 2-D, where a scan is planned
+    /// on one thread, each map goes through all of them on a thread of its own. `clock` as for [`Mapper::integrate_timed`].
+    ///
+    /// A result a scan. A map that is full ends the list, with that error; the other map may hold a few scans more.
+    pub fn integrate_all(
+        &mut self,
+        scans: &[(Pose<D>, impl ScanKind<D> + Sync)],
+        clock: &(dyn Fn() -> f64 + Sync),
+    ) -> Vec<Result<Fused, MapError>> {
+        let memory = self.settings.memory;
+        let first = scans.iter().find(|(pose, _)| pose.is_rigid());
+        let ready = first.map_or(Ok(()), |(pose, _)| self.prepare(pose.translation));
+        let (true, Ok(())) = (D == 2 && self.maps.made, ready) else {
+            let mut full = false;
+            let mut one = |(pose, scan): &(Pose<D>, _)| {
+                let fused = self.integrate_timed(pose, scan, clock);
+                let ended = std::mem::replace(&mut full, matches!(fused, Err(MapError::Full(_))));
+                (!ended).then_some(fused)
+            };
+            return scans.iter().map_while(&mut one).collect();
+        };
+        let Maps { occupancy, tsdf, .. } = &mut self.maps;
+        let [a, b] = bytes(occupancy, tsdf);
+        // Each may use half of what is left.
+        let half = memory.saturating_sub(a + b) / 2;
+        occupancy.iter_mut().for_each(|map| map.set_limit(a.saturating_add(half)));
+        tsdf.iter_mut().for_each(|map| map.set_limit(b.saturating_add(half)));
+        let full = AtomicBool::new(false);
+        let (occupancy, distances) = parallel::join(
+            || fuse_all(occupancy, scans, clock, &full, |map, pose, scan| map.integrate(pose, scan)),
+            || fuse_all(tsdf, scans, clock, &full, |map, pose, scan| map.integrate(pose, scan)),
+        );
+        let fused: Vec<_> = occupancy.into_iter().zip(distances).map(|(a, b)| Fused::of(a, b)).collect();
+        fused.iter().flatten().for_each(|fused| self.stats += fused.stats());
+        fused
+    }
+
     fn fuse(
         &mut self,
         pose: &Pose<D>,
-        scan: &(impl ScanKind<D> + Sync),
+        scan: &impl ScanKind<D>,
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, MapError> {
         let memory = self.settings.memory;
         let Maps { occupancy, tsdf, .. } = &mut self.maps;
-        let bytes = |occupancy: &Option<Occupancy<D>>, tsdf: &Option<Tsdf<D>>| {
-            [
-                occupancy.as_ref().map_or(0, Occupancy::<D>::memory_bytes),
-                tsdf.as_ref().map_or(0, Tsdf::memory_bytes),
-            ]
-        };
-        let fuse_occupancy = |map: &mut Option<Occupancy<D>>, limit: usize| {
-            map.as_mut().map(|map| {
-                map.set_limit(limit);
-                timed(clock, || map.integrate(pose, scan))
-            })
-        };
-        let fuse_distances = |map: &mut Option<Tsdf<D>>, limit: usize| {
-            map.as_mut().map(|map| {
-                map.set_limit(limit);
-                timed(clock, || map.integrate(pose, scan))
-            })
-        };
-        let [a, b] = bytes(occupancy, tsdf);
-        let (occupancy, distances) = if D == 2 {
-            // A 2-D scan is planned on one thread, so both maps take it at once; each may use half of what is left.
-            let half = memory.saturating_sub(a + b) / 2;
-            parallel::join(
-                || fuse_occupancy(occupancy, a.saturating_add(half)),
-                || fuse_distances(tsdf, b.saturating_add(half)),
-            )
-        } else {
-            let fused = fuse_occupancy(occupancy, memory.saturating_sub(b));
-            let [a, _] = bytes(occupancy, tsdf);
-            (fused, fuse_distances(tsdf, memory.saturating_sub(a)))
-        };
-        let mut fused = Fused::default();
-        if let Some((stats, seconds)) = occupancy {
-            (fused.occupancy, fused.seconds[0]) = (Some(stats?), seconds);
-        }
-        if let Some((stats, seconds)) = distances {
-            (fused.distances, fused.seconds[1]) = (Some(stats?), seconds);
-        }
-        Ok(fused)
+        let [_, b] = bytes(occupancy, tsdf);
+        let of_occupancy = occupancy.as_mut().map(|map| {
+            map.set_limit(memory.saturating_sub(b));
+            timed(clock, || map.integrate(pose, scan))
+        });
+        let [a, _] = bytes(occupancy, tsdf);
+        let of_distances = tsdf.as_mut().map(|map| {
+            map.set_limit(memory.saturating_sub(a));
+            timed(clock, || map.integrate(pose, scan))
+        });
+        Fused::of(of_occupancy, of_distances)
     }
 
     /// The occupancy map; `None` where there is none, or before the first scan.
@@ -243,6 +259,35 @@ impl<const D: usize> Mapper<D> {
             + self.tsdf().map_or(0, Tsdf::memory_bytes)
             + self.derived.memory_bytes()
     }
+}
+
+/// What a map said to a scan, and the seconds that it took.
+type Timed = (Result<ScanStats, MapError>, f64);
+
+/// Bytes of the two maps.
+fn bytes<const D: usize>(occupancy: &Option<Occupancy<D>>, tsdf: &Option<Tsdf<D>>) -> [usize; 2] {
+    [occupancy.as_ref().map_or(0, Occupancy::<D>::memory_bytes), tsdf.as_ref().map_or(0, Tsdf::memory_bytes)]
+}
+
+/// All scans into one map, up to where it, or the other one, is full: `None` for each where there is no map.
+fn fuse_all<M, S, const D: usize>(
+    map: &mut Option<M>,
+    scans: &[(Pose<D>, S)],
+    clock: &(dyn Fn() -> f64 + Sync),
+    full: &AtomicBool,
+    integrate: impl Fn(&mut M, &Pose<D>, &S) -> Result<ScanStats, MapError>,
+) -> Vec<Option<Timed>> {
+    let Some(map) = map else { return scans.iter().map(|_| None).collect() };
+    let mut done = Vec::with_capacity(scans.len());
+    for (pose, scan) in scans {
+        if full.load(Ordering::Relaxed) {
+            break;
+        }
+        let timed = timed(clock, || integrate(map, pose, scan));
+        full.fetch_or(matches!(timed.0, Err(MapError::Full(_))), Ordering::Relaxed);
+        done.push(Some(timed));
+    }
+    done
 }
 
 fn timed<T>(clock: &(dyn Fn() -> f64 + Sync), work: impl FnOnce() -> T) -> (T, f64) {
