@@ -6,7 +6,7 @@ use crate::geom::{Lattice, Pose};
 use crate::map::{MapError, Occupancy, ScanKind, Tsdf};
 use crate::parallel;
 use crate::scan::ScanStats;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// An occupancy map and signed distances of the same scans, and what is derived from them.
 ///
@@ -187,7 +187,7 @@ impl<const D: usize> Mapper<D> {
         let half = memory.saturating_sub(a + b) / 2;
         occupancy.iter_mut().for_each(|map| map.set_limit(a.saturating_add(half)));
         tsdf.iter_mut().for_each(|map| map.set_limit(b.saturating_add(half)));
-        let full = AtomicBool::new(false);
+        let full = AtomicUsize::new(usize::MAX);
         let (occupancy, distances) = parallel::join(
             || fuse_all(occupancy, scans, clock, &full, |map, pose, scan| map.integrate(pose, scan)),
             || fuse_all(tsdf, scans, clock, &full, |map, pose, scan| map.integrate(pose, scan)),
@@ -269,22 +269,24 @@ fn bytes<const D: usize>(occupancy: &Option<Occupancy<D>>, tsdf: &Option<Tsdf<D>
     [occupancy.as_ref().map_or(0, Occupancy::<D>::memory_bytes), tsdf.as_ref().map_or(0, Tsdf::memory_bytes)]
 }
 
-/// All scans into one map, up to where it, or the other one, is full: `None` for each where there is no map.
+/// All scans into one map, up to the one that it, or the other one, had no room for: `None` for each where there is no map.
 fn fuse_all<M, S, const D: usize>(
     map: &mut Option<M>,
     scans: &[(Pose<D>, S)],
     clock: &(dyn Fn() -> f64 + Sync),
-    full: &AtomicBool,
+    full: &AtomicUsize,
     integrate: impl Fn(&mut M, &Pose<D>, &S) -> Result<ScanStats, MapError>,
 ) -> Vec<Option<Timed>> {
     let Some(map) = map else { return scans.iter().map(|_| None).collect() };
     let mut done = Vec::with_capacity(scans.len());
-    for (pose, scan) in scans {
-        if full.load(Ordering::Relaxed) {
+    for (i, (pose, scan)) in scans.iter().enumerate() {
+        if i > full.load(Ordering::Relaxed) {
             break;
         }
         let timed = timed(clock, || integrate(map, pose, scan));
-        full.fetch_or(matches!(timed.0, Err(MapError::Full(_))), Ordering::Relaxed);
+        if let Err(MapError::Full(_)) = timed.0 {
+            full.fetch_min(i, Ordering::Relaxed);
+        }
         done.push(Some(timed));
     }
     done

@@ -4,7 +4,7 @@ use super::*;
 use crate::answer::Status;
 use crate::field::Esdf;
 use crate::geom::{Pose, vector};
-use crate::map::{Occupancy, ScanKind, Tsdf};
+use crate::map::{MapError, Occupancy, ScanKind, Tsdf};
 use crate::scan::{Beam, BeamKind, Scan};
 use crate::surface::{ContourSettings, MeshSettings, marching_cubes, marching_squares};
 use crate::sweep::WeightModel;
@@ -142,4 +142,37 @@ fn far_from_zero_the_lattice_begins_at_the_first_sensor() {
     assert!(mapper.occupancy().is_none() && mapper.esdf().is_none());
     mapper.integrate(&scan::<2>(0).0, &scan::<2>(0).1).unwrap();
     assert!(mapper.occupancy().is_some() && mapper.tsdf().is_none() && mapper.contour().segments.is_empty());
+}
+
+/// All scans at once, those that are refused among them, are the same cells and counts as one by one.
+fn all_at_once_is_one_by_one<const D: usize>()
+where
+    Scan<D>: ScanKind<D>,
+{
+    let mut scans: Vec<_> = (0..POSES).map(scan::<D>).collect();
+    scans[1].0.translation[0] = f64::NAN;
+    scans[2].0.translation[0] = 1e300;
+    let mut expected = Mapper::<D>::new(0.1);
+    let one_by_one: Vec<_> = scans.iter().map(|(pose, scan)| expected.integrate(pose, scan)).collect();
+    let mut mapper = Mapper::<D>::new(0.1);
+    let all = mapper.integrate_all(&scans, &|| 0.0);
+    assert_eq!(all.iter().map(|fused| fused.clone().map(|f| f.stats())).collect::<Vec<_>>(), one_by_one);
+    assert_eq!(mapper.stats(), expected.stats());
+    let ((a, b), (c, d)) = (mapper.into_maps(), expected.into_maps());
+    let (a, c) = (a.unwrap().into_store(), c.unwrap().into_store());
+    assert!(a.keys() == c.keys() && a.keys().iter().all(|&key| a.brick(key) == c.brick(key)));
+    let (b, d) = (b.unwrap().into_stores().0, d.unwrap().into_stores().0);
+    assert!(b.keys() == d.keys() && b.keys().iter().all(|&key| b.brick(key) == d.brick(key)));
+
+    // A full map ends the list.
+    let mut small = Mapper::with(MapperSettings { memory: 100_000, ..MapperSettings::<D>::new(0.02) });
+    let results = small.integrate_all(&scans, &|| 0.0);
+    assert!(matches!(results.last(), Some(Err(MapError::Full(_)))), "{results:?}");
+    assert!(results.len() < POSES && results.iter().filter(|r| r.is_err()).count() == 1, "{results:?}");
+}
+
+#[test]
+fn all_at_once_is_one_by_one_2d_and_3d() {
+    all_at_once_is_one_by_one::<2>();
+    all_at_once_is_one_by_one::<3>();
 }
