@@ -211,7 +211,7 @@ fn appending_keeps_settings_and_names_what_differs() {
         assert!(error.contains(word), "{error}");
     }
     let error = fail(1, ["map", arg(&log), "--out", arg(&out), "--append", "--no-color"]);
-    assert!(error.contains("leave --no-color out"), "{error}");
+    assert!(error.contains("leave out --no-color"), "{error}");
 }
 
 #[test]
