@@ -52,11 +52,12 @@ pub struct PathViolation {
 ///
 /// ```
 /// use portolan::field::{Esdf, EsdfSettings};
-/// use portolan::map::{Tsdf2, TsdfConfig, Tsdf3, TsdfConfig};
+/// use portolan::geom::Grid;
+/// use portolan::map::{DenseTsdf, Tsdf2, TsdfConfig};
 /// use portolan::plan::{Cause, Demand, PathCheck, Waypoints, check_path};
 ///
 /// // A wall at x = 4 m; the space before it was observed.
-/// let mut tsdf = Tsdf2::new(TsdfConfig { cells: [84, 60], resolution: 0.05, ..Default::default() })?;
+/// let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [84, 60]), TsdfConfig::default())?;
 /// for i in 0..tsdf.grid().len() {
 ///     let cell = tsdf.grid().cell(i);
 ///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
@@ -75,7 +76,8 @@ pub struct PathViolation {
 /// assert!((first.from - 2.7).abs() < 5e-3 && first.cause == Cause::TooNear);
 ///
 /// // The same in 3-D.
-/// let mut tsdf = Tsdf3::new(TsdfConfig { cells: [44, 20, 20], resolution: 0.1, ..Default::default() })?;
+/// let grid = Grid::new([0.0; 3], 0.1, [44, 20, 20]);
+/// let mut tsdf = DenseTsdf::covering(&grid, TsdfConfig::default())?;
 /// for i in 0..tsdf.grid().len() {
 ///     let cell = tsdf.grid().cell(i);
 ///     tsdf.fuse(cell, 4.0 - tsdf.grid().lattice.center(cell)[0], 1.0);
