@@ -175,7 +175,7 @@ impl Args {
             let log = log::read_2d(&self.log, &self.source)?;
             let no_return = &mut settings.no_return.no_return;
             *no_return = no_return.or_else(|| detect_no_return(&log));
-            return Ok(Log::Two(log));
+            return Ok(Log::Two(Box::new(log)));
         }
         let log = log::read_3d(&self.log, &self.source, settings.shape.color)?;
         self.source.check_sensor(&log)?;

@@ -21,7 +21,7 @@ pub(crate) use selection::Selection;
 /// A log of either dimension.
 pub(crate) enum Log {
     /// Scans of a laser.
-    Two(CarmenLog),
+    Two(Box<CarmenLog>),
     /// Depth images or clouds.
     Three(Box<ScanLog>),
 }

@@ -142,7 +142,7 @@ pub(crate) fn fuse_3d(
     std::thread::scope(|scope| {
         let (send, receive) = sync_channel::<Read>(AHEAD);
         // Sending fails where fusing has ended early.
-        scope.spawn(move || read.try_for_each(|frame| send.send(frame)));
+        scope.spawn(move || read.all(|frame| send.send(frame).is_ok()));
         fuse(mapper, receive.into_iter(), &name, poses, progress)
     })
 }

@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn cells_go_there_and_back_2d_and_3d() {
-        let odds = |i: usize| (i % 3 != 0).then_some(LogOdds8((i % 90) as i8 - 40));
+        let odds = |i: usize| (!i.is_multiple_of(3)).then_some(LogOdds8((i % 90) as i8 - 40));
         let distances =
             |i: usize| (i % 5 < 3).then_some(SignedDistance { distance: i as f32 * 0.01, weight: 1.0 });
         there_and_back::<_, 2>(odds);
