@@ -17,7 +17,7 @@
 //! | [`experiment`], [`pictures`], [`report`], [`radiance_report`] | the numbers of a run as JSON, pictures, text and `report.html` | |
 //!
 //! [`MapRepr`] is the text's thesis as an interface. The textbook's march and its distance transform are parts of the
-//! engine, to be chosen there: [`SweepKind::March`](portolan::map::SweepKind::March),
+//! engine, to be chosen there: [`BeamSweep::March`](portolan::map::BeamSweep::March),
 //! [`esdf_from_tsdf`](portolan::field::esdf_from_tsdf).
 //!
 //! No module opens files or reads a clock; the caller passes one.

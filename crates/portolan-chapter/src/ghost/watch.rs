@@ -40,7 +40,7 @@ impl GhostWatch {
         Self { w_max: tsdf.config().w_max, cells }
     }
 
-    /// The cells, ascending: what [`Tsdf::watch`] wants.
+    /// The cells, ascending: what [`Tsdf::watch`](portolan::map::Tsdf::watch) wants.
     pub fn cells(&self) -> impl Iterator<Item = [i32; 2]> + '_ {
         self.cells.iter().map(|c| c.0)
     }
