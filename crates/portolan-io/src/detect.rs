@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::bytes::open;
 use crate::mesh::{MeshFormat, mesh_format};
 use crate::scan_log::ScanLogKind;
-use crate::{IoError, container, esdf_bin};
+use crate::{Result, container, esdf_bin};
 
 /// How much of a file is read (unpacked bytes).
 const HEAD: u64 = 64 << 10;
@@ -45,8 +45,8 @@ pub enum FileKind {
 /// Finds out what a file or folder is.
 ///
 /// # Errors
-/// [`IoError`] where it cannot be opened or read.
-pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
+/// [`crate::IoError`] where it cannot be opened or read.
+pub fn detect(path: impl AsRef<Path>) -> Result<FileKind> {
     let path = path.as_ref();
     if path.is_dir() {
         if path.join("map.portolan").is_file() {

@@ -17,7 +17,7 @@ use portolan::geom::{Grid, Pose};
 
 use crate::bytes::{Input, Lines, open, parse_f64};
 use crate::error::shown;
-use crate::{IoError, Pgm, write_atomic};
+use crate::{IoError, Pgm, Result, write_atomic};
 
 /// The state of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -79,7 +79,7 @@ impl MapServerInfo {
     ///
     /// # Errors
     /// [`IoError::Text`] for a value that is not allowed or a missing `image` or `resolution`.
-    pub fn parse(input: Input) -> Result<Self, IoError> {
+    pub fn parse(input: Input) -> Result<Self> {
         yaml(Lines::of(input))
     }
 }
@@ -106,7 +106,7 @@ impl MapServerMap {
     ///
     /// # Errors
     /// [`IoError`] of the yaml file or of the image.
-    pub fn read(yaml: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(yaml: impl AsRef<Path>) -> Result<Self> {
         let yaml = yaml.as_ref();
         let info = MapServerInfo::parse(open(yaml)?)?;
         let image = Pgm::read(yaml.with_file_name(&info.image))?;
@@ -166,7 +166,7 @@ fn cell(value: u16, white: u16, info: &MapServerInfo) -> (MapCell, f32) {
 /// # Errors
 /// [`IoError::Unwritable`] where the lengths differ or the resolution is not positive, else as
 /// [`write_atomic`].
-pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell]) -> Result<(), IoError> {
+pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell]) -> Result<()> {
     let gray = |c: &MapCell| match c {
         MapCell::Free => 254,
         MapCell::Unknown => 205,
@@ -184,18 +184,14 @@ pub(crate) fn write_pair(
     mode: MapMode,
     occupied_thresh: f64,
     free_thresh: f64,
-) -> Result<(), IoError> {
+) -> Result<()> {
     let [width, height] = grid.shape;
     let [x, y] = grid.lattice.origin;
     let resolution = grid.lattice.resolution;
     if grid.checked_len() != Some(pixels.len()) || pixels.is_empty() {
         let value = format!("{width} x {height} for {} cells", pixels.len());
-        return Err(IoError::unwritable(
-            yaml,
-            "the map size",
-            value,
-            "give one value per cell, at least one",
-        ));
+        let advice = "give one value per cell, at least one";
+        return Err(IoError::unwritable(yaml, "the map size", value, advice));
     }
     if !(resolution > 0.0 && resolution.is_finite() && x.is_finite() && y.is_finite()) {
         let value = format!("{resolution} at {x} {y}");
@@ -205,12 +201,7 @@ pub(crate) fn write_pair(
     let image_path = yaml.with_extension("pgm");
     let name = image_path.file_name().unwrap_or_default().to_string_lossy().replace('\'', "''");
     if name.chars().any(char::is_control) {
-        return Err(IoError::unwritable(
-            yaml,
-            "the image name",
-            shown(name.as_bytes()),
-            "choose a plain name",
-        ));
+        return Err(IoError::unwritable(yaml, "the image name", shown(name), "choose a plain name"));
     }
     Pgm { width, height, max_value: 255, pixels }.write(&image_path)?;
     let mode = match mode {
@@ -224,16 +215,14 @@ pub(crate) fn write_pair(
     })
 }
 
-fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo, IoError> {
+fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {
     let path = lines.path().to_owned();
     let mut info = MapServerInfo { free_thresh: 0.196, ..MapServerInfo::of_image(f64::NAN) };
     let mut list: Option<Vec<f64>> = None;
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let line = String::from_utf8_lossy(without_comment(line)).into_owned();
         let bad = |field: &str, value: &str, advice: &str| {
-            Err(IoError::text(&path, number, field, shown(value.as_bytes()), advice))
+            Err(IoError::text(&path, number, field, shown(value), advice))
         };
         // `origin:` may be followed by a list of `- value` lines.
         if let (Some(list), Some(item)) = (&mut list, line.trim_start().strip_prefix("- ")) {
@@ -326,10 +315,10 @@ fn origin(value: &str) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, bad_bytes, real_data};
+    use crate::testing::{Random, no_panic, real_data, says};
     use MapCell::*;
 
-    fn parse(text: impl Into<Vec<u8>>) -> Result<MapServerInfo, IoError> {
+    fn parse(text: impl Into<Vec<u8>>) -> Result<MapServerInfo> {
         MapServerInfo::parse(Input::from_reader(std::io::Cursor::new(text.into()), "m.yaml".as_ref())?)
     }
 
@@ -369,8 +358,7 @@ mod tests {
             ("image: a\nresolution: 1\nfree_thresh: 0.9\n", "free_thresh is 0.9 above"),
             ("image: a\nresolution: 1\norigin:\n- 1\n", "origin is missing"),
         ] {
-            let error = parse(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(parse(text), part);
         }
     }
 
@@ -420,9 +408,7 @@ mod tests {
 
     #[test]
     fn no_bytes_make_it_panic() {
-        for bytes in bad_bytes(GOOD.as_bytes(), 11, 3000) {
-            let _ = parse(bytes);
-        }
+        no_panic(GOOD.as_bytes(), 11, 3000, parse);
     }
 
     #[test]

@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use crate::Result;
+
 /// SplitMix64 *(Steele, Lea, Flood 2014)*.
 pub(crate) struct Random(pub(crate) u64);
 
@@ -53,6 +55,27 @@ pub(crate) fn bad_bytes(good: &[u8], seed: u64, count: usize) -> Vec<Vec<u8>> {
         all.push(bytes);
     }
     all
+}
+
+/// Reads variants of a good file: none may make it panic, and errors are of one line.
+pub(crate) fn no_panic<T>(
+    good: impl AsRef<[u8]>,
+    seed: u64,
+    count: usize,
+    read: impl Fn(Vec<u8>) -> Result<T>,
+) {
+    for bytes in bad_bytes(good.as_ref(), seed, count) {
+        if let Err(e) = read(bytes) {
+            assert!(!e.to_string().contains('\n'), "{e}");
+        }
+    }
+}
+
+/// Asserts an error of one line that has this part.
+#[track_caller]
+pub(crate) fn says<T>(result: Result<T>, part: &str) {
+    let error = result.err().unwrap().to_string();
+    assert!(error.contains(part) && !error.contains('\n'), "{error}");
 }
 
 /// A file of the real data, or `None` with a loud line where it is not there.

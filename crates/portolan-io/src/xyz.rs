@@ -12,10 +12,10 @@
 
 use std::path::Path;
 
-use crate::IoError;
 use crate::bytes::{Input, Lines, Scalar, open, parse_f64};
 use crate::error::shown;
 use crate::points::{CloudBuilder, PointCloudFile, channel, is_time};
+use crate::{IoError, Result};
 
 /// The most columns of a line.
 const MOST_COLUMNS: usize = 64;
@@ -27,19 +27,17 @@ const MOST_POINTS: usize = 1 << 30;
 /// # Errors
 /// [`IoError::Text`] for a line that is not a point, for lines with different numbers of columns, and for a file without
 /// points. `nan` is a number: such points are refused and counted.
-pub fn read_xyz(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+pub fn read_xyz(path: impl AsRef<Path>) -> Result<PointCloudFile> {
     parse(open(path)?)
 }
 
-pub(crate) fn parse(input: Input) -> Result<PointCloudFile, IoError> {
+pub(crate) fn parse(input: Input) -> Result<PointCloudFile> {
     let mut lines = Lines::of(input);
     let path = lines.path().to_owned();
     let mut builder = CloudBuilder::new(true);
     let mut columns: Option<Columns> = None;
     let (mut row, mut first) = (0, true);
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         // A header may be a comment: "//X,Y,Z" is what CloudCompare writes.
         let (content, comment) = split_comment(line);
         let content = if first && content.is_empty() { comment } else { content };
@@ -81,12 +79,12 @@ pub(crate) fn parse(input: Input) -> Result<PointCloudFile, IoError> {
             None => columns.insert(Columns::guessed(values).ok_or_else(|| {
                 let advice =
                     "write 3 (x y z), 4 (x y z intensity), 6 (x y z r g b) or 7, or a first line of names";
-                IoError::text(&path, number, "the number of columns", count.to_string(), advice)
+                IoError::text(&path, number, "the number of columns", count, advice)
             })?),
         };
         if count != columns.count {
             let advice = format!("write {} as above", columns.count);
-            return Err(IoError::text(&path, number, "the number of columns", count.to_string(), advice));
+            return Err(IoError::text(&path, number, "the number of columns", count, advice));
         }
         if row == MOST_POINTS {
             let value = format!("more than {MOST_POINTS}");
@@ -208,9 +206,9 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{no_panic, real_data, says};
 
-    fn read(text: impl Into<Vec<u8>>) -> Result<PointCloudFile, IoError> {
+    fn read(text: impl Into<Vec<u8>>) -> Result<PointCloudFile> {
         parse(Input::from_reader(std::io::Cursor::new(text.into()), "a.xyz".as_ref())?)
     }
 
@@ -259,16 +257,13 @@ mod tests {
             ("lon lat h\n1 2 3\n", "line 1: column 1 is \"lon\""),
             ("# nothing\n", "the number of points is 0"),
         ] {
-            let error = read(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(read(text), part);
         }
     }
 
     #[test]
     fn no_bytes_make_it_panic() {
-        for bytes in bad_bytes(b"x,y,z,r,g,b\n1,2,3,4,5,6\n#c\n7,8,9,1,2,3\n", 17, 3000) {
-            let _ = read(bytes);
-        }
+        no_panic(b"x,y,z,r,g,b\n1,2,3,4,5,6\n#c\n7,8,9,1,2,3\n", 17, 3000, read);
     }
 
     #[test]

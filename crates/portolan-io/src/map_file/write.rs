@@ -13,7 +13,7 @@ use super::kind::Kind;
 use super::maps::{of_grid, of_tree, of_tsdf};
 use super::settings::{ColorSettings, OccupancySettings, TsdfSettings, weights_word};
 use super::{ColorBricks, MapFile, OccupancyBricks, VERSION, part_name};
-use crate::{ContainerWriter, IoError};
+use crate::{ContainerWriter, IoError, Result};
 
 /// A dense plane is cut into chunks of this many bytes.
 const CHUNK: usize = 1 << 30;
@@ -23,7 +23,7 @@ impl<const D: usize> MapFile<D> {
     ///
     /// # Errors
     /// As [`crate::write_atomic`].
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         self.writer()?.write(path)
     }
 
@@ -31,15 +31,15 @@ impl<const D: usize> MapFile<D> {
     ///
     /// # Errors
     /// [`IoError::Unwritable`] where a map does not fit the format.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, IoError> {
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
         Ok(self.writer()?.to_bytes())
     }
 
-    fn writer(&self) -> Result<ContainerWriter, IoError> {
+    fn writer(&self) -> Result<ContainerWriter> {
         let mut writer = ContainerWriter::new();
         let header = self.header_text().map_err(|e| {
             let advice = "give finite numbers";
-            IoError::unwritable("map.portolan".as_ref(), "the header", e.to_string(), advice)
+            IoError::unwritable("map.portolan".as_ref(), "the header", e, advice)
         })?;
         writer.chunk("HEAD", "", header.as_bytes())?;
         self.write_dense(&mut writer)?;
@@ -100,7 +100,7 @@ impl<const D: usize> MapFile<D> {
         Ok(entries)
     }
 
-    fn write_dense(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
+    fn write_dense(&self, writer: &mut ContainerWriter) -> Result<()> {
         if let Some((store, _)) = self.grid.as_ref().map(of_grid) {
             let plane: Vec<u8> = store.planes().iter().map(|v| v.0 as u8).collect();
             write_plane(writer, Kind::Grid.names::<D>().chunk, "occupancy", &plane)?;
@@ -119,7 +119,7 @@ impl<const D: usize> MapFile<D> {
         Ok(())
     }
 
-    fn write_bricks(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
+    fn write_bricks(&self, writer: &mut ContainerWriter) -> Result<()> {
         if let Some(map) = &self.occupancy_bricks {
             let tag = Kind::OccupancyBricks.names::<D>().chunk;
             write_keys(writer, tag, &map.store)?;
@@ -162,7 +162,7 @@ fn put_floats(values: &[f32], bytes: &mut Vec<u8>) {
     bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
 }
 
-fn write_plane(writer: &mut ContainerWriter, tag: &str, name: &str, bytes: &[u8]) -> Result<(), IoError> {
+fn write_plane(writer: &mut ContainerWriter, tag: &str, name: &str, bytes: &[u8]) -> Result<()> {
     if bytes.is_empty() {
         return writer.chunk(tag, name, bytes);
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::bytes::{Input, fields, open, parse_f64};
-use crate::{IoError, ply};
+use crate::{Result, ply};
 
 /// How much of a file is read (unpacked bytes).
 const HEAD: u64 = 64 << 10;
@@ -45,16 +45,16 @@ pub struct MeshCounts {
 /// OBJ has no header, and that of GLB is not read.
 ///
 /// # Errors
-/// [`IoError`] where the file cannot be opened or read.
-pub fn mesh_counts(path: impl AsRef<Path>) -> Result<Option<MeshCounts>, IoError> {
+/// [`crate::IoError`] where the file cannot be opened or read.
+pub fn mesh_counts(path: impl AsRef<Path>) -> Result<Option<MeshCounts>> {
     parse_mesh_counts(&mut open(path)?)
 }
 
 /// [`mesh_counts`] from any input, of which it reads at most 64 KiB.
 ///
 /// # Errors
-/// [`IoError`] where the input cannot be read.
-pub fn parse_mesh_counts(input: &mut Input) -> Result<Option<MeshCounts>, IoError> {
+/// [`crate::IoError`] where the input cannot be read.
+pub fn parse_mesh_counts(input: &mut Input) -> Result<Option<MeshCounts>> {
     let head = input.read_up_to(HEAD)?;
     Ok(ply::mesh_counts(&head, input.path()).map(|(vertices, faces)| MeshCounts { vertices, faces }))
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use portolan::surface::Mesh;
 
 use super::check;
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// World coordinates beyond this (metres) are written as `double`: up to it an f32 is no coarser than 0.06 mm.
 const NEAR: f64 = 1000.0;
@@ -20,7 +20,7 @@ const NEAR: f64 = 1000.0;
 /// # Errors
 /// [`IoError::Unwritable`] where the mesh's arrays do not fit together or a coordinate is not finite, else as
 /// [`write_atomic`].
-pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
+pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     let path = path.as_ref();
     check(path, mesh)?;
     write_atomic(path, |w| write_to(w, mesh))
@@ -30,7 +30,7 @@ pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_ply_mesh`].
-pub fn ply_mesh_to_bytes(mesh: &Mesh) -> Result<Vec<u8>, IoError> {
+pub fn ply_mesh_to_bytes(mesh: &Mesh) -> Result<Vec<u8>> {
     let name = Path::new("mesh.ply");
     check(name, mesh)?;
     let mut bytes = Vec::new();

@@ -8,7 +8,7 @@ use portolan::store::Tree;
 use super::header::{Header, Kind};
 use super::stored::Stored;
 use super::{read, write};
-use crate::{Compression, IoError};
+use crate::{Compression, Result};
 
 /// An OctoMap file: the tree of log odds, and the rest of the file.
 ///
@@ -33,9 +33,9 @@ impl OctomapTree {
     /// stamps are not in the file) and `ColorOcTree` (whose colors are passed over) are read.
     ///
     /// # Errors
-    /// [`IoError`] where a field is wrong, a log odds is not finite, the number of nodes differs from the header's, they
+    /// [`crate::IoError`] where a field is wrong, a log odds is not finite, the number of nodes differs from the header's, they
     /// would take more than 4 GiB (a file that is not packed: 16 GiB), or bytes are missing or left over.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let input = crate::open(&path)?;
         let packed = input.compression();
         read::read(input, packed, path.as_ref())
@@ -45,7 +45,7 @@ impl OctomapTree {
     ///
     /// # Errors
     /// As [`OctomapTree::read`].
-    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self, IoError> {
+    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self> {
         read::read(bytes, Compression::Plain, name)
     }
 
@@ -100,7 +100,7 @@ impl OctomapTree {
     ///
     /// # Errors
     /// As [`crate::write_atomic`].
-    pub fn write_bt(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+    pub fn write_bt(&self, path: impl AsRef<Path>) -> Result<()> {
         write::file_bt(self, path.as_ref())
     }
 
@@ -109,7 +109,7 @@ impl OctomapTree {
     ///
     /// # Errors
     /// As [`crate::write_atomic`].
-    pub fn write_ot(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+    pub fn write_ot(&self, path: impl AsRef<Path>) -> Result<()> {
         write::file_ot(self, path.as_ref())
     }
 }

@@ -11,7 +11,7 @@ use super::header::{Header, Kind};
 use super::place::placed;
 use super::stored::{Cursor, Stored};
 use super::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree};
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// Writes a tree as OctoMap's `.bt`: every leaf free or occupied (log odds 0 and above, as OctoMap has it), equal leaves
 /// merged.
@@ -19,7 +19,7 @@ use crate::{IoError, write_atomic};
 /// # Errors
 /// [`IoError::Unwritable`] where the tree's origin is not a multiple of its resolution or something was observed outside
 /// of OctoMap's 65,536 cells about the world's zero; else as [`write_atomic`].
-pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 3>) -> Result<(), IoError> {
+pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 3>) -> Result<()> {
     let path = path.as_ref();
     let (header, tree, stored) = bt(tree, path)?;
     write(&header, &tree, &stored, path)
@@ -29,7 +29,7 @@ pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_octomap_bt`].
-pub fn octomap_bt_to_bytes<V: LogOddsValue>(tree: &Tree<V, 3>) -> Result<Vec<u8>, IoError> {
+pub fn octomap_bt_to_bytes<V: LogOddsValue>(tree: &Tree<V, 3>) -> Result<Vec<u8>> {
     let name = Path::new("octree.bt");
     let (header, tree, stored) = bt(tree, name)?;
     let mut bytes = Vec::new();
@@ -38,10 +38,7 @@ pub fn octomap_bt_to_bytes<V: LogOddsValue>(tree: &Tree<V, 3>) -> Result<Vec<u8>
 }
 
 /// What a `.bt` of a tree holds.
-fn bt<V: LogOddsValue>(
-    tree: &Tree<V, 3>,
-    path: &Path,
-) -> Result<(Header, Tree<LogOdds32, 3>, Stored), IoError> {
+fn bt<V: LogOddsValue>(tree: &Tree<V, 3>, path: &Path) -> Result<(Header, Tree<LogOdds32, 3>, Stored)> {
     let tree = likeliest(tree);
     let moved = match placed(&tree, path)? {
         Cow::Owned(moved) => Some(moved),
@@ -63,7 +60,7 @@ pub fn write_octomap_ot<V: LogOddsValue>(
     path: impl AsRef<Path>,
     tree: &Tree<V, 3>,
     quantum: f64,
-) -> Result<(), IoError> {
+) -> Result<()> {
     let path = path.as_ref();
     let tree = tree.map_values(|v| LogOdds32((v.units() * quantum) as f32));
     let mut infinite = None;
@@ -82,7 +79,7 @@ pub fn write_octomap_ot<V: LogOddsValue>(
 }
 
 /// [`OctomapTree::write_bt`].
-pub(super) fn file_bt(file: &OctomapTree, path: &Path) -> Result<(), IoError> {
+pub(super) fn file_bt(file: &OctomapTree, path: &Path) -> Result<()> {
     if file.header.kind == Kind::Bt {
         return write(&file.header, &file.tree, &file.stored, path);
     }
@@ -93,7 +90,7 @@ pub(super) fn file_bt(file: &OctomapTree, path: &Path) -> Result<(), IoError> {
 }
 
 /// [`OctomapTree::write_ot`].
-pub(super) fn file_ot(file: &OctomapTree, path: &Path) -> Result<(), IoError> {
+pub(super) fn file_ot(file: &OctomapTree, path: &Path) -> Result<()> {
     let class = if file.header.class == "OcTreeStamped" { "OcTreeStamped" } else { "OcTree" };
     let header = file.header.changed(Kind::Ot, class, file.header.size);
     write(&header, &file.tree, &file.stored, path)
@@ -109,7 +106,7 @@ fn open_root(tree: &Tree<LogOdds32, 3>) -> Stored {
     Stored { root_open: tree.inner_nodes() == 0 && tree.nodes() == 1, ..Stored::default() }
 }
 
-fn write(header: &Header, tree: &Tree<LogOdds32, 3>, stored: &Stored, path: &Path) -> Result<(), IoError> {
+fn write(header: &Header, tree: &Tree<LogOdds32, 3>, stored: &Stored, path: &Path) -> Result<()> {
     write_atomic(path, |out| write_to(out, header, tree, stored))
 }
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::IoError;
 use crate::bytes::{Scalar, fields, parse_f64};
 use crate::error::shown;
 use crate::points::Viewpoint;
+use crate::{IoError, Result};
 
 /// The most fields, and the most values of a point.
 const MOST_FIELDS: usize = 256;
@@ -73,7 +73,7 @@ struct Lines<'a> {
     viewpoint: Option<Viewpoint>,
 }
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let mut lines = Lines::default();
     let (mut at, mut number) = (0, 0);
     let data = loop {
@@ -131,7 +131,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
 }
 
 impl Lines<'_> {
-    fn fields(&self, data: Data, path: &Path) -> Result<Vec<Field>, IoError> {
+    fn fields(&self, data: Data, path: &Path) -> Result<Vec<Field>> {
         let n = self.names.len();
         let wrong =
             |what: &str, value: String, advice: &str| Err(IoError::text(path, 1, what, value, advice));
@@ -172,7 +172,7 @@ impl Lines<'_> {
     }
 
     /// Columns and rows.
-    fn shape(&self, path: &Path) -> Result<(usize, usize), IoError> {
+    fn shape(&self, path: &Path) -> Result<(usize, usize)> {
         let (width, height) = match (self.width, self.height, self.points) {
             (Some(width), height, _) => (width, height.unwrap_or(1)),
             (None, _, Some(points)) => (points, 1),

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::points::{PointCloudFile, Viewpoint};
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// Writes a binary PCD file (version 0.7) with the fields that the cloud has; coordinates are doubles where it has an
 /// offset, else floats. Times are written as `timestamp` (doubles, seconds). An organized cloud gets its pixels without a
@@ -13,25 +13,11 @@ use crate::{IoError, write_atomic};
 /// # Errors
 /// [`IoError::Unwritable`] where a list is neither empty nor as long as the points, or where rows and columns do not hold
 /// the points, else as [`write_atomic`].
-pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), IoError> {
+pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<()> {
     let path = path.as_ref();
     let n = cloud.points.len();
-    let lists = [
-        ("intensities", cloud.intensity.len()),
-        ("times", cloud.times.len()),
-        ("rings", cloud.rings.len()),
-        ("colors", cloud.colors.len()),
-        ("normals", cloud.normals.len()),
-    ];
-    if let Some((name, length)) = lists.iter().find(|(_, length)| *length != 0 && *length != n) {
-        let value = length.to_string();
-        return Err(IoError::unwritable(
-            path,
-            format!("the number of {name}"),
-            value,
-            format!("give {n}, or an empty list"),
-        ));
-    }
+    let lists = [("times", cloud.times.len()), ("rings", cloud.rings.len())];
+    cloud.check_lists(path, &lists)?;
     if let Some(grid) = &cloud.grid {
         let size = grid.columns.saturating_mul(grid.rows);
         let ascending = grid.pixels.windows(2).all(|w| w[0] < w[1]);

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::body::Body;
 use super::header::{self, Element, Header};
-use crate::IoError;
 use crate::bytes::{Input, Scalar, open};
 use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, channel, is_time, most_bytes, time_unit};
+use crate::{IoError, Result};
 
 /// The most pixels of a range grid.
 const MOST_PIXELS: u64 = 1 << 30;
@@ -18,16 +18,16 @@ const MOST_PIXELS: u64 = 1 << 30;
 /// # Errors
 /// [`IoError::Text`] for a wrong header or text, [`IoError::Binary`] for wrong binary data, both for a grid that names
 /// vertices that are not there or names one twice.
-pub fn read_ply_cloud(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+pub fn read_ply_cloud(path: impl AsRef<Path>) -> Result<PointCloudFile> {
     parse(open(path)?)
 }
 
-pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
+pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile> {
     let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }
 
-pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, IoError> {
+pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile> {
     let header = header::parse(bytes, path)?;
     let mut body = Body::of(&header, bytes, path);
     let mut cloud = None;
@@ -48,7 +48,7 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, I
     }
     cloud.ok_or_else(|| {
         let names: Vec<_> = header.elements.iter().map(|e| e.name.as_str()).collect();
-        let value = crate::error::shown(names.join(" ").as_bytes());
+        let value = crate::error::shown(names.join(" "));
         IoError::text(path, header.body_line - 1, "the elements", value, "give a file with vertices")
     })
 }
@@ -92,15 +92,10 @@ fn read_vertices(
     with_grid: bool,
     vertices: &mut Vertices,
     path: &Path,
-) -> Result<PointCloudFile, IoError> {
+) -> Result<PointCloudFile> {
     let Some(fields) = Fields::of(element) else {
-        return Err(IoError::text(
-            path,
-            1,
-            "the properties of vertices",
-            "without x, y, z",
-            "give a file with points",
-        ));
+        let (field, value) = ("the properties of vertices", "without x, y, z");
+        return Err(IoError::text(path, 1, field, value, "give a file with points"));
     };
     // Text may hold more digits than the type that the header speaks of.
     let fine = fields.position[0].1 == Scalar::F64 || body.is_text();
@@ -141,15 +136,12 @@ fn read_grid(
     element: &Element,
     vertices: &Vertices,
     cloud: &mut PointCloudFile,
-) -> Result<(), IoError> {
+) -> Result<()> {
     let size = header.columns.zip(header.rows).map(|(c, r)| (c, r, c.saturating_mul(r)));
     let Some((columns, rows, _)) = size.filter(|s| s.2 == element.count && s.2 <= MOST_PIXELS) else {
         let value = format!("{:?} x {:?} for {} pixels", header.columns, header.rows, element.count);
-        return Err(body.error(
-            "obj_info num_cols, num_rows",
-            value,
-            "write the columns and rows of range_grid",
-        ));
+        let advice = "write the columns and rows of range_grid";
+        return Err(body.error("obj_info num_cols, num_rows", value, advice));
     };
     let wanted = element.indices();
     let (mut order, mut pixels) = (Vec::new(), Vec::new());
@@ -163,7 +155,7 @@ fn read_grid(
         let vertex = (index >= 0.0 && body.list.len() == 1).then(|| vertices.0.get(index as usize)).flatten();
         let Some(vertex) = vertex else {
             let advice = format!("a pixel has no vertex, or one of {}", vertices.0.len());
-            return Err(body.error("range_grid", format!("{:?}", body.list), &advice));
+            return Err(body.error("range_grid", format!("{:?}", body.list), advice));
         };
         // A refused vertex was counted where it was read.
         let Some(point) = *vertex else { continue };

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::IoError;
 use crate::bytes::{Endian, Scalar, fields};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 /// The most elements, and the most properties of one.
 const MOST: usize = 256;
@@ -70,7 +70,7 @@ pub(super) struct Header {
     pub(super) body_line: u64,
 }
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let mut format = None;
     let mut elements: Vec<Element> = Vec::new();
     let (mut columns, mut rows) = (None, None);
@@ -124,7 +124,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
         return Err(IoError::text(path, number, "the format", "missing", advice));
     };
     if let Some(empty) = elements.iter().find(|e| e.properties.is_empty() && e.count > 0) {
-        let field = format!("the number of properties of {}", shown(empty.name.as_bytes()));
+        let field = format!("the number of properties of {}", shown(&empty.name));
         return Err(IoError::text(path, number, field, "0", "write its properties below the element"));
     }
     Ok(Header { format, elements, columns, rows, body: at, body_line: number + 1 })

@@ -13,7 +13,7 @@ use super::files::{has_name, name_of, names_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{CameraFrom, ScanLogOptions, ScanLogStats};
-use crate::IoError;
+use crate::Result;
 use crate::poses3::{PoseConvention, read_poses_3d};
 
 const FOLDER: &str = "masked_depth";
@@ -41,7 +41,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(&path.join(FOLDER), |name| angle_and_camera(name).is_some())
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let folder = path.join(FOLDER);
     let mut names = names_in(&folder, |name| angle_and_camera(name).is_some())?;
     names.sort_by_key(|name| {

@@ -11,7 +11,7 @@ use super::cloud_frames::{about, file_from_frames};
 use super::files::{has_extension, name_of};
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
+use crate::Result;
 use crate::poses3::{PoseConvention, RawPose};
 use crate::scan_graph::{ScanGraphNode, read_scan_graph};
 
@@ -28,7 +28,7 @@ struct GraphFrames {
 }
 
 impl FrameSource for GraphFrames {
-    fn frame(&self, i: usize) -> Result<Frame, IoError> {
+    fn frame(&self, i: usize) -> Result<Frame> {
         let cloud = about(self.nodes[i].cloud.clone(), self.base, &self.path)?;
         Ok(Frame::Points(cloud.into_scan([0.0; 3])))
     }
@@ -38,7 +38,7 @@ impl FrameSource for GraphFrames {
     }
 }
 
-pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts> {
     let nodes = read_scan_graph(path)?;
     let scan = |node: &ScanGraphNode| ScanId { path: path.into(), number: Some(node.id.into()), time: None };
     let pose = |node: &ScanGraphNode| {

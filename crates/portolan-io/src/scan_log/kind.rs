@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::parts::Parts;
 use super::{ScanLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
-use crate::IoError;
+use crate::Result;
 
 /// A kind of log of 3-D scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -34,7 +34,7 @@ struct Format {
     label: &'static str,
     /// Whether a file or folder is of this kind. Reads no more than a few names and bytes.
     is_it: fn(&Path) -> bool,
-    open: fn(&Path, &ScanLogOptions) -> Result<Parts, IoError>,
+    open: fn(&Path, &ScanLogOptions) -> Result<Parts>,
 }
 
 impl ScanLogKind {
@@ -120,7 +120,7 @@ impl ScanLogKind {
         Self::ALL.into_iter().find(|kind| (kind.format().is_it)(path))
     }
 
-    pub(super) fn parts(self, path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+    pub(super) fn parts(self, path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         (self.format().open)(path, options)
     }
 }

@@ -16,11 +16,11 @@ use super::cloud_frames::{CloudFrames, Rays};
 use super::files::{has_extension, has_name, name_of, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
 use crate::error::shown;
 use crate::points::PointFormat;
 use crate::poses3::{PoseConvention, RawPose, read_poses_3d};
+use crate::{IoError, Result};
 
 /// The most scans of a log.
 const MOST_TIMES: usize = 1 << 21;
@@ -33,7 +33,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(&path.join("velodyne"), is_scan)
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let folder = path.join("velodyne");
     let names = names_in(&folder, is_scan)?;
     let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
@@ -80,7 +80,7 @@ fn pose_file(path: &Path) -> Option<PathBuf> {
 }
 
 /// `Tr`; `None` where poses are the lidar's own.
-fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pose<3>>, IoError> {
+fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pose<3>>> {
     if options.pose_convention.is_some() || options.poses.is_some() {
         return Ok(None);
     }
@@ -94,11 +94,9 @@ fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pos
 }
 
 /// The twelve numbers of the line `Tr` (`Tr_velo_to_cam` in KITTI's other benchmarks).
-fn read_transform(path: &Path) -> Result<Pose<3>, IoError> {
+fn read_transform(path: &Path) -> Result<Pose<3>> {
     let mut lines = Lines::of(open_input(path)?);
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let mut words = fields(line);
         if !matches!(
             words.next(),
@@ -120,12 +118,10 @@ fn read_transform(path: &Path) -> Result<Pose<3>, IoError> {
 }
 
 /// One time a line (seconds).
-fn read_times(path: &Path) -> Result<Vec<f64>, IoError> {
+fn read_times(path: &Path) -> Result<Vec<f64>> {
     let mut lines = Lines::of(open_input(path)?);
     let mut times = Vec::new();
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let Some(word) = fields(line).next() else { continue };
         let Some(time) = parse_f64(word).filter(|t| t.is_finite()) else {
             return Err(IoError::text(

@@ -8,13 +8,13 @@ use portolan::scan::Frame;
 
 use super::files::names_in;
 use super::{Camera, ScanLogStats, UnreadColors};
-use crate::IoError;
 use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
+use crate::{IoError, Result};
 
 /// Reads scans by index, in any order, from any thread.
 pub(crate) trait FrameSource: Send + Sync {
     /// Scan `i` of those that the format found.
-    fn frame(&self, i: usize) -> Result<Frame, IoError>;
+    fn frame(&self, i: usize) -> Result<Frame>;
 
     /// Where the sensor stood in the frame of scan `i` (metres): not in its zero where clouds are in the world's frame.
     fn origin(&self, _i: usize) -> [f64; 3] {
@@ -69,7 +69,7 @@ pub(crate) struct Parts {
 }
 
 /// The pose in a file of its own; `None` where the file is missing.
-pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>, IoError> {
+pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>> {
     if !path.exists() {
         return Ok(None);
     }
@@ -87,7 +87,7 @@ pub(super) fn poses_beside_nothing(
     folder: &Path,
     scans: &[String],
     name_of_scan: impl Fn(&str) -> Option<String>,
-) -> Result<u64, IoError> {
+) -> Result<u64> {
     let scans: HashSet<&str> = scans.iter().map(String::as_str).collect();
     let alone = |name: &str| name_of_scan(name).is_some_and(|scan| !scans.contains(&*scan));
     Ok(names_in(folder, alone)?.len() as u64)

@@ -11,7 +11,7 @@ use super::files::{has_name, name_of, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
+use crate::Result;
 use crate::poses3::PoseConvention;
 
 const DEPTH: &str = ".depth.png";
@@ -27,7 +27,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(path, is_depth)
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let names = names_in(path, is_depth)?;
     let files = ["camera-intrinsics.txt", "../camera-intrinsics.txt"];
     let camera = find_camera(path, &files, Some(("7-Scenes", CAMERA)), options)?;
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
     use crate::scan_log::testing::*;
     use crate::scan_log::{ScanLog, ScanLogKind};
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{bad_bytes, real_data, says};
     use portolan::geom::vector::distance;
 
     /// Median distance (metres) along the ray between two frames at the same points: pixels of one, moved into the
@@ -235,11 +235,7 @@ mod tests {
         (0..4).for_each(|i| assert_is_picture(&log, i, i));
         assert_eq!(log.stats().poses_without_scan, 8);
         let few = quaternion_text(0) + "\n" + &quaternion_text(1);
-        let error = open(few, None).unwrap_err().to_string();
-        assert!(
-            error.contains("other.txt: the number of poses is 2; give one pose for each of the 4"),
-            "{error}"
-        );
+        says(open(few, None), "other.txt: the number of poses is 2; give one pose for each of the 4");
     }
 
     #[test]
@@ -290,10 +286,9 @@ mod tests {
     fn a_camera_of_other_pictures_is_refused() {
         let folder = folder_of(1);
         std::fs::remove_file(folder.path().join("camera-intrinsics.txt")).unwrap();
-        let error = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap_err().to_string();
-        assert!(
-            error.contains("the size of the picture is 8 x 6; the camera has its center at 320"),
-            "{error}"
+        says(
+            ScanLog::open(folder.path(), &ScanLogOptions::default()),
+            "the size of the picture is 8 x 6; the camera has its center at 320",
         );
     }
 

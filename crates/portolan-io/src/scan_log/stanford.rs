@@ -14,11 +14,11 @@ use super::cloud_frames::{CloudFrames, Rays};
 use super::files::{has_extension, name_of, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
 use crate::error::shown;
 use crate::points::PointFormat;
 use crate::poses3::{PoseConvention, RawPose};
+use crate::{IoError, Result};
 
 /// The most scans of a log.
 const MOST_SCANS: usize = 1 << 16;
@@ -46,7 +46,7 @@ fn conf_of(path: &Path) -> Option<PathBuf> {
     })
 }
 
-pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts> {
     let Some(conf) = conf_of(path) else {
         return Err(IoError::layout(path, "the .conf file", "missing or not the only one", "name it"));
     };
@@ -78,12 +78,10 @@ pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoEr
     })
 }
 
-fn read(path: &Path) -> Result<Vec<Line>, IoError> {
+fn read(path: &Path) -> Result<Vec<Line>> {
     let mut lines = Lines::of(open_input(path)?);
     let mut all = Vec::new();
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let mut words = fields(line);
         if !matches!(words.next(), Some(b"bmesh" | b"mesh")) {
             continue;
