@@ -6,14 +6,14 @@ use portolan::cell::{
     Cell, ColorBrick, DistanceBrick, DistancePlanes, LogOdds8, LogOddsValue, Planes, SignedDistance, TsdfRule,
 };
 use portolan::geom::Grid;
+use portolan::map::{DenseTsdf, OccupancyGrid, OccupancyTree, TsdfConfig};
 use portolan::store::{Dense, Tree, TreeRecords};
 use serde_json::Value;
 
 use super::header::Entry;
 use super::kind::Kind;
-use super::maps::{SWEEP, grid_of, tree_of, tsdf_of};
 use super::reading::{AGAIN, MEMORY, Reading};
-use super::settings::{ColorSettings, OccupancySettings, TsdfSettings};
+use super::settings::{ColorSettings, OccupancySettings, SWEEP, TsdfSettings};
 use super::{ColorBricks, MapFile, OccupancyBricks, TsdfBricks, sweep_of, weights_of};
 use crate::error::shown;
 use crate::{Container, Result};
@@ -85,22 +85,26 @@ impl Reading<'_> {
         let map = &*entry.map;
         match kind {
             Kind::Grid => {
-                let settings = self.typed(map, settings)?;
+                let settings: OccupancySettings = self.typed(map, settings)?;
                 let store = self.dense_occupancy(&entry)?;
-                file.grid = Some(self.possible(map, grid_of(store, &settings))?);
+                file.grid = Some(self.possible(map, OccupancyGrid::from_store(store, settings.model))?);
             }
             Kind::Tree => {
-                let settings = self.typed(map, settings)?;
+                let settings: OccupancySettings = self.typed(map, settings)?;
                 let store = self.tree(&entry)?;
-                file.tree = Some(self.possible(map, tree_of(store, &settings))?);
+                file.tree = Some(self.possible(map, OccupancyTree::from_store(store, settings.model))?);
             }
             Kind::Tsdf => {
                 let settings: TsdfSettings = self.typed(map, settings)?;
                 let weights = self.chosen(map, "weight model", &settings.weights, weights_of)?;
                 let sweep = settings.more.get(SWEEP).and_then(Value::as_str).unwrap_or_default();
-                let sweep = self.chosen(map, SWEEP, sweep, sweep_of)?;
+                let beams = self.chosen(map, SWEEP, sweep, sweep_of)?;
                 let store = self.dense_distances(&entry)?;
-                file.tsdf = Some(self.possible(map, tsdf_of(store, &settings, weights, sweep))?);
+                let TsdfSettings { truncation, w_max, carve_weight, .. } = settings;
+                let w_max = w_max.unwrap_or(f32::INFINITY);
+                let rest = TsdfConfig::default();
+                let config = TsdfConfig { truncation, w_max, carve_weight, beams, weights, ..rest };
+                file.tsdf = Some(self.possible(map, DenseTsdf::from_stores(store, None, config))?);
             }
             Kind::OccupancyBricks => {
                 let OccupancySettings { model, more } = self.typed(map, settings)?;

@@ -9,7 +9,7 @@ use std::path::Path;
 use portolan::scan::Pinhole;
 
 use super::depth_frames::{DepthFrame, DepthFrames};
-use super::files::{has_name, name_of, names_in};
+use super::files::{has_name, names_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{CameraFrom, ScanLogOptions, ScanLogStats};
@@ -62,16 +62,9 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         None if poses.is_file() => LayoutPoses::File(read_poses_3d(poses)?),
         _ => LayoutPoses::Missing(POSES.into()),
     };
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?),
-        scans,
-        poses,
-        convention: PoseConvention::TransposedRotation,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let (camera, convention) = (Some(camera), PoseConvention::TransposedRotation);
+    Ok(Parts { convention, camera, stats, ..Parts::new(path, source, scans, poses) })
 }
 
 #[cfg(test)]

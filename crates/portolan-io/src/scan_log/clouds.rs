@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 
+use super::ScanLogOptions;
 use super::agreement::{Placed, disagreement};
 use super::cloud_frames::{CloudFrames, Rays};
-use super::files::{has_extension, has_name, name_of, names_in, number_in};
+use super::files::{has_extension, has_name, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{ScanLogOptions, ScanLogStats};
 use crate::pcd::read_viewpoint;
 use crate::points::{PointFormat, Viewpoint, read_points_as};
-use crate::poses3::{PoseConvention, RawPose, read_poses_3d};
+use crate::poses3::{RawPose, read_poses_3d};
 use crate::{IoError, Result};
 
 /// The endings of clouds, in the order in which they are tried where a folder has as many of one as of another.
@@ -117,16 +117,8 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
 }
 
 fn parts(path: &Path, source: CloudFrames, scans: Vec<ScanId>, poses: LayoutPoses) -> Parts {
-    Parts {
-        name: name_of(path),
-        scans,
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: source.files_from_frames(),
-        source: Box::new(source),
-        camera: None,
-        stats: ScanLogStats::default(),
-    }
+    let posed_from_sensor = source.files_from_frames();
+    Parts { posed_from_sensor, ..Parts::new(path, source, scans, poses) }
 }
 
 /// A single cloud: at the pose of `--poses`, else where it is, seen from `--origin`, the viewpoint or zero.

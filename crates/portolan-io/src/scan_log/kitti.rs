@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 
+use super::ScanLogOptions;
 use super::cloud_frames::{CloudFrames, Rays};
-use super::files::{has_extension, has_name, name_of, names_in, number_in};
+use super::files::{has_extension, has_name, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{ScanLogOptions, ScanLogStats};
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
 use crate::error::shown;
 use crate::points::PointFormat;
@@ -57,16 +57,8 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     };
     let origins = vec![options.origin.unwrap_or([0.0; 3]); files.len()];
     let source = CloudFrames::new(files, Some(PointFormat::KittiBin), Rays::From(origins))?;
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(source),
-        scans,
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: camera_from_lidar(path, options)?,
-        camera: None,
-        stats: ScanLogStats::default(),
-    })
+    let posed_from_sensor = camera_from_lidar(path, options)?;
+    Ok(Parts { posed_from_sensor, ..Parts::new(path, source, scans, poses) })
 }
 
 fn pose_file(path: &Path) -> Option<PathBuf> {

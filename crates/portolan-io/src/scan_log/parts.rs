@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use portolan::geom::Pose;
 use portolan::scan::Frame;
 
-use super::files::names_in;
+use super::files::{name_of, names_in};
 use super::{Camera, ScanLogStats, UnreadColors};
 use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
 use crate::{IoError, Result};
@@ -66,6 +66,29 @@ pub(crate) struct Parts {
     pub(crate) camera: Option<Camera>,
     /// What the format counted by itself.
     pub(crate) stats: ScanLogStats,
+}
+
+impl Parts {
+    /// Scans of sensors whose poses are their own, `world_from_sensor`.
+    pub(super) fn new(
+        path: &Path,
+        source: impl FrameSource + 'static,
+        scans: Vec<ScanId>,
+        poses: LayoutPoses,
+    ) -> Self {
+        let (source, convention, stats) =
+            (Box::new(source), PoseConvention::default(), ScanLogStats::default());
+        Self {
+            name: name_of(path),
+            source,
+            scans,
+            poses,
+            convention,
+            posed_from_sensor: None,
+            camera: None,
+            stats,
+        }
+    }
 }
 
 /// The pose in a file of its own; `None` where the file is missing.

@@ -10,13 +10,13 @@
 use std::path::{Path, PathBuf};
 
 use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
-use super::files::{has_extension, has_name, name_of, names_in, number_in};
+use super::files::{has_extension, has_name, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{ScanLogOptions, ScanLogStats};
 use crate::Result;
-use crate::poses3::{PoseConvention, read_poses_3d};
+use crate::poses3::read_poses_3d;
 
 const DEPTH: &str = "depth";
 const POSES: &str = "trajectory.log";
@@ -64,16 +64,9 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         let (number, time) = number_and_time(name);
         ScanId { path: folder.join(name), number, time }
     };
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?),
-        scans: names.iter().map(scan).collect(),
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let scans = names.iter().map(scan).collect();
+    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }
 
 /// Number and time (seconds) of a picture's name.

@@ -7,12 +7,11 @@
 use std::path::Path;
 
 use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
-use super::files::{has_name, name_of, names_in, number_in};
+use super::files::{has_name, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{ScanLogOptions, ScanLogStats};
 use crate::Result;
-use crate::poses3::PoseConvention;
 
 const DEPTH: &str = ".depth.png";
 const POSE: &str = ".pose.txt";
@@ -51,21 +50,14 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         stats.poses_without_scan = poses_beside_nothing(path, &names, name_of_scan)?;
     }
     let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(source),
-        scans,
-        poses: LayoutPoses::PerScan(poses),
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let poses = LayoutPoses::PerScan(poses);
+    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::poses3::PoseConvention;
     use crate::scan_log::testing::*;
     use crate::scan_log::{ScanLog, ScanLogKind};
     use crate::testing::{bad_bytes, real_data, says};

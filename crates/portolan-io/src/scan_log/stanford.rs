@@ -11,7 +11,7 @@
 use std::path::{Path, PathBuf};
 
 use super::cloud_frames::{CloudFrames, Rays};
-use super::files::{has_extension, name_of, names_in, number_in};
+use super::files::{has_extension, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
@@ -66,16 +66,9 @@ pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts> {
         files.push(file);
     }
     let source = CloudFrames::new(files, Some(PointFormat::Ply), Rays::Parallel)?;
-    Ok(Parts {
-        name: name_of(path),
-        scans,
-        poses: LayoutPoses::PerScan(poses),
-        convention: PoseConvention::TransposedRotation,
-        posed_from_sensor: source.files_from_frames(),
-        source: Box::new(source),
-        camera: None,
-        stats,
-    })
+    let (convention, posed_from_sensor) = (PoseConvention::TransposedRotation, source.files_from_frames());
+    let parts = Parts::new(path, source, scans, LayoutPoses::PerScan(poses));
+    Ok(Parts { convention, posed_from_sensor, stats, ..parts })
 }
 
 fn read(path: &Path) -> Result<Vec<Line>> {

@@ -17,7 +17,7 @@ use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
 use crate::bytes::{Lines, open as open_input, parse_f64};
 use crate::error::shown;
-use crate::poses3::{PoseConvention, read_poses_3d};
+use crate::poses3::read_poses_3d;
 use crate::{IoError, Result};
 
 const DEPTH: &str = "depth.txt";
@@ -47,8 +47,7 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     }
     let colors = path.join(COLOR);
     let colors = if options.color && colors.is_file() { read_list(&colors)? } else { Vec::new() };
-    let name = name_of(path);
-    let camera = find_camera(path, &CAMERA_FILES, published_camera(&name), options)?;
+    let camera = find_camera(path, &CAMERA_FILES, published_camera(&name_of(path)), options)?;
     let color = |time| nearest_in_time(&colors, time, options.time_tolerance).filter(|file| file.is_file());
     let frames = depths.iter().map(|(time, file)| DepthFrame {
         depth: file.clone(),
@@ -61,16 +60,9 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         None if poses.is_file() => LayoutPoses::File(read_poses_3d(poses)?),
         _ => LayoutPoses::Missing(POSES.into()),
     };
-    Ok(Parts {
-        name,
-        source: Box::new(DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?),
-        scans: depths.into_iter().map(|(t, path)| ScanId { path, number: None, time: Some(t) }).collect(),
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let scans = depths.into_iter().map(|(t, path)| ScanId { path, number: None, time: Some(t) }).collect();
+    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }
 
 /// What TUM publishes for the color cameras, to which its depth images are registered.
