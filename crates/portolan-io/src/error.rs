@@ -121,6 +121,22 @@ impl IoError {
         Self::Text { path: path.into(), line, field, value, advice }
     }
 
+    /// Refuses one more thing where `count` are the most that a file may have.
+    pub(crate) fn unless_full(
+        path: &Path,
+        line: u64,
+        count: usize,
+        most: usize,
+        what: &str,
+        of: &str,
+    ) -> Result<()> {
+        if count < most {
+            return Ok(());
+        }
+        let (field, value) = (format!("the number of {what}"), format!("more than {most}"));
+        Err(Self::text(path, line, field, value, format!("split the {of}")))
+    }
+
     pub(crate) fn binary(
         path: &Path,
         offset: u64,

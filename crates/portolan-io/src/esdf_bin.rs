@@ -22,7 +22,7 @@ use portolan::Status;
 use portolan::field::EsdfGrid;
 use portolan::geom::Grid;
 
-use crate::bytes::{open_file, write_atomic};
+use crate::bytes::{open_file, u32_at, u64_at, write_atomic};
 use crate::error::shown;
 use crate::{IoError, Result};
 
@@ -162,20 +162,12 @@ impl EsdfFile {
             let advice = "give an esdf.bin: it starts with PORTESDF";
             return Err(IoError::binary(path, 0, "the magic", shown(&h[..8]), advice));
         }
-        match word(&h, 12) {
+        match u32_at(&h, 12) {
             2 => Ok(Self::Two(body(&h, reader, length, path)?)),
             3 => Ok(Self::Three(body(&h, reader, length, path)?)),
             d => Err(IoError::binary(path, 12, "the dimension", d, "it must be 2 or 3")),
         }
     }
-}
-
-fn word(h: &[u8; 64], at: usize) -> u32 {
-    u32::from_le_bytes([h[at], h[at + 1], h[at + 2], h[at + 3]])
-}
-
-fn double(h: &[u8; 64], at: usize) -> f64 {
-    f64::from_le_bytes(std::array::from_fn(|k| h[at + k]))
 }
 
 fn body<const D: usize>(
@@ -187,14 +179,14 @@ fn body<const D: usize>(
     let bad = |at: u64, field: &str, value: String, advice: &str| {
         Err(IoError::binary(path, at, field, value, advice))
     };
-    let (version, flags) = (word(h, 8), word(h, 28));
+    let (version, flags) = (u32_at(h, 8), u32_at(h, 28));
     if version != 1 {
         return bad(8, "the version", version.to_string(), "this program reads version 1; use a newer one");
     }
     if flags > 1 {
         return bad(28, "the flags", flags.to_string(), "this program reads bit 0 only; use a newer one");
     }
-    let shape: [u32; 3] = std::array::from_fn(|k| word(h, 16 + 4 * k));
+    let shape: [u32; 3] = std::array::from_fn(|k| u32_at(h, 16 + 4 * k));
     let cells = shape.iter().try_fold(1u64, |n, &s| n.checked_mul(u64::from(s)));
     let cells = match cells.filter(|n| (1..=MOST_CELLS).contains(n)) {
         Some(n) if shape[D..].iter().all(|&s| s == 1) => n,
@@ -203,8 +195,8 @@ fn body<const D: usize>(
             return bad(16, "the shape", format!("{shape:?}"), advice);
         }
     };
-    let origin: [f64; D] = std::array::from_fn(|k| double(h, 32 + 8 * k));
-    let resolution = double(h, 56);
+    let origin: [f64; D] = std::array::from_fn(|k| f64::from_bits(u64_at(h, 32 + 8 * k)));
+    let resolution = f64::from_bits(u64_at(h, 56));
     if !origin.iter().all(|v| v.is_finite()) {
         return bad(32, "the origin", format!("{origin:?}"), "give finite numbers (metres)");
     }

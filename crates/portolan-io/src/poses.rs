@@ -73,10 +73,7 @@ pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>> {
                 return Err(IoError::text(&path, number, "the number of columns", count, advice));
             }
         };
-        if poses.len() == MOST_POSES {
-            let value = format!("more than {MOST_POSES}");
-            return Err(IoError::text(&path, number, "the number of poses", value, "split the file"));
-        }
+        IoError::unless_full(&path, number, poses.len(), MOST_POSES, "poses", "file")?;
         poses.push(pose);
     }
     if poses.is_empty() {

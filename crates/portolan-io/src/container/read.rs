@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::{
     ContainerWriter, ENTRY, HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_of,
 };
-use crate::bytes::open_file;
+use crate::bytes::{open_file, u32_at, u64_at};
 use crate::error::shown;
 use crate::{IoError, Result};
 
@@ -255,14 +255,6 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
         return Err(IoError::binary(path, at as u64, "the file length", value, advice));
     }
     Ok(chunks)
-}
-
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
-}
-
-fn u64_at(bytes: &[u8], at: usize) -> u64 {
-    u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
 }
 
 #[cfg(test)]

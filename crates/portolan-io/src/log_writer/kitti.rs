@@ -35,13 +35,9 @@ impl LogWriter {
             }
         };
         write_atomic(&path, |out| {
-            for [x, y, z] in points {
-                // Intensity is not simulated.
-                for v in [x, y, z, 0.0] {
-                    out.write_all(&v.to_le_bytes())?;
-                }
-            }
-            Ok(())
+            // Intensity is not simulated.
+            let mut values = points.iter().flat_map(|[x, y, z]| [*x, *y, *z, 0.0]);
+            values.try_for_each(|v| out.write_all(&v.to_le_bytes()))
         })?;
         let pose = matrix_rows(world_from_camera).map(|r| r.join(" ")).join(" ");
         self.text("poses.txt").push_str(&(pose + "\n"));

@@ -8,7 +8,7 @@ use std::path::Path;
 use flate2::read::DeflateDecoder;
 
 use super::{NpyArray, npy};
-use crate::bytes::{open_file, write_atomic};
+use crate::bytes::{open_file, u32_at, write_atomic};
 use crate::error::shown;
 use crate::{IoError, Result};
 
@@ -119,7 +119,7 @@ pub fn read_npz(path: impl AsRef<Path>) -> Result<Vec<(String, NpyArray)>> {
 }
 
 fn word(bytes: &[u8], at: usize) -> u64 {
-    u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
+    u64::from(u32_at(bytes, at))
 }
 
 fn short(bytes: &[u8], at: usize) -> usize {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::bytes::{Scalar, fields, parse_f64};
+use crate::bytes::{Scalar, fields, header_line, parse_f64, whole};
 use crate::error::shown;
 use crate::points::Viewpoint;
 use crate::{IoError, Result};
@@ -78,14 +78,11 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let (mut at, mut number) = (0, 0);
     let data = loop {
         number += 1;
-        let line_end = bytes[at..].iter().take(1 << 16).position(|b| *b == b'\n');
-        let Some(length) = line_end else {
+        let Some(line) = header_line(bytes, &mut at) else {
             let advice = "give a PCD file, whose header ends with a line DATA";
             let value = shown(&bytes[at..bytes.len().min(at + 48)]);
             return Err(IoError::text(path, number, "the header", value, advice));
         };
-        let line = &bytes[at..at + length];
-        at += length + 1;
         let mut words = fields(line);
         let Some(key) = words.next() else { continue };
         let words: Vec<&[u8]> = words.take(MOST_FIELDS + 1).collect();
@@ -193,10 +190,6 @@ impl Lines<'_> {
 
 fn bad(path: &Path, number: u64, key: &[u8], value: &[u8], advice: &str) -> IoError {
     IoError::text(path, number, String::from_utf8_lossy(key), shown(value), advice)
-}
-
-fn whole(word: &[u8]) -> Option<usize> {
-    std::str::from_utf8(word).ok()?.parse().ok()
 }
 
 fn scalar(kind: &[u8], size: &[u8]) -> Option<Scalar> {

@@ -7,7 +7,7 @@ use super::header::{self, Data, Field, Header};
 use super::lzf;
 use crate::bytes::{Input, Scalar, fields, open, parse_f64};
 use crate::error::shown;
-use crate::points::{CloudBuilder, PointCloudFile, Viewpoint, channel, is_time, most_bytes, time_unit};
+use crate::points::{CloudBuilder, PointCloudFile, PointFields, Viewpoint, is_time, most_bytes};
 use crate::{IoError, Result};
 
 /// A header is no longer than this (bytes).
@@ -156,40 +156,24 @@ fn cloud(body: &[u8], header: &Header, path: &Path) -> Result<PointCloudFile> {
         let advice = "give a cloud with fields x, y and z";
         return Err(IoError::text(path, 1, "FIELDS", shown(names.join(" ")), advice));
     };
-    let intensity = named(&["intensity", "i", "reflectivity", "reflectance"]);
     let packed = named(&["rgb", "rgba"]);
     let channels = three("r", "g", "b").or_else(|| three("red", "green", "blue"));
-    let normal = three("normal_x", "normal_y", "normal_z");
-    let ring = named(&["ring", "channel"]);
-    let time = header.fields.iter().find(|f| is_time(&f.name)).and_then(column);
-
-    let fine = position[0].scalar == Scalar::F64;
-    let mut builder = CloudBuilder::new(fine);
+    let fields = PointFields {
+        position,
+        intensity: named(&["intensity", "i", "reflectivity", "reflectance"]),
+        color: channels.filter(|_| packed.is_none()),
+        normal: three("normal_x", "normal_y", "normal_z"),
+        ring: named(&["ring", "channel"]),
+        time: header.fields.iter().find(|f| is_time(&f.name)).and_then(column),
+    };
+    let mut builder = CloudBuilder::new(position[0].scalar == Scalar::F64);
     builder.cloud.viewpoint = header.viewpoint;
     if header.height > 1 {
         builder.organize(header.width, header.height);
     }
     for i in 0..header.points() {
-        if !builder.push(i, position.map(|c| c.get(i))) {
-            continue;
-        }
-        if let Some(column) = intensity {
-            builder.cloud.intensity.push(column.get(i) as f32);
-        }
-        if let Some(column) = packed {
-            builder.cloud.colors.push(rgb(column.bits(i)));
-        } else if let Some(columns) = channels {
-            builder.cloud.colors.push(columns.map(|c| channel(c.get(i), c.scalar)));
-        }
-        if let Some(columns) = normal {
-            builder.cloud.normals.push(columns.map(|c| c.get(i) as f32));
-        }
-        if let Some(column) = ring {
-            builder.cloud.rings.push(column.get(i) as u16);
-        }
-        if let Some(column) = time {
-            builder.times.push(column.get(i) * time_unit(column.scalar));
-        }
+        let kept = builder.push_fields(i, &fields, |column| (column.get(i), column.scalar));
+        builder.cloud.colors.extend(packed.filter(|_| kept).map(|column| rgb(column.bits(i))));
     }
     Ok(builder.finish())
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::body::Body;
 use super::header::{self, Element, Header};
 use crate::bytes::{Input, Scalar, open};
-use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, channel, is_time, most_bytes, time_unit};
+use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, PointFields, is_time, most_bytes};
 use crate::{IoError, Result};
 
 /// The most pixels of a range grid.
@@ -58,32 +58,17 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile> {
 struct Vertices(Vec<Option<u32>>);
 
 /// The places of a vertex's properties.
-struct Fields {
-    position: [(usize, Scalar); 3],
-    intensity: Option<(usize, Scalar)>,
-    normal: Option<[(usize, Scalar); 3]>,
-    color: Option<[(usize, Scalar); 3]>,
-    ring: Option<(usize, Scalar)>,
-    time: Option<(usize, Scalar)>,
-}
-
-impl Fields {
-    fn of(element: &Element) -> Option<Self> {
-        let color = [
-            &["red", "r", "diffuse_red"][..],
-            &["green", "g", "diffuse_green"],
-            &["blue", "b", "diffuse_blue"],
-        ];
-        let names = element.properties.iter().map(|p| p.name.as_str());
-        Some(Self {
-            position: element.three([&["x"], &["y"], &["z"]])?,
-            intensity: element.value(&["intensity", "scalar_intensity", "reflectance", "reflectivity"]),
-            normal: element.three([&["nx"], &["ny"], &["nz"]]),
-            color: element.three(color),
-            ring: element.value(&["ring"]),
-            time: names.into_iter().find(|n| is_time(n)).and_then(|n| element.value(&[n])),
-        })
-    }
+fn fields_of(element: &Element) -> Option<PointFields<(usize, Scalar)>> {
+    let red = &["red", "r", "diffuse_red"][..];
+    let mut names = element.properties.iter().map(|p| p.name.as_str());
+    Some(PointFields {
+        position: element.three([&["x"], &["y"], &["z"]])?,
+        intensity: element.value(&["intensity", "scalar_intensity", "reflectance", "reflectivity"]),
+        normal: element.three([&["nx"], &["ny"], &["nz"]]),
+        color: element.three([red, &["green", "g", "diffuse_green"], &["blue", "b", "diffuse_blue"]]),
+        ring: element.value(&["ring"]),
+        time: names.find(|n| is_time(n)).and_then(|n| element.value(&[n])),
+    })
 }
 
 fn read_vertices(
@@ -93,7 +78,7 @@ fn read_vertices(
     vertices: &mut Vertices,
     path: &Path,
 ) -> Result<PointCloudFile> {
-    let Some(fields) = Fields::of(element) else {
+    let Some(fields) = fields_of(element) else {
         let (field, value) = ("the properties of vertices", "without x, y, z");
         return Err(IoError::text(path, 1, field, value, "give a file with points"));
     };
@@ -103,27 +88,9 @@ fn read_vertices(
     for i in 0..element.count {
         body.row(element, None)?;
         let values = &body.values;
-        let kept = builder.push(i as usize, fields.position.map(|(k, _)| values[k]));
+        let kept = builder.push_fields(i as usize, &fields, |(k, scalar)| (values[k], scalar));
         if with_grid {
             vertices.0.push(kept.then(|| builder.cloud.points.len() as u32 - 1));
-        }
-        if !kept {
-            continue;
-        }
-        if let Some((k, _)) = fields.intensity {
-            builder.cloud.intensity.push(values[k] as f32);
-        }
-        if let Some(n) = fields.normal {
-            builder.cloud.normals.push(n.map(|(k, _)| values[k] as f32));
-        }
-        if let Some(c) = fields.color {
-            builder.cloud.colors.push(c.map(|(k, scalar)| channel(values[k], scalar)));
-        }
-        if let Some((k, _)) = fields.ring {
-            builder.cloud.rings.push(values[k] as u16);
-        }
-        if let Some((k, scalar)) = fields.time {
-            builder.times.push(values[k] * time_unit(scalar));
         }
     }
     Ok(builder.finish())

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::bytes::{Endian, Scalar, fields};
+use crate::bytes::{Endian, Scalar, fields, header_line, whole};
 use crate::error::shown;
 use crate::{IoError, Result};
 
@@ -80,13 +80,10 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
         let error = |field: &str, value: &[u8], advice: &str| {
             IoError::text(path, number, field, shown(value), advice)
         };
-        let end = bytes[at..].iter().take(1 << 16).position(|b| *b == b'\n');
-        let Some(length) = end else {
+        let Some(line) = header_line(bytes, &mut at) else {
             let value = &bytes[at..bytes.len().min(at + 48)];
             return Err(error("the header", value, "give a PLY file, whose header ends with end_header"));
         };
-        let line = &bytes[at..at + length];
-        at += length + 1;
         let words: Vec<&[u8]> = fields(line).take(8).collect();
         match words[..] {
             [b"ply"] if number == 1 => {}
@@ -154,8 +151,4 @@ fn scalar(word: &[u8]) -> Option<Scalar> {
         b"double" | b"float64" => Scalar::F64,
         _ => return None,
     })
-}
-
-fn whole(word: &[u8]) -> Option<u64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
 }

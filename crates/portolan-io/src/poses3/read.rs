@@ -144,10 +144,7 @@ impl Reading {
             let advice = format!("give {expected}, as the lines before");
             Err(IoError::text(path, line, "the number of columns", row.len(), advice))
         };
-        if self.poses.len() == MOST_POSES {
-            let value = format!("more than {MOST_POSES}");
-            return Err(IoError::text(path, line, "the number of poses", value, "split the file"));
-        }
+        IoError::unless_full(path, line, self.poses.len(), MOST_POSES, "poses", "file")?;
         match self.layout {
             PoseLayout::Matrices | PoseLayout::RedwoodLog => return self.take_row(row, line, path),
             PoseLayout::Quaternions => {

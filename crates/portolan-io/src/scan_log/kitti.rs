@@ -124,10 +124,7 @@ fn read_times(path: &Path) -> Result<Vec<f64>> {
                 "write seconds, one line per scan",
             ));
         };
-        if times.len() == MOST_TIMES {
-            let value = format!("more than {MOST_TIMES}");
-            return Err(IoError::text(path, number, "the number of times", value, "split the log"));
-        }
+        IoError::unless_full(path, number, times.len(), MOST_TIMES, "times", "log")?;
         times.push(time);
     }
     Ok(times)

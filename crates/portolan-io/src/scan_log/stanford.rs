@@ -86,10 +86,7 @@ fn read(path: &Path) -> Result<Vec<Line>> {
         let file = words.next().and_then(|w| std::str::from_utf8(w).ok()).ok_or_else(bad)?;
         let values: Option<Vec<f64>> = words.map(parse_f64).collect();
         let [x, y, z, qx, qy, qz, qw] = *values.unwrap_or_default() else { return Err(bad()) };
-        if all.len() == MOST_SCANS {
-            let value = format!("more than {MOST_SCANS}");
-            return Err(IoError::text(path, number, "the number of scans", value, "split the file"));
-        }
+        IoError::unless_full(path, number, all.len(), MOST_SCANS, "scans", "file")?;
         all.push(Line {
             file: file.into(),
             pose: RawPose::from_quaternion([x, y, z], [qx, qy, qz, qw], number),

@@ -100,10 +100,7 @@ fn read_list(path: &Path) -> Result<Vec<(f64, PathBuf)>> {
         if file.is_empty() || file.contains('\0') {
             return Err(IoError::text(path, number, "the file", shown(line), "write seconds, then a file"));
         }
-        if pictures.len() == MOST_PICTURES {
-            let value = format!("more than {MOST_PICTURES}");
-            return Err(IoError::text(path, number, "the number of pictures", value, "split the list"));
-        }
+        IoError::unless_full(path, number, pictures.len(), MOST_PICTURES, "pictures", "list")?;
         pictures.push((time, folder.join(file)));
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0));
