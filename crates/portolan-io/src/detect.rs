@@ -96,7 +96,7 @@ fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {
     }
     if text.lines().any(|line| {
         let word = line.split_ascii_whitespace().next().unwrap_or("");
-        CARMEN_WORDS.contains(&word)
+        CARMEN_WORDS.split(' ').any(|known| known == word)
             || line.starts_with("# message_name ")
             || line.starts_with("# message formats")
     }) {
@@ -110,20 +110,8 @@ fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {
 const GEOJSON_WORDS: [&str; 3] = ["\"Feature\"", "\"FeatureCollection\"", "\"coordinates\""];
 
 /// First words of lines of CARMEN logs.
-const CARMEN_WORDS: [&str; 12] = [
-    "FLASER",
-    "RLASER",
-    "ROBOTLASER1",
-    "ROBOTLASER2",
-    "RAWLASER1",
-    "RAWLASER2",
-    "ODOM",
-    "PARAM",
-    "SYNC",
-    "TRUEPOS",
-    "NEFF",
-    "OLDLASER",
-];
+const CARMEN_WORDS: &str =
+    "FLASER RLASER ROBOTLASER1 ROBOTLASER2 RAWLASER1 RAWLASER2 ODOM PARAM SYNC TRUEPOS NEFF OLDLASER";
 
 /// By the name, for a file whose content has no format (an empty or broken one): the reader's error is more useful.
 fn by_name(path: &Path, head: &[u8]) -> Option<FileKind> {

@@ -53,8 +53,9 @@ pub fn write_esdf<const D: usize>(
     status: Option<&[u8]>,
 ) -> Result<()> {
     let path = path.as_ref();
-    check_esdf(path, grid, distances, status)?;
-    write_atomic(path, |w| write_to(w, grid, distances, status))
+    let field = Samples { grid, distances, status };
+    field.check(path)?;
+    write_atomic(path, |w| field.write_to(w))
 }
 
 /// The same as bytes in memory.
@@ -67,62 +68,64 @@ pub fn esdf_to_bytes<const D: usize>(
     status: Option<&[u8]>,
 ) -> Result<Vec<u8>> {
     let name = Path::new("esdf.bin");
-    check_esdf(name, grid, distances, status)?;
+    let field = Samples { grid, distances, status };
+    field.check(name)?;
     let mut bytes = Vec::new();
-    write_to(&mut bytes, grid, distances, status).map_err(|e| IoError::os(name, "write it", e))?;
+    field.write_to(&mut bytes).map_err(|e| IoError::os(name, "write it", e))?;
     Ok(bytes)
 }
 
-fn check_esdf<const D: usize>(
-    path: &Path,
-    grid: &Grid<D>,
-    distances: &[f32],
-    status: Option<&[u8]>,
-) -> Result<()> {
-    let cells = grid.checked_len().filter(|&n| n as u64 <= MOST_CELLS);
-    let fits = cells == Some(distances.len()) && status.is_none_or(|s| s.len() == distances.len());
-    if !fits || distances.is_empty() {
-        let value = format!(
-            "{:?} for {} distances and {:?} states",
-            grid.shape,
-            distances.len(),
-            status.map(<[u8]>::len)
-        );
-        let advice = format!("give one value per cell, from 1 to {MOST_CELLS} of them");
-        return Err(IoError::unwritable(path, "the shape", value, advice));
-    }
-    let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
-    if !(resolution > 0.0 && resolution.is_finite() && origin.iter().all(|v| v.is_finite())) {
-        let value = format!("{resolution} at {origin:?}");
-        return Err(IoError::unwritable(path, "the resolution", value, "give finite values, above zero"));
-    }
-    Ok(())
+/// What a file holds.
+struct Samples<'a, const D: usize> {
+    grid: &'a Grid<D>,
+    distances: &'a [f32],
+    status: Option<&'a [u8]>,
 }
 
-fn write_to<const D: usize>(
-    w: &mut impl Write,
-    grid: &Grid<D>,
-    distances: &[f32],
-    status: Option<&[u8]>,
-) -> std::io::Result<()> {
-    let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
-    w.write_all(MAGIC)?;
-    for word in [1, D as u32] {
-        w.write_all(&word.to_le_bytes())?;
+impl<const D: usize> Samples<'_, D> {
+    fn check(&self, path: &Path) -> Result<()> {
+        let Self { grid, distances, status } = *self;
+        let cells = grid.checked_len().filter(|&n| n as u64 <= MOST_CELLS);
+        let fits = cells == Some(distances.len()) && status.is_none_or(|s| s.len() == distances.len());
+        if !fits || distances.is_empty() {
+            let value = format!(
+                "{:?} for {} distances and {:?} states",
+                grid.shape,
+                distances.len(),
+                status.map(<[u8]>::len)
+            );
+            let advice = format!("give one value per cell, from 1 to {MOST_CELLS} of them");
+            return Err(IoError::unwritable(path, "the shape", value, advice));
+        }
+        let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
+        if !(resolution > 0.0 && resolution.is_finite() && origin.iter().all(|v| v.is_finite())) {
+            let value = format!("{resolution} at {origin:?}");
+            return Err(IoError::unwritable(path, "the resolution", value, "give finite values, above zero"));
+        }
+        Ok(())
     }
-    for k in 0..3 {
-        w.write_all(&(grid.shape.get(k).map_or(1, |&s| s as u32)).to_le_bytes())?;
+
+    fn write_to(&self, w: &mut impl Write) -> io::Result<()> {
+        let Self { grid, distances, status } = *self;
+        let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
+        w.write_all(MAGIC)?;
+        for word in [1, D as u32] {
+            w.write_all(&word.to_le_bytes())?;
+        }
+        for k in 0..3 {
+            w.write_all(&(grid.shape.get(k).map_or(1, |&s| s as u32)).to_le_bytes())?;
+        }
+        w.write_all(&u32::from(status.is_some()).to_le_bytes())?;
+        for k in 0..3 {
+            w.write_all(&origin.get(k).copied().unwrap_or(0.0).to_le_bytes())?;
+        }
+        w.write_all(&resolution.to_le_bytes())?;
+        for chunk in distances.chunks(1 << 14) {
+            let bytes: Vec<u8> = chunk.iter().flat_map(|d| d.to_le_bytes()).collect();
+            w.write_all(&bytes)?;
+        }
+        w.write_all(status.unwrap_or(&[]))
     }
-    w.write_all(&u32::from(status.is_some()).to_le_bytes())?;
-    for k in 0..3 {
-        w.write_all(&origin.get(k).copied().unwrap_or(0.0).to_le_bytes())?;
-    }
-    w.write_all(&resolution.to_le_bytes())?;
-    for chunk in distances.chunks(1 << 14) {
-        let bytes: Vec<u8> = chunk.iter().flat_map(|d| d.to_le_bytes()).collect();
-        w.write_all(&bytes)?;
-    }
-    w.write_all(status.unwrap_or(&[]))
 }
 
 impl EsdfFile {

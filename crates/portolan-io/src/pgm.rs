@@ -1,6 +1,6 @@
 //! Netpbm gray maps: `P5` (binary) and `P2` (text), 8 and 16 bits.
 
-use std::io::{self, BufRead, Read, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use crate::bytes::{Input, open, parse_f64, read_failed};
@@ -38,7 +38,7 @@ impl Pgm {
     /// # Errors
     /// [`IoError::Binary`] for a wrong header and for too few pixels.
     pub fn parse(mut input: Input) -> Result<Self> {
-        let mut header = Header { input: &mut input, offset: 0, last: b' ' };
+        let mut header = Header { input: &mut input, offset: 0 };
         let magic = [header.byte()?, header.byte()?].map(|b| b.unwrap_or(b' '));
         let text = match &magic {
             b"P5" => false,
@@ -120,7 +120,6 @@ fn binary_pixels(input: &mut Input, offset: u64, count: u64, max_value: u64) -> 
 struct Header<'a> {
     input: &'a mut Input,
     offset: u64,
-    last: u8,
 }
 
 impl Header<'_> {
@@ -130,7 +129,6 @@ impl Header<'_> {
             Ok(0) => Ok(None),
             Ok(_) => {
                 self.offset += 1;
-                self.last = byte[0];
                 Ok(Some(byte[0]))
             }
             Err(e) => Err(read_failed(self.input.path(), self.input.compression(), self.offset, e)),
@@ -158,23 +156,8 @@ impl Header<'_> {
     }
 
     fn skip_comment(&mut self) -> Result<()> {
-        loop {
-            let (used, ended) = match self.input.fill_buf() {
-                Ok([]) => return Ok(()),
-                Ok(bytes) => match bytes.iter().position(|b| *b == b'\n') {
-                    Some(i) => (i + 1, true),
-                    None => (bytes.len(), false),
-                },
-                Err(e) => {
-                    return Err(read_failed(self.input.path(), self.input.compression(), self.offset, e));
-                }
-            };
-            self.input.consume(used);
-            self.offset += used as u64;
-            if ended {
-                return Ok(());
-            }
-        }
+        while self.byte()?.is_some_and(|b| b != b'\n') {}
+        Ok(())
     }
 }
 

@@ -93,10 +93,8 @@ mod tests {
     use super::*;
 
     fn svg(lines: &[Polyline]) -> String {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("c.svg");
-        write_svg(&path, lines, &SvgStyle { margin: 1.0, ..SvgStyle::default() }).unwrap();
-        std::fs::read_to_string(path).unwrap()
+        let style = SvgStyle { margin: 1.0, ..SvgStyle::default() };
+        String::from_utf8(crate::testing::written(|path| write_svg(path, lines, &style))).unwrap()
     }
 
     #[test]

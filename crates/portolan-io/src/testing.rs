@@ -71,6 +71,14 @@ pub(crate) fn no_panic<T>(
     }
 }
 
+/// The bytes that a writer makes.
+pub(crate) fn written(write: impl FnOnce(&Path) -> Result<()>) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file");
+    write(&path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
 /// Asserts an error of one line that has this part.
 #[track_caller]
 pub(crate) fn says<T>(result: Result<T>, part: &str) {

@@ -90,7 +90,7 @@ impl CarmenLog {
     /// [`IoError::NoScans`] where no line is a usable scan, [`IoError::Text`] for a line longer than 4 MiB or
     /// a log that would need gigabytes, and the errors of reading.
     pub fn parse(input: Input) -> Result<Self> {
-        Reading::new().run(Lines::of(input))
+        Reading::default().run(Lines::of(input))
     }
 
     /// The file that the log comes from.

@@ -30,6 +30,7 @@ struct Collected {
 }
 
 /// The state of reading a log.
+#[derive(Default)]
 pub(super) struct Reading {
     flaser: Collected,
     robot_laser: Collected,
@@ -42,19 +43,6 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    pub(super) fn new() -> Self {
-        Self {
-            flaser: Collected::default(),
-            robot_laser: Collected::default(),
-            fans: Vec::new(),
-            fan_of_shape: HashMap::new(),
-            fan_beams: 0,
-            refused: RefusedScans::default(),
-            other: BTreeMap::new(),
-            rare: 0,
-        }
-    }
-
     /// Reads all lines.
     pub(super) fn run(mut self, mut lines: Lines<impl BufRead>) -> Result<CarmenLog> {
         while let Some(line) = lines.next_line()? {
@@ -69,11 +57,7 @@ impl Reading {
                     continue;
                 }
             };
-            let into = match message {
-                ScanMessage::Flaser => &mut self.flaser.readings,
-                ScanMessage::RobotLaser1 => &mut self.robot_laser.readings,
-            };
-            match parse_scan(message, rest, into) {
+            match parse_scan(message, rest, &mut self.of(message).readings) {
                 Ok(head) if self.push(message, &head) => {}
                 Ok(_) => {
                     let value = format!("over {MOST_READINGS} readings or {MOST_SCANS} scans");
@@ -87,13 +71,17 @@ impl Reading {
         self.finish(path, count)
     }
 
+    fn of(&mut self, message: ScanMessage) -> &mut Collected {
+        match message {
+            ScanMessage::Flaser => &mut self.flaser,
+            ScanMessage::RobotLaser1 => &mut self.robot_laser,
+        }
+    }
+
     /// Whether there was room for the scan.
     fn push(&mut self, message: ScanMessage, head: &ScanHead) -> bool {
         let Some(fan) = self.fan(head.fan) else { return false };
-        let into = match message {
-            ScanMessage::Flaser => &mut self.flaser,
-            ScanMessage::RobotLaser1 => &mut self.robot_laser,
-        };
+        let into = self.of(message);
         let [x, y, theta] = head.pose;
         into.entries.push(Entry {
             world_from_laser: Pose::<2>::new(x, y, theta),

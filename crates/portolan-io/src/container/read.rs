@@ -97,11 +97,6 @@ impl Container {
         chunk.map(|c| self.unpack(c)).transpose()
     }
 
-    /// The chunks with this tag, in the order of the file.
-    pub fn tagged<'a>(&'a self, tag: &'a str) -> impl Iterator<Item = &'a Chunk> + 'a {
-        self.chunks.iter().filter(move |c| c.tag == tag)
-    }
-
     /// The content of one of [`Container::chunks`]. Memory grows as it is unpacked, and no farther than the
     /// index announces.
     ///
@@ -305,7 +300,10 @@ mod tests {
         assert_eq!(container.get("NOISE", "a").unwrap().unwrap(), noise);
         assert_eq!(container.get("ZERO", "b").unwrap().unwrap(), vec![0; 3 << 20]);
         assert_eq!(container.get("ZERO", "c").unwrap(), None);
-        assert_eq!((container.tagged("ZERO").count(), container.chunks()[1].length), (1, 3 << 20));
+        assert_eq!(
+            (container.chunks().iter().filter(|c| c.tag == "ZERO").count(), container.chunks()[1].length),
+            (1, 3 << 20)
+        );
         assert_eq!(std::fs::read(&path).unwrap(), writer.to_bytes());
         assert_eq!(sample(), sample());
         assert!(parse(&ContainerWriter::new().to_bytes()).unwrap().chunks().is_empty());

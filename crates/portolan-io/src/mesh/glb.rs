@@ -181,10 +181,7 @@ mod tests {
     use super::*;
 
     fn written(mesh: &Mesh) -> (Value, Vec<u8>) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh.glb");
-        write_glb(&path, mesh).unwrap();
-        let file = std::fs::read(path).unwrap();
+        let file = crate::testing::written(|path| write_glb(path, mesh));
         assert_eq!(file, glb_to_bytes(mesh).unwrap());
         let mut bytes = Bytes(&file);
         assert_eq!((bytes.take(), bytes.u32(), bytes.u32()), (*b"glTF", 2, file.len() as u32));

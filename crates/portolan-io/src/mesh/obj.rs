@@ -58,10 +58,7 @@ mod tests {
     use super::*;
 
     fn written(mesh: &Mesh) -> String {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh.obj");
-        write_obj(&path, mesh).unwrap();
-        std::fs::read_to_string(path).unwrap()
+        String::from_utf8(crate::testing::written(|path| write_obj(path, mesh))).unwrap()
     }
 
     #[test]

@@ -83,10 +83,7 @@ mod tests {
     use super::*;
 
     fn written(mesh: &Mesh) -> (String, Vec<u8>) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh.ply");
-        write_ply_mesh(&path, mesh).unwrap();
-        let bytes = std::fs::read(path).unwrap();
+        let bytes = crate::testing::written(|path| write_ply_mesh(path, mesh));
         assert_eq!(bytes, ply_mesh_to_bytes(mesh).unwrap());
         let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
         (String::from_utf8(bytes[..end].to_vec()).unwrap(), bytes[end..].to_vec())

@@ -70,7 +70,7 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan_log::testing::{SIZE, camera_pose, gray_png, image, matrix_text, write};
+    use crate::scan_log::testing::{SIZE, camera_pose, gray_png, image, matrix_text, with_convention, write};
     use crate::scan_log::{Intrinsics, ScanLog, ScanLogKind};
     use crate::testing::real_data;
 
@@ -121,10 +121,7 @@ mod tests {
         let Some(path) = real_data("rgbd_bigbird_detergent") else { return };
         let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
         assert_eq!((log.len(), log.stats().refused_poses.len()), (40, 0));
-        let options = ScanLogOptions {
-            pose_convention: Some(PoseConvention::WorldFromSensor),
-            ..ScanLogOptions::default()
-        };
+        let options = with_convention(PoseConvention::WorldFromSensor);
         let other = ScanLog::open(&path, &options).unwrap();
         // Every view is 9 degrees from the next, the last from the first.
         for (a, b) in [(0, 1), (10, 11), (30, 31), (39, 0)] {

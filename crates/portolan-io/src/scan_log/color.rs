@@ -38,9 +38,12 @@ pub(super) fn color_size(path: &Path) -> Result<[usize; 2]> {
     }
 }
 
+type Jpeg<'a> = JpegDecoder<ZCursor<&'a [u8]>>;
+type Png<'a> = Reader<std::io::Cursor<&'a [u8]>>;
+
 enum Picture<'a> {
-    Jpeg(Box<JpegDecoder<ZCursor<&'a [u8]>>>),
-    Png(Box<Reader<std::io::Cursor<&'a [u8]>>>),
+    Jpeg(Box<Jpeg<'a>>),
+    Png(Box<Png<'a>>),
 }
 
 impl<'a> Picture<'a> {
@@ -97,13 +100,13 @@ fn check_size(path: &Path, found: [usize; 2], expected: [usize; 2]) -> Result<()
     Err(IoError::layout(path, "the size of the picture", format!("{} x {}", found[0], found[1]), advice))
 }
 
-fn jpeg_size(path: &Path, decoder: &JpegDecoder<ZCursor<&[u8]>>) -> Result<[usize; 2]> {
+fn jpeg_size(path: &Path, decoder: &Jpeg) -> Result<[usize; 2]> {
     let (w, h) = decoder.dimensions().ok_or_else(|| damaged(path, "it has no size"))?;
     // How far a JPEG packs has no bound, so its length does not limit its size.
     size_within_limits(path, w as u32, h as u32, usize::MAX, 1)
 }
 
-fn png_size(path: &Path, reader: &Reader<std::io::Cursor<&[u8]>>, file_bytes: usize) -> Result<[usize; 2]> {
+fn png_size(path: &Path, reader: &Png, file_bytes: usize) -> Result<[usize; 2]> {
     let info = reader.info();
     let bits = info.bits_per_pixel() as u64;
     // Pixels of fewer than eight bits share a byte.
@@ -111,11 +114,7 @@ fn png_size(path: &Path, reader: &Reader<std::io::Cursor<&[u8]>>, file_bytes: us
     size_within_limits(path, info.width, info.height, usize::try_from(holds).unwrap_or(usize::MAX), 1)
 }
 
-fn read_jpeg(
-    path: &Path,
-    decoder: &mut JpegDecoder<ZCursor<&[u8]>>,
-    [columns, rows]: [usize; 2],
-) -> Result<Vec<[u8; 3]>> {
+fn read_jpeg(path: &Path, decoder: &mut Jpeg, [columns, rows]: [usize; 2]) -> Result<Vec<[u8; 3]>> {
     let pixels = columns * rows;
     if decoder.output_buffer_size() != Some(3 * pixels) {
         let channels = decoder.output_buffer_size().unwrap_or(0) / pixels;
@@ -126,11 +125,7 @@ fn read_jpeg(
     Ok(colors)
 }
 
-fn read_png(
-    path: &Path,
-    reader: &mut Reader<std::io::Cursor<&[u8]>>,
-    [columns, rows]: [usize; 2],
-) -> Result<Vec<[u8; 3]>> {
+fn read_png(path: &Path, reader: &mut Png, [columns, rows]: [usize; 2]) -> Result<Vec<[u8; 3]>> {
     let pixels = columns * rows;
     let bytes = reader.output_buffer_size().filter(|n| *n <= pixels.saturating_mul(4));
     let mut raw = vec![0; bytes.ok_or_else(|| damaged(path, "its size does not fit"))?];

@@ -7,6 +7,7 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, Origin, PointScan, Projection};
 
+use super::testing::with_convention;
 use super::{ScanLog, ScanLogKind, ScanLogOptions};
 use crate::poses3::PoseConvention;
 use crate::testing::{Random, bad_bytes, real_data, says};
@@ -14,6 +15,12 @@ use crate::{PointCloudFile, Viewpoint, write_kitti_bin, write_pcd};
 
 fn open(path: &Path) -> ScanLog {
     ScanLog::open(path, &ScanLogOptions::default()).unwrap()
+}
+
+/// Asserts that opening fails so.
+#[track_caller]
+fn refused(path: &Path, part: &str) {
+    says(ScanLog::open(path, &ScanLogOptions::default()), part);
 }
 
 fn points(log: &ScanLog, i: usize) -> PointScan {
@@ -87,7 +94,7 @@ fn kitti_poses_are_the_cameras_and_lead_to_the_lidar() {
 
     // Beside the scans they come first; with a convention they are the lidar's own.
     fs::write(root.join("poses.txt"), &rows).unwrap();
-    let own = ScanLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
+    let own = with_convention(PoseConvention::WorldFromSensor);
     let log = ScanLog::open(&root, &own).unwrap();
     assert!(distance(world(&log, 2)[0], cameras[2].transform_point([1.0, 2.0, 3.0])) < 1e-9);
     // So are poses that the caller names: `Tr` is there, and is not for them.
@@ -104,12 +111,9 @@ fn kitti_poses_are_the_cameras_and_lead_to_the_lidar() {
     assert!(distance(log.pose(1).translation, (cameras[2] * tr).translation) < 1e-9);
     // Without calibration the camera's poses would turn the world on its side.
     fs::remove_file(root.join("calib.txt")).unwrap();
-    says(ScanLog::open(&root, &ScanLogOptions::default()), "calib.txt is missing; put calib.txt");
+    refused(&root, "calib.txt is missing; put calib.txt");
     fs::write(root.join("calib.txt"), "P0: 1\nTr: 1 0 0\n").unwrap();
-    says(
-        ScanLog::open(&root, &ScanLogOptions::default()),
-        "calib.txt: line 2: Tr is \"Tr: 1 0 0\"; write twelve numbers",
-    );
+    refused(&root, "calib.txt: line 2: Tr is \"Tr: 1 0 0\"; write twelve numbers");
 }
 
 #[test]
@@ -119,10 +123,7 @@ fn folders_of_clouds_with_poses_in_every_layout() {
     for i in [9, 10, 11] {
         fs::write(path.join(format!("scan{i}.xyz")), format!("1 2 {i}\n0 1 0\n")).unwrap();
     }
-    says(
-        ScanLog::open(path, &ScanLogOptions::default()),
-        "the pose file is missing; looked for a file with \"pose\"",
-    );
+    refused(path, "the pose file is missing; looked for a file with \"pose\"");
     let given = path.join("given.txt");
     fs::write(&given, "5 0 0 0 0 0 0 1\n6 1 0 0 0 0 0 1\n7 2 0 0 0 0 1 0\n").unwrap();
     let options = ScanLogOptions { poses: Some(given), ..Default::default() };
@@ -133,10 +134,7 @@ fn folders_of_clouds_with_poses_in_every_layout() {
     fs::write(path.join("lidar_poses.csv"), row(&Pose::IDENTITY).repeat(3)).unwrap();
     assert_eq!(world(&open(path), 0)[0], [1.0, 2.0, 9.0]);
     fs::write(path.join("trajectory.tum"), "").unwrap();
-    says(
-        ScanLog::open(path, &ScanLogOptions::default()),
-        "the pose file is lidar_poses.csv or trajectory.tum; name the one",
-    );
+    refused(path, "the pose file is lidar_poses.csv or trajectory.tum; name the one");
 }
 
 #[test]
@@ -292,8 +290,7 @@ fn what_viewpoints_mean_is_checked_on_the_points() {
             let cloud = PointCloudFile { points, viewpoint, ..PointCloudFile::default() };
             write_pcd(folder.path().join(format!("{i}.pcd")), &cloud).unwrap();
         }
-        let applied =
-            ScanLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
+        let applied = with_convention(PoseConvention::WorldFromSensor);
         let log = ScanLog::open(folder.path(), &applied).unwrap();
         assert_eq!((log.pose(2).translation, points(&log, 2).origin), (places[2], Origin::Common([0.0; 3])));
         match ScanLog::open(folder.path(), &ScanLogOptions::default()) {
@@ -353,7 +350,7 @@ fn broken_files_of_a_log_make_nothing_panic() {
     fs::write(&conf, [&good[..], b"bmesh b.ply 0 0 0 0 0 0 1\n"].concat()).unwrap();
     assert_eq!((open(&conf).len(), open(&conf).stats().missing_files), (1, 1));
     fs::remove_file(folder.path().join("a.ply")).unwrap();
-    says(ScanLog::open(&conf, &ScanLogOptions::default()), "a.conf: the number of scans is 0");
+    refused(&conf, "a.conf: the number of scans is 0");
 }
 
 #[test]
@@ -367,8 +364,7 @@ fn scans_of_the_real_hall_agree_in_the_world() {
     // Points are some centimetres apart, and other ones in every scan.
     let right = median_distance(&world(&log, 20), &world(&log, 21), 200);
     assert!(right < 0.07, "{right}");
-    let turned =
-        ScanLogOptions { pose_convention: Some(PoseConvention::SensorFromWorld), ..Default::default() };
+    let turned = with_convention(PoseConvention::SensorFromWorld);
     let log = ScanLog::open(&path, &turned).unwrap();
     let wrong = median_distance(&world(&log, 20), &world(&log, 21), 200);
     assert!(wrong > 3.0 * right, "{wrong} against {right}");
@@ -388,8 +384,7 @@ fn the_simulated_scans_are_in_the_world_already() {
             (3500, Origin::Common(origins[i]), 0)
         );
     }
-    let applied =
-        ScanLogOptions { pose_convention: Some(PoseConvention::WorldFromSensor), ..Default::default() };
+    let applied = with_convention(PoseConvention::WorldFromSensor);
     let posed = ScanLog::open(&path, &applied).unwrap();
     // Three scans are from each of four places.
     let disagreement = |log: &ScanLog| {

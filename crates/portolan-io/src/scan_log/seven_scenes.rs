@@ -318,10 +318,7 @@ mod tests {
         // Half a pixel at 2 m is 1.7 mm, the depth's own step there 3 mm.
         let right = disagreement(&log, 10, 11);
         assert!(right < 0.006, "{right}");
-        let options = ScanLogOptions {
-            pose_convention: Some(PoseConvention::SensorFromWorld),
-            ..ScanLogOptions::default()
-        };
+        let options = with_convention(PoseConvention::SensorFromWorld);
         let wrong = disagreement(&ScanLog::open(&path, &options).unwrap(), 10, 11);
         assert!(wrong > 2.0 * right, "{wrong} against {right}");
     }

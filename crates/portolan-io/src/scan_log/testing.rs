@@ -7,7 +7,8 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, RangeImage};
 
-use super::ScanLog;
+use super::{ScanLog, ScanLogOptions};
+use crate::poses3::PoseConvention;
 
 /// z of the wall (metres).
 pub(super) const WALL: f64 = 3.0;
@@ -97,6 +98,11 @@ pub(super) fn write_color(path: &Path, rgb: [u8; 3]) {
 pub(super) fn write(path: &Path, bytes: impl AsRef<[u8]>) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     fs::write(path, bytes).unwrap();
+}
+
+/// Options with a convention of poses.
+pub(super) fn with_convention(convention: PoseConvention) -> ScanLogOptions {
+    ScanLogOptions { pose_convention: Some(convention), ..ScanLogOptions::default() }
 }
 
 /// The depth image of scan `i`.
