@@ -65,22 +65,19 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind> {
 }
 
 fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {
-    if head.starts_with(container::MAGIC) {
-        return Some(FileKind::Portolan);
-    }
-    if head.starts_with(esdf_bin::MAGIC) {
-        return Some(FileKind::EsdfBin);
+    let starts: [(&[u8], _); 4] = [
+        (container::MAGIC, FileKind::Portolan),
+        (esdf_bin::MAGIC, FileKind::EsdfBin),
+        (b"# Octomap OcTree binary file", FileKind::OctomapBt),
+        (b"# Octomap OcTree file", FileKind::OctomapOt),
+    ];
+    if let Some((_, kind)) = starts.into_iter().find(|(start, _)| head.starts_with(start)) {
+        return Some(kind);
     }
     if let [b'P', b'2' | b'5', next, ..] = head
         && (next.is_ascii_whitespace() || *next == b'#')
     {
         return Some(FileKind::Pgm);
-    }
-    if head.starts_with(b"# Octomap OcTree binary file") {
-        return Some(FileKind::OctomapBt);
-    }
-    if head.starts_with(b"# Octomap OcTree file") {
-        return Some(FileKind::OctomapOt);
     }
     if let Some(format) = mesh_format(path, head) {
         return Some(FileKind::Mesh(format));

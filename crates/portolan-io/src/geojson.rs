@@ -83,7 +83,7 @@ pub fn parse_geojson(mut input: Input) -> Result<Vec<Polyline>> {
     };
     let mut lines = Vec::new();
     let top: Object = serde_json::from_slice(&bytes).map_err(failed)?;
-    top.collect(&mut lines).map_err(failed)?;
+    top.collect(&mut lines, 0).map_err(failed)?;
     if let Some(i) = lines.iter().position(|l| !l.iter().flatten().all(|v| v.is_finite())) {
         let field = format!("a coordinate of line string {i}");
         return Err(IoError::text(input.path(), 1, field, "not finite", "write finite numbers"));
@@ -107,11 +107,7 @@ struct Object<'a> {
 }
 
 impl Object<'_> {
-    fn collect(&self, lines: &mut Vec<Polyline>) -> serde_json::Result<()> {
-        self.collect_below(lines, 0)
-    }
-
-    fn collect_below(&self, lines: &mut Vec<Polyline>, depth: u32) -> serde_json::Result<()> {
+    fn collect(&self, lines: &mut Vec<Polyline>, depth: u32) -> serde_json::Result<()> {
         use serde::de::Error;
         // Collections in collections: the raw values are parsed level by level, so that the parser's own limit
         // does not count them.
@@ -120,33 +116,26 @@ impl Object<'_> {
         }
         let text = || self.coordinates.map(RawValue::get).ok_or_else(|| Error::missing_field("coordinates"));
         let inner = |raw: &RawValue, lines: &mut Vec<Polyline>| {
-            serde_json::from_str::<Object>(raw.get())?.collect_below(lines, depth + 1)
+            serde_json::from_str::<Object>(raw.get())?.collect(lines, depth + 1)
         };
-        match self.kind.as_str() {
-            "Feature" => self.geometry.map_or(Ok(()), |g| inner(g, lines)),
-            "FeatureCollection" => self.features.iter().flatten().try_for_each(|f| inner(f, lines)),
-            "GeometryCollection" => self.geometries.iter().flatten().try_for_each(|g| inner(g, lines)),
-            "Point" | "MultiPoint" => Ok(()),
-            "LineString" => {
-                lines.push(line(serde_json::from_str(text()?)?));
-                Ok(())
+        let found: Vec<Vec<Position>> = match self.kind.as_str() {
+            "Feature" => return self.geometry.map_or(Ok(()), |g| inner(g, lines)),
+            "FeatureCollection" => return self.features.iter().flatten().try_for_each(|f| inner(f, lines)),
+            "GeometryCollection" => {
+                return self.geometries.iter().flatten().try_for_each(|g| inner(g, lines));
             }
-            "MultiLineString" | "Polygon" => {
-                lines.extend(serde_json::from_str::<Vec<Vec<Position>>>(text()?)?.into_iter().map(line));
-                Ok(())
-            }
+            "Point" | "MultiPoint" => return Ok(()),
+            "LineString" => vec![serde_json::from_str(text()?)?],
+            "MultiLineString" | "Polygon" => serde_json::from_str(text()?)?,
             "MultiPolygon" => {
-                let polygons = serde_json::from_str::<Vec<Vec<Vec<Position>>>>(text()?)?;
-                lines.extend(polygons.into_iter().flatten().map(line));
-                Ok(())
+                let polygons: Vec<Vec<Vec<Position>>> = serde_json::from_str(text()?)?;
+                polygons.into_iter().flatten().collect()
             }
-            other => Err(Error::custom(format!("the type {other} is not GeoJSON"))),
-        }
+            other => return Err(Error::custom(format!("the type {other} is not GeoJSON"))),
+        };
+        lines.extend(found.into_iter().map(|line| line.into_iter().map(|p| p.0).collect()));
+        Ok(())
     }
-}
-
-fn line(positions: Vec<Position>) -> Polyline {
-    positions.into_iter().map(|p| p.0).collect()
 }
 
 /// x and y; further numbers are allowed and ignored.

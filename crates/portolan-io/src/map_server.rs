@@ -219,10 +219,10 @@ fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {
     let path = lines.path().to_owned();
     let mut info = MapServerInfo { free_thresh: 0.196, ..MapServerInfo::of_image(f64::NAN) };
     let mut list: Option<Vec<f64>> = None;
-    while let Some((number, line)) = lines.next_numbered()? {
+    while let Some((number_of_line, line)) = lines.next_numbered()? {
         let line = String::from_utf8_lossy(without_comment(line)).into_owned();
         let bad = |field: &str, value: &str, advice: &str| {
-            Err(IoError::text(&path, number, field, shown(value), advice))
+            Err(IoError::text(&path, number_of_line, field, shown(value), advice))
         };
         // `origin:` may be followed by a list of `- value` lines.
         if let (Some(list), Some(item)) = (&mut list, line.trim_start().strip_prefix("- ")) {
@@ -237,17 +237,20 @@ fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {
         }
         let Some((key, raw)) = line.split_once(':').map(|(key, raw)| (key, raw.trim())) else { continue };
         let value = unquoted(raw);
-        let number_in =
-            |low: f64, high: f64| parse_f64(value.as_bytes()).filter(|v| (low..=high).contains(v));
+        let number_in = |low: f64, high: f64, field: &str, advice: &str| {
+            let number = parse_f64(value.as_bytes()).filter(|v| (low..=high).contains(v));
+            number.ok_or_else(|| IoError::text(&path, number_of_line, field, shown(value), advice))
+        };
+        const SHARE: &str = "write a number from 0 to 1";
         match unquoted(key.trim()) {
             "image" if value.is_empty() => return bad("image", value, "name the image file"),
             // In single quotes a quote is written twice.
             "image" if raw.starts_with('\'') => info.image = PathBuf::from(value.replace("''", "'")),
             "image" => info.image = PathBuf::from(value),
-            "resolution" => match number_in(1e-6, 1e6) {
-                Some(v) => info.resolution = v,
-                None => return bad("resolution", value, "write metres per pixel, above zero, like 0.05"),
-            },
+            "resolution" => {
+                let advice = "write metres per pixel, above zero, like 0.05";
+                info.resolution = number_in(1e-6, 1e6, "resolution", advice)?;
+            }
             "origin" if value.is_empty() => list = Some(Vec::new()),
             "origin" => match origin(value) {
                 Some(v) => info.origin = v,
@@ -258,14 +261,8 @@ fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {
                 "1" | "true" | "True" | "yes" => info.negate = true,
                 _ => return bad("negate", value, "write 0 or 1"),
             },
-            "occupied_thresh" => match number_in(0.0, 1.0) {
-                Some(v) => info.occupied_thresh = v,
-                None => return bad("occupied_thresh", value, "write a number from 0 to 1"),
-            },
-            "free_thresh" => match number_in(0.0, 1.0) {
-                Some(v) => info.free_thresh = v,
-                None => return bad("free_thresh", value, "write a number from 0 to 1"),
-            },
+            "occupied_thresh" => info.occupied_thresh = number_in(0.0, 1.0, "occupied_thresh", SHARE)?,
+            "free_thresh" => info.free_thresh = number_in(0.0, 1.0, "free_thresh", SHARE)?,
             "mode" => match value {
                 "trinary" => info.mode = MapMode::Trinary,
                 "scale" => info.mode = MapMode::Scale,
@@ -345,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_place() {
+    fn errors_name_the_place_and_no_bytes_make_it_panic() {
         for (text, part) in [
             ("resolution: 0.05\n", "m.yaml: line 1: image is missing; add a line"),
             ("image: a\n", "resolution is missing"),
@@ -360,6 +357,7 @@ mod tests {
         ] {
             says(parse(text), part);
         }
+        no_panic(GOOD.as_bytes(), 11, 3000, parse);
     }
 
     #[test]
@@ -404,11 +402,6 @@ mod tests {
         let map = MapServerMap::read(&path).unwrap();
         assert_eq!((map.grid, map.cells, map.yaw), (grid, cells, 0.0));
         assert!(write_map_server(&path, &grid, &[]).is_err());
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
-        no_panic(GOOD.as_bytes(), 11, 3000, parse);
     }
 
     #[test]

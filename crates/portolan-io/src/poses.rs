@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_place() {
+    fn errors_name_the_place_and_no_bytes_make_it_panic() {
         for (text, part) in [
             ("1 2 3\n1 2\n", "p.txt: line 2: the number of columns is 2; give every line"),
             ("1 2\n", "line 1: the number of columns is 2; write 3"),
@@ -141,10 +141,6 @@ mod tests {
         ] {
             says(parse(text), part);
         }
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
         no_panic(b"1 2 3 # c\n4 5 6\n7,8,9,\n", 5, 3000, parse);
     }
 }

@@ -94,14 +94,13 @@ pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    // Not `eprintln!`, which the test harness swallows: a skipped test must be seen.
-    let shown = path.display();
-    writeln!(
-        std::io::stderr(),
-        "SKIPPED: {shown} is not there (set PORTOLAN_DATA to the folder of real data)"
-    )
-    .unwrap();
+    skipped(&format!("{} is not there (set PORTOLAN_DATA to the folder of real data)", path.display()));
     None
+}
+
+/// Says that a test was skipped. Not by `eprintln!`, which the test harness swallows: it must be seen.
+fn skipped(why: &str) {
+    writeln!(std::io::stderr(), "SKIPPED: {why}").unwrap();
 }
 
 /// A Python with a package.
@@ -116,11 +115,7 @@ pub(crate) fn python(package: &str) -> Option<Python> {
         return Some(python);
     }
     let shown = python.0.display();
-    writeln!(
-        std::io::stderr(),
-        "SKIPPED: {shown} has no {package} (set PORTOLAN_PYTHON to a Python that has)"
-    )
-    .unwrap();
+    skipped(&format!("{shown} has no {package} (set PORTOLAN_PYTHON to a Python that has)"));
     None
 }
 

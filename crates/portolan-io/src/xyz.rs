@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_place() {
+    fn errors_name_the_place_and_no_bytes_make_it_panic() {
         for (text, part) in [
             ("1 2 3\n1 2\n", "a.xyz: line 2: the number of columns is 2; write 3 as above"),
             ("1 2\n", "line 1: the number of columns is 2; write 3 (x y z)"),
@@ -226,10 +226,6 @@ mod tests {
         ] {
             says(read(text), part);
         }
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
         no_panic(b"x,y,z,r,g,b\n1,2,3,4,5,6\n#c\n7,8,9,1,2,3\n", 17, 3000, read);
     }
 

@@ -160,12 +160,8 @@ impl Header {
             return bad(0, "the magic", &shown(magic), "give a map.portolan: it starts with PORTOLAN");
         }
         if bytes.len() < HEADER {
-            return bad(
-                8,
-                "the header",
-                &format!("{} bytes", bytes.len()),
-                "the file is cut off: copy it again",
-            );
+            let advice = "the file is cut off: copy it again";
+            return bad(8, "the header", &format!("{} bytes", bytes.len()), advice);
         }
         let version = u32_at(bytes, 8);
         if version != VERSION {
@@ -191,32 +187,20 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
             Err(IoError::binary(path, (at + offset) as u64, field, value, advice))
         };
         let Some(entry) = bytes.get(at..at + ENTRY) else {
-            return bad(
-                0,
-                "the index",
-                &format!("{} entries", chunks.len()),
-                "the header announces more: the file is cut off",
-            );
+            let advice = "the header announces more: the file is cut off";
+            return bad(0, "the index", &format!("{} entries", chunks.len()), advice);
         };
         let Some(tag) = tag_of(std::array::from_fn(|k| entry[k])) else {
             return bad(0, "a chunk tag", &shown(&entry[..8]), "use 4 to 8 ASCII letters, digits or _");
         };
         let [place, stored_length, length] = [8, 16, 24].map(|k| u64_at(entry, k));
         if place != position as u64 {
-            return bad(
-                8,
-                "a chunk position",
-                &place,
-                "chunks must follow each other without gaps: the file is damaged",
-            );
+            let advice = "chunks must follow each other without gaps: the file is damaged";
+            return bad(8, "a chunk position", &place, advice);
         }
         if stored_length > (index - position) as u64 {
-            return bad(
-                16,
-                "a stored length",
-                &stored_length,
-                "it reaches beyond the chunks: the file is damaged",
-            );
+            let advice = "it reaches beyond the chunks: the file is damaged";
+            return bad(16, "a stored length", &stored_length, advice);
         }
         if length > LONGEST_CHUNK {
             return bad(24, "a chunk length", &length, "chunks have at most 2^30 bytes");
@@ -225,20 +209,12 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
         let name = bytes.get(at + ENTRY..at + ENTRY + name_length.min(LONGEST_NAME + 1));
         let name = name.filter(|n| n.len() <= LONGEST_NAME).and_then(|n| std::str::from_utf8(n).ok());
         let Some(name) = name else {
-            return bad(
-                36,
-                "a chunk name",
-                &format!("{name_length} bytes"),
-                "use at most 255 bytes of UTF-8",
-            );
+            let advice = "use at most 255 bytes of UTF-8";
+            return bad(36, "a chunk name", &format!("{name_length} bytes"), advice);
         };
         if !names.insert((tag.clone(), name)) {
-            return bad(
-                0,
-                "a chunk name",
-                &format!("{tag} {}", shown(name)),
-                "it is there twice: write the file again",
-            );
+            let advice = "it is there twice: write the file again";
+            return bad(0, "a chunk name", &format!("{tag} {}", shown(name)), advice);
         }
         let crc = u32_at(entry, 32);
         chunks.push(Chunk { tag, name: name.to_owned(), length, stored_length, position, crc });

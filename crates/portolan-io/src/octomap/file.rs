@@ -6,8 +6,8 @@ use portolan::cell::LogOdds32;
 use portolan::store::Tree;
 
 use super::header::{Header, Kind};
+use super::read;
 use super::stored::Stored;
-use super::{read, write};
 use crate::{Compression, Result};
 
 /// An OctoMap file: the tree of log odds, and the rest of the file.
@@ -93,23 +93,5 @@ impl OctomapTree {
     /// Whether the file had colors, which are not kept.
     pub fn colors_left_out(&self) -> bool {
         self.colors_left_out
-    }
-
-    /// Writes a `.bt`. Read from a `.bt` it has the same bytes; else every leaf becomes free or occupied and equal leaves
-    /// are merged, as OctoMap's `writeBinary` does it. Comments and class name stay.
-    ///
-    /// # Errors
-    /// As [`crate::write_atomic`].
-    pub fn write_bt(&self, path: impl AsRef<Path>) -> Result<()> {
-        write::file_bt(self, path.as_ref())
-    }
-
-    /// Writes an `.ot`. Nodes are those of the file that was read, and read from an `.ot` without colors it has the same
-    /// bytes. Comments stay; the class is `OcTree`, or `OcTreeStamped` where it was.
-    ///
-    /// # Errors
-    /// As [`crate::write_atomic`].
-    pub fn write_ot(&self, path: impl AsRef<Path>) -> Result<()> {
-        write::file_ot(self, path.as_ref())
     }
 }

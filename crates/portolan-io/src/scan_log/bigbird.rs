@@ -70,7 +70,9 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan_log::testing::{SIZE, camera_pose, gray_png, image, matrix_text, with_convention, write};
+    use crate::scan_log::testing::{
+        SIZE, camera_pose, gray_png, image, matrix_text, median_distance, with_convention, write,
+    };
     use crate::scan_log::{Intrinsics, ScanLog, ScanLogKind};
     use crate::testing::real_data;
 
@@ -107,13 +109,7 @@ mod tests {
             image(log, i).points().map(|(_, p)| log.pose(i).transform_point(p)).collect()
         };
         let (one, other) = (world(a), world(b));
-        let nearest = |p: &[f64; 3]| {
-            let all = other.iter().map(|q| portolan::geom::vector::distance(*p, *q));
-            all.fold(f64::INFINITY, f64::min)
-        };
-        let mut all: Vec<f64> = one.iter().step_by(one.len() / 300 + 1).map(nearest).collect();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
+        median_distance(&one, &other, one.len() / 300 + 1)
     }
 
     #[test]

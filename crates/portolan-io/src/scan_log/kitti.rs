@@ -85,15 +85,15 @@ fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pos
     read_transform(&file).map(Some)
 }
 
+/// How the line of the transform begins.
+const TRANSFORM_WORDS: [&[u8]; 5] = [b"Tr:", b"Tr", b"Tr_velo_to_cam:", b"Tr_velo_cam", b"Tr_velo_cam:"];
+
 /// The twelve numbers of the line `Tr` (`Tr_velo_to_cam` in KITTI's other benchmarks).
 fn read_transform(path: &Path) -> Result<Pose<3>> {
     let mut lines = Lines::of(open_input(path)?);
     while let Some((number, line)) = lines.next_numbered()? {
         let mut words = fields(line);
-        if !matches!(
-            words.next(),
-            Some(b"Tr:" | b"Tr" | b"Tr_velo_to_cam:" | b"Tr_velo_cam" | b"Tr_velo_cam:")
-        ) {
+        if !words.next().is_some_and(|word| TRANSFORM_WORDS.contains(&word)) {
             continue;
         }
         let bad = |advice: &str| IoError::text(path, number, "Tr", shown(line), advice);
@@ -116,13 +116,8 @@ fn read_times(path: &Path) -> Result<Vec<f64>> {
     while let Some((number, line)) = lines.next_numbered()? {
         let Some(word) = fields(line).next() else { continue };
         let Some(time) = parse_f64(word).filter(|t| t.is_finite()) else {
-            return Err(IoError::text(
-                path,
-                number,
-                "a time",
-                shown(word),
-                "write seconds, one line per scan",
-            ));
+            let advice = "write seconds, one line per scan";
+            return Err(IoError::text(path, number, "a time", shown(word), advice));
         };
         IoError::unless_full(path, number, times.len(), MOST_TIMES, "times", "log")?;
         times.push(time);

@@ -7,7 +7,7 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, Origin, PointScan, Projection};
 
-use super::testing::with_convention;
+use super::testing::{median_distance, with_convention};
 use super::{ScanLog, ScanLogKind, ScanLogOptions};
 use crate::poses3::PoseConvention;
 use crate::testing::{Random, bad_bytes, real_data, says};
@@ -32,15 +32,6 @@ fn points(log: &ScanLog, i: usize) -> PointScan {
 
 fn world(log: &ScanLog, i: usize) -> Vec<[f64; 3]> {
     points(log, i).points.iter().map(|p| log.pose(i).transform_point(p.map(f64::from))).collect()
-}
-
-/// Median distance from every `step`-th point to the nearest of the others, by looking at all of them.
-fn median_distance(from: &[[f64; 3]], to: &[[f64; 3]], step: usize) -> f64 {
-    let square = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f64>();
-    let nearest = |p: &[f64; 3]| to.iter().map(|q| square(*p, *q)).fold(f64::INFINITY, f64::min);
-    let mut all: Vec<f64> = from.iter().step_by(step).map(|p| nearest(p).sqrt()).collect();
-    all.sort_by(f64::total_cmp);
-    all[all.len() / 2]
 }
 
 /// A room of random points on six walls, as seen from a place: points less that place.
