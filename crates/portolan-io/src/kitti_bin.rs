@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn the_layout_is_four_floats() {
+    fn the_layout_is_four_floats_and_no_bytes_make_it_panic() {
         let mut bytes = Vec::new();
         for v in [1.0f32, -2.0, 0.5, 0.25, f32::NAN, 0.0, 0.0, 0.0] {
             bytes.extend(v.to_le_bytes());
@@ -89,10 +89,6 @@ mod tests {
         write_to(&mut written, &cloud).unwrap();
         assert_eq!(written, bytes[..16]);
         says(read(bytes[..20].to_vec()), "0.bin: byte 16: the last point is 4 bytes; a scan has 16");
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
-        no_panic(&[7; 64], 3, 500, read);
+        no_panic([7; 64], 3, 500, read);
     }
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use portolan::geom::Pose;
 
-use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::bytes::{Input, Lines, columns, open, parse_f64};
 use crate::error::shown;
 use crate::{IoError, Result};
 
@@ -48,14 +48,17 @@ pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>> {
     let mut lines = Lines::of(input);
     let path = lines.path().to_owned();
     let mut poses = Vec::new();
-    let mut columns = None;
+    let mut width = None;
+    let finite = |word: &[u8]| parse_f64(word).filter(|v| v.is_finite());
     while let Some((number, line)) = lines.next_numbered()? {
-        let (values, count) = numbers(line, number, &path)?;
+        let (values, count) = columns::<9>(line, |b| b == b',', finite).map_err(|(word, column)| {
+            IoError::text(&path, number, column, shown(word), "write a finite number")
+        })?;
         let values = &values[..count];
         if values.is_empty() {
             continue;
         }
-        if *columns.get_or_insert(count) != count {
+        if *width.get_or_insert(count) != count {
             let advice = "give every line the same columns";
             return Err(IoError::text(&path, number, "the number of columns", count, advice));
         }
@@ -81,21 +84,6 @@ pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>> {
         return Err(IoError::text(&path, lines.number(), "the number of poses", "0", advice));
     }
     Ok(poses)
-}
-
-/// The finite numbers of a line, at most nine of them.
-fn numbers(line: &[u8], number: u64, path: &Path) -> Result<([f64; 9], usize)> {
-    let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
-    let words = content.split(|b| b.is_ascii_whitespace() || *b == b',').filter(|w| !w.is_empty());
-    let (mut values, mut count) = ([0.0; 9], 0);
-    for word in words.take(9) {
-        values[count] = parse_f64(word).filter(|v| v.is_finite()).ok_or_else(|| {
-            let field = format!("column {}", count + 1);
-            IoError::text(path, number, field, shown(word), "write a finite number")
-        })?;
-        count += 1;
-    }
-    Ok((values, count))
 }
 
 fn pose_2d(x: f64, y: f64, xyzw: [f64; 4]) -> Result<Pose<2>, &'static str> {

@@ -5,6 +5,22 @@ pub(crate) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty())
 }
 
+/// The numbers of a line before its comment, at most `N` of them, and how many; `Err` is the word that is none and its column.
+pub(crate) fn columns<const N: usize>(
+    line: &[u8],
+    separates: impl Fn(u8) -> bool,
+    number: impl Fn(&[u8]) -> Option<f64>,
+) -> Result<([f64; N], usize), (&[u8], String)> {
+    let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
+    let words = content.split(|b| b.is_ascii_whitespace() || separates(*b));
+    let (mut values, mut count) = ([0.0; N], 0);
+    for word in words.filter(|w| !w.is_empty()).take(N) {
+        values[count] = number(word).ok_or_else(|| (word, format!("column {}", count + 1)))?;
+        count += 1;
+    }
+    Ok((values, count))
+}
+
 /// The whole number that a word spells.
 pub(crate) fn whole<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()

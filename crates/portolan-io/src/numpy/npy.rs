@@ -177,7 +177,7 @@ fn parse(header: &str) -> Option<(String, bool, Vec<usize>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{bad_bytes, says};
+    use crate::testing::{no_panic, says};
 
     fn bytes_of(array: &NpyArray) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -251,8 +251,6 @@ mod tests {
     #[test]
     fn no_bytes_make_it_panic() {
         let good = bytes_of(&NpyArray::fortran([2, 2], NpyValues::F32(vec![1.0; 4])));
-        for bytes in bad_bytes(&good, 21, 3000) {
-            let _ = parse_npy(&bytes[..], "a.npy".as_ref());
-        }
+        no_panic(&good, 21, 3000, |bytes| parse_npy(&bytes[..], "a.npy".as_ref()));
     }
 }

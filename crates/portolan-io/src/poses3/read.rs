@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::RawPose;
 use super::convention::CORNER_OFF;
-use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::bytes::{Input, Lines, columns, open, parse_f64};
 use crate::error::shown;
 use crate::{IoError, Result};
 
@@ -84,27 +84,31 @@ pub fn parse_poses_3d(input: Input) -> Result<PoseFile> {
     let path = lines.path().to_owned();
     let mut reading: Option<Reading> = None;
     while let Some((number, line)) = lines.next_numbered()? {
-        let mut row = [0.0; MOST_COLUMNS];
-        let columns = numbers(line, &mut row, number, &path)?;
-        if columns == 0 {
+        // NaN and infinity are numbers here.
+        let row = columns::<MOST_COLUMNS>(line, |b| matches!(b, b',' | b';'), parse_f64);
+        let (row, count) = row.map_err(|(word, column)| {
+            let advice = "write a number, or begin a comment with #";
+            IoError::text(&path, number, column, shown(word), advice)
+        })?;
+        if count == 0 {
             continue;
         }
         let state = match &mut reading {
             Some(state) => state,
             None => {
-                let Some(layout) = PoseLayout::of_columns(columns) else {
+                let Some(layout) = PoseLayout::of_columns(count) else {
                     return Err(IoError::text(
                         &path,
                         number,
                         "the number of columns",
-                        columns,
+                        count,
                         "write 4 (rows of matrices), 7 or 8 (TUM), 12 (KITTI) or 16",
                     ));
                 };
                 reading.insert(Reading { layout, poses: Vec::new(), open: None })
             }
         };
-        state.take(&row[..columns], number, &path)?;
+        state.take(&row[..count], number, &path)?;
     }
     let Some(state) = reading else {
         let advice = "give a file with poses, one 4x4 matrix or one line of 8, 12 or 16 numbers each";
@@ -115,21 +119,6 @@ pub fn parse_poses_3d(input: Input) -> Result<PoseFile> {
 
 /// Of a line with more columns, so many are counted.
 const MOST_COLUMNS: usize = 17;
-
-/// The numbers of a line; NaN and infinity are numbers here.
-fn numbers(line: &[u8], row: &mut [f64; MOST_COLUMNS], number: u64, path: &Path) -> Result<usize> {
-    let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
-    let words = content.split(|b| b.is_ascii_whitespace() || matches!(b, b',' | b';'));
-    let mut columns = 0;
-    for word in words.filter(|w| !w.is_empty()).take(MOST_COLUMNS) {
-        row[columns] = parse_f64(word).ok_or_else(|| {
-            let field = format!("column {}", columns + 1);
-            IoError::text(path, number, field, shown(word), "write a number, or begin a comment with #")
-        })?;
-        columns += 1;
-    }
-    Ok(columns)
-}
 
 struct Reading {
     layout: PoseLayout,
