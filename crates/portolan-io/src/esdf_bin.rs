@@ -251,7 +251,7 @@ fn body<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, bad_bytes, says};
+    use crate::testing::{Random, bad_bytes, says, temporary};
 
     fn field<const D: usize>(shape: [usize; D], with_status: bool) -> EsdfGrid<D> {
         let mut random = Random(4);
@@ -270,8 +270,7 @@ mod tests {
     }
 
     fn bytes_of<const D: usize>(field: &EsdfGrid<D>) -> Vec<u8> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("esdf.bin");
+        let (_folder, path) = temporary("esdf.bin");
         write(field, &path);
         let bytes = std::fs::read(&path).unwrap();
         // As text: NaN does not equal itself.

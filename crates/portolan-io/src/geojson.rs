@@ -166,7 +166,7 @@ impl<'de> Deserialize<'de> for Position {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, no_panic, says};
+    use crate::testing::{Random, no_panic, says, temporary};
 
     fn parse(text: impl Into<Vec<u8>>) -> Result<Vec<Polyline>> {
         parse_geojson(Input::from_reader(io::Cursor::new(text.into()), "c.geojson".as_ref())?)
@@ -177,8 +177,7 @@ mod tests {
         let mut random = Random(8);
         let mut point = || [random.unit() * 4e6, -random.unit() * 1e-7];
         let lines: Vec<Polyline> = (0..9).map(|n| (0..n).map(|_| point()).collect()).collect();
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("c.geojson");
+        let (_folder, path) = temporary("c.geojson");
         write_geojson(&path, &lines).unwrap();
         assert_eq!(read_geojson(&path).unwrap(), lines);
         write_geojson(&path, &[]).unwrap();

@@ -312,7 +312,7 @@ fn origin(value: &str) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, no_panic, real_data, says};
+    use crate::testing::{Random, no_panic, real_data, says, temporary};
     use MapCell::*;
 
     fn parse(text: impl Into<Vec<u8>>) -> Result<MapServerInfo> {
@@ -393,8 +393,7 @@ mod tests {
 
     #[test]
     fn round_trips() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("it's a map.yaml");
+        let (_folder, path) = temporary("it's a map.yaml");
         let grid = Grid::new([-3.2, 1.0e6], 0.05, [5, 3]);
         let mut random = Random(2);
         let cells: Vec<_> = (0..15).map(|_| [Free, Occupied, Unknown][random.below(3)]).collect();

@@ -164,7 +164,7 @@ impl Header<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, no_panic, says};
+    use crate::testing::{Random, no_panic, says, temporary};
 
     fn parse(bytes: impl Into<Vec<u8>>) -> Result<Pgm> {
         Pgm::parse(Input::from_reader(io::Cursor::new(bytes.into()), "m.pgm".as_ref())?)
@@ -181,8 +181,7 @@ mod tests {
 
     #[test]
     fn round_trips() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("m.pgm");
+        let (_folder, path) = temporary("m.pgm");
         let mut random = Random(1);
         for max_value in [1, 255, 256, 65_535] {
             let pixels = (0..35).map(|_| random.below(max_value as usize + 1) as u16).collect();

@@ -71,10 +71,16 @@ pub(crate) fn no_panic<T>(
     }
 }
 
+/// A folder that goes when it is dropped, and the path of a file in it.
+pub(crate) fn temporary(name: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    (folder, path)
+}
+
 /// The bytes that a writer makes.
 pub(crate) fn written(write: impl FnOnce(&Path) -> Result<()>) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("file");
+    let (_folder, path) = temporary("file");
     write(&path).unwrap();
     std::fs::read(path).unwrap()
 }

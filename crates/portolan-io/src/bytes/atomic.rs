@@ -75,7 +75,7 @@ fn finish(file: File, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::says;
+    use crate::testing::{says, temporary};
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap();
@@ -84,8 +84,7 @@ mod tests {
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.bin");
+        let (folder, path) = temporary("map.bin");
         write_atomic(&path, |w| w.write_all(b"old")).unwrap();
         let failed = write_atomic(&path, |w| {
             w.write_all(&[0; 1 << 20])?;

@@ -231,7 +231,7 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, bad_bytes, says};
+    use crate::testing::{Random, bad_bytes, says, temporary};
 
     fn sample() -> Vec<u8> {
         let mut writer = ContainerWriter::new();
@@ -264,8 +264,7 @@ mod tests {
 
     #[test]
     fn round_trips_and_is_deterministic() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.portolan");
+        let (_folder, path) = temporary("map.portolan");
         let mut random = Random(1);
         let noise: Vec<u8> = (0..300_000).map(|_| random.next() as u8).collect();
         let mut writer = ContainerWriter::new();

@@ -95,13 +95,12 @@ mod tests {
     use super::super::testing::tetrahedron;
     use super::super::{write_glb, write_obj, write_ply_mesh};
     use super::*;
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{bad_bytes, real_data, temporary};
     use portolan::surface::Mesh;
 
     #[test]
     fn headers_tell_how_much_there_is() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh");
+        let (folder, path) = temporary("mesh");
         let mesh = tetrahedron([0.0; 3]);
         write_ply_mesh(&path, &mesh).unwrap();
         assert_eq!(mesh_counts(&path).unwrap(), Some(MeshCounts { vertices: 4, faces: Some(4) }));

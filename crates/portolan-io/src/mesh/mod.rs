@@ -80,11 +80,11 @@ mod testing {
 mod tests {
     use super::testing::tetrahedron;
     use super::*;
+    use crate::testing::temporary;
 
     #[test]
     fn what_does_not_fit_together_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh");
+        let (_folder, path) = temporary("mesh");
         let refused = |mesh: &Mesh| {
             for written in [write_ply_mesh(&path, mesh), write_glb(&path, mesh), write_obj(&path, mesh)] {
                 assert!(matches!(written, Err(IoError::Unwritable { .. })));

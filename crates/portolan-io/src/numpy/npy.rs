@@ -177,7 +177,7 @@ fn parse(header: &str) -> Option<(String, bool, Vec<usize>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{no_panic, says};
+    use crate::testing::{no_panic, says, temporary};
 
     fn bytes_of(array: &NpyArray) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -203,8 +203,7 @@ mod tests {
             let values = bytes.iter().position(|b| *b == b'\n').unwrap() + 1;
             assert_eq!(values % 64, 0);
         }
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npy");
+        let (_folder, path) = temporary("a.npy");
         write_npy(&path, &NpyArray::vector(&[4.0])).unwrap();
         assert_eq!(read_npy(&path).unwrap(), NpyArray::vector(&[4.0]));
     }

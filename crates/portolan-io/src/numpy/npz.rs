@@ -207,7 +207,7 @@ mod tests {
 
     use super::*;
     use crate::NpyValues;
-    use crate::testing::{no_panic, python, says};
+    use crate::testing::{no_panic, python, says, temporary};
 
     fn arrays() -> Vec<(&'static str, NpyArray)> {
         vec![
@@ -234,8 +234,7 @@ mod tests {
 
     #[test]
     fn round_trips_with_the_same_bytes_every_time() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npz");
+        let (_folder, path) = temporary("a.npz");
         let bytes = written(&path);
         assert_eq!(text(&read_npz(&path).unwrap()), text(&arrays()));
         assert_eq!(bytes, written(&path));
@@ -246,8 +245,7 @@ mod tests {
     #[test]
     fn numpy_reads_it_and_we_read_numpys() {
         let Some(python) = python("numpy") else { return };
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npz");
+        let (folder, path) = temporary("a.npz");
         written(&path);
         let script = "import sys, numpy as np\n\
             a = np.load(sys.argv[1])\n\

@@ -3,7 +3,7 @@ use std::time::Duration;
 use super::{lzf::tests::pack, parse, read_pcd, write_pcd};
 use crate::bytes::Input;
 use crate::points::{CloudGrid, PointCloudFile, RefusedPoints, Viewpoint};
-use crate::testing::{no_panic, real_data, says};
+use crate::testing::{no_panic, real_data, says, temporary};
 use crate::{IoError, Result, read_points};
 
 fn read(bytes: impl Into<Vec<u8>>) -> Result<PointCloudFile> {
@@ -127,8 +127,7 @@ fn doubles_and_text_far_away_keep_their_millimetres() {
         "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n500000.001 4000000.002 10\n";
     let cloud = read(ascii).unwrap();
     assert!((cloud.position(0)[1] - 4_000_000.002).abs() < 1e-6, "{:?}", cloud.position(0));
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("far.pcd");
+    let (_folder, path) = temporary("far.pcd");
     write_pcd(&path, &cloud).unwrap();
     let again = read_pcd(&path).unwrap();
     assert_eq!((again.offset, again.position(0)), (cloud.offset, cloud.position(0)));
@@ -136,8 +135,7 @@ fn doubles_and_text_far_away_keep_their_millimetres() {
 
 #[test]
 fn what_is_written_is_read() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("cloud.pcd");
+    let (_folder, path) = temporary("cloud.pcd");
     let unorganized = mixed_cloud();
     let grid = Some(CloudGrid { columns: 3, rows: 2, pixels: vec![1, 4] });
     let organized = PointCloudFile { grid, ..mixed_cloud() };

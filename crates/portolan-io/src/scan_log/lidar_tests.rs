@@ -10,7 +10,7 @@ use portolan::scan::{Frame, Origin, PointScan, Projection};
 use super::testing::{median_distance, with_convention};
 use super::{ScanLog, ScanLogKind, ScanLogOptions};
 use crate::poses3::PoseConvention;
-use crate::testing::{Random, bad_bytes, real_data, says};
+use crate::testing::{Random, bad_bytes, real_data, says, temporary};
 use crate::{PointCloudFile, Viewpoint, write_kitti_bin, write_pcd};
 
 fn open(path: &Path) -> ScanLog {
@@ -156,8 +156,7 @@ fn names_that_are_times_are_matched_by_time() {
 
 #[test]
 fn clouds_far_away_keep_their_millimetres() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("utm.xyz");
+    let (folder, path) = temporary("utm.xyz");
     fs::write(&path, "500000.001 4000000.002 12.003\n500003.5 4000001.25 12\n").unwrap();
     let origin = Some([500_001.0, 4_000_000.5, 14.0]);
     let log = ScanLog::open(&path, &ScanLogOptions { origin, ..Default::default() }).unwrap();
@@ -193,8 +192,7 @@ fn graph_of(scans: &[([f64; 7], &[[f64; 3]])]) -> Vec<u8> {
 
 #[test]
 fn scan_graphs_far_away_keep_their_millimetres() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("utm.graph");
+    let (folder, path) = temporary("utm.graph");
     let far = [[500_000.001, 4_000_000.002, 12.003], [500_003.5, 4_000_001.25, 12.0]];
     let none = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
     // Half a turn about z.
@@ -242,8 +240,7 @@ fn an_empty_first_cloud_and_one_elsewhere_do_not_cost_the_others_digits() {
 
 #[test]
 fn organized_clouds_keep_the_rows_and_columns_of_their_sensor() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scan.pcd");
+    let (_folder, path) = temporary("scan.pcd");
     let sensor = [10.0, -3.0, 1.5];
     let (mut points, mut pixels) = (Vec::new(), Vec::new());
     for (row, column) in (0..16u32).flat_map(|r| (0..360u32).map(move |c| (r, c))) {

@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use crate::scan_log::testing::*;
     use crate::scan_log::{CameraFrom, ScanLog, ScanLogKind};
-    use crate::testing::{bad_bytes, says};
+    use crate::testing::{bad_bytes, says, temporary};
 
     const START: f64 = 1_305_031_453.25;
 
@@ -213,8 +213,7 @@ mod tests {
 
     #[test]
     fn lists_are_read_whatever_they_are() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("depth.txt");
+        let (folder, path) = temporary("depth.txt");
         let good = "# c\n2.5 depth/b c.png\n1.5,depth/a.png\n\n";
         write(&path, good);
         let list = read_list(&path).unwrap();
