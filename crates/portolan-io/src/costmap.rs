@@ -18,7 +18,7 @@ use portolan::geom::Grid;
 use portolan::handover::{Inflation, cost};
 
 use crate::map_server::write_pair;
-use crate::{IoError, MapMode};
+use crate::{IoError, MapMode, Result};
 
 /// Writes costs (one byte per cell, x fastest, y up: [`Inflation::costs`]) as a yaml file, and beside it the image under
 /// the same name with `.pgm`.
@@ -26,12 +26,7 @@ use crate::{IoError, MapMode};
 /// # Errors
 /// [`IoError::Unwritable`] where the lengths differ, the resolution is not positive, or the mode cannot hold unknown
 /// cells that are there; else as [`crate::write_atomic`].
-pub fn write_costmap(
-    yaml: impl AsRef<Path>,
-    grid: &Grid<2>,
-    costs: &[u8],
-    mode: MapMode,
-) -> Result<(), IoError> {
+pub fn write_costmap(yaml: impl AsRef<Path>, grid: &Grid<2>, costs: &[u8], mode: MapMode) -> Result<()> {
     let yaml = yaml.as_ref();
     let unknown = costs.iter().filter(|c| **c == cost::NO_INFORMATION).count();
     if mode == MapMode::Scale && unknown > 0 {

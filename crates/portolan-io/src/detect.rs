@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::bytes::open;
 use crate::mesh::{MeshFormat, mesh_format};
 use crate::scan_log::ScanLogKind;
-use crate::{IoError, container, esdf_bin};
+use crate::{Result, container, esdf_bin};
 
 /// How much of a file is read (unpacked bytes).
 const HEAD: u64 = 64 << 10;
@@ -45,8 +45,8 @@ pub enum FileKind {
 /// Finds out what a file or folder is.
 ///
 /// # Errors
-/// [`IoError`] where it cannot be opened or read.
-pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
+/// [`crate::IoError`] where it cannot be opened or read.
+pub fn detect(path: impl AsRef<Path>) -> Result<FileKind> {
     let path = path.as_ref();
     if path.is_dir() {
         if path.join("map.portolan").is_file() {
@@ -65,22 +65,19 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind, IoError> {
 }
 
 fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {
-    if head.starts_with(container::MAGIC) {
-        return Some(FileKind::Portolan);
-    }
-    if head.starts_with(esdf_bin::MAGIC) {
-        return Some(FileKind::EsdfBin);
+    let starts: [(&[u8], _); 4] = [
+        (container::MAGIC, FileKind::Portolan),
+        (esdf_bin::MAGIC, FileKind::EsdfBin),
+        (b"# Octomap OcTree binary file", FileKind::OctomapBt),
+        (b"# Octomap OcTree file", FileKind::OctomapOt),
+    ];
+    if let Some((_, kind)) = starts.into_iter().find(|(start, _)| head.starts_with(start)) {
+        return Some(kind);
     }
     if let [b'P', b'2' | b'5', next, ..] = head
         && (next.is_ascii_whitespace() || *next == b'#')
     {
         return Some(FileKind::Pgm);
-    }
-    if head.starts_with(b"# Octomap OcTree binary file") {
-        return Some(FileKind::OctomapBt);
-    }
-    if head.starts_with(b"# Octomap OcTree file") {
-        return Some(FileKind::OctomapOt);
     }
     if let Some(format) = mesh_format(path, head) {
         return Some(FileKind::Mesh(format));
@@ -96,7 +93,7 @@ fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {
     }
     if text.lines().any(|line| {
         let word = line.split_ascii_whitespace().next().unwrap_or("");
-        CARMEN_WORDS.contains(&word)
+        CARMEN_WORDS.split(' ').any(|known| known == word)
             || line.starts_with("# message_name ")
             || line.starts_with("# message formats")
     }) {
@@ -110,20 +107,8 @@ fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {
 const GEOJSON_WORDS: [&str; 3] = ["\"Feature\"", "\"FeatureCollection\"", "\"coordinates\""];
 
 /// First words of lines of CARMEN logs.
-const CARMEN_WORDS: [&str; 12] = [
-    "FLASER",
-    "RLASER",
-    "ROBOTLASER1",
-    "ROBOTLASER2",
-    "RAWLASER1",
-    "RAWLASER2",
-    "ODOM",
-    "PARAM",
-    "SYNC",
-    "TRUEPOS",
-    "NEFF",
-    "OLDLASER",
-];
+const CARMEN_WORDS: &str =
+    "FLASER RLASER ROBOTLASER1 ROBOTLASER2 RAWLASER1 RAWLASER2 ODOM PARAM SYNC TRUEPOS NEFF OLDLASER";
 
 /// By the name, for a file whose content has no format (an empty or broken one): the reader's error is more useful.
 fn by_name(path: &Path, head: &[u8]) -> Option<FileKind> {

@@ -1,6 +1,10 @@
 //! The one error of this crate.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
+
+/// What readers and writers return.
+pub type Result<T, E = IoError> = std::result::Result<T, E>;
 
 /// Why a file could not be read or written. Every message is one line that names the file, the place, the
 /// field, its value and what to do about it.
@@ -109,42 +113,58 @@ impl IoError {
     pub(crate) fn text(
         path: &Path,
         line: u64,
-        field: impl Into<String>,
-        value: impl Into<String>,
-        advice: impl Into<String>,
+        field: impl Display,
+        value: impl Display,
+        advice: impl Display,
     ) -> Self {
-        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        let [field, value, advice] = [field.to_string(), value.to_string(), advice.to_string()];
         Self::Text { path: path.into(), line, field, value, advice }
+    }
+
+    /// Refuses one more thing where `count` are the most that a file may have.
+    pub(crate) fn unless_full(
+        path: &Path,
+        line: u64,
+        count: usize,
+        most: usize,
+        what: &str,
+        of: &str,
+    ) -> Result<()> {
+        if count < most {
+            return Ok(());
+        }
+        let (field, value) = (format!("the number of {what}"), format!("more than {most}"));
+        Err(Self::text(path, line, field, value, format!("split the {of}")))
     }
 
     pub(crate) fn binary(
         path: &Path,
         offset: u64,
-        field: impl Into<String>,
-        value: impl Into<String>,
-        advice: impl Into<String>,
+        field: impl Display,
+        value: impl Display,
+        advice: impl Display,
     ) -> Self {
-        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        let [field, value, advice] = [field.to_string(), value.to_string(), advice.to_string()];
         Self::Binary { path: path.into(), offset, field, value, advice }
     }
 
     pub(crate) fn unwritable(
         path: &Path,
-        field: impl Into<String>,
-        value: impl Into<String>,
-        advice: impl Into<String>,
+        field: impl Display,
+        value: impl Display,
+        advice: impl Display,
     ) -> Self {
-        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        let [field, value, advice] = [field.to_string(), value.to_string(), advice.to_string()];
         Self::Unwritable { path: path.into(), field, value, advice }
     }
 
     pub(crate) fn layout(
         path: &Path,
-        field: impl Into<String>,
-        value: impl Into<String>,
-        advice: impl Into<String>,
+        field: impl Display,
+        value: impl Display,
+        advice: impl Display,
     ) -> Self {
-        let (field, value, advice) = (field.into(), value.into(), advice.into());
+        let [field, value, advice] = [field.to_string(), value.to_string(), advice.to_string()];
         Self::Layout { path: path.into(), field, value, advice }
     }
 
@@ -183,8 +203,9 @@ fn shown_path(path: &Path) -> String {
 }
 
 /// Bytes of a file as a short quoted word on one line.
-pub(crate) fn shown(bytes: &[u8]) -> String {
+pub(crate) fn shown(bytes: impl AsRef<[u8]>) -> String {
     const LONGEST: usize = 48;
+    let bytes = bytes.as_ref();
     let head = &bytes[..bytes.len().min(LONGEST)];
     let text: String =
         String::from_utf8_lossy(head).chars().map(|c| if c.is_control() { '?' } else { c }).collect();

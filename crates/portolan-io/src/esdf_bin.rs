@@ -22,9 +22,9 @@ use portolan::Status;
 use portolan::field::EsdfGrid;
 use portolan::geom::Grid;
 
-use crate::IoError;
-use crate::bytes::{open_file, write_atomic};
+use crate::bytes::{open_file, u32_at, u64_at, write_atomic};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 /// The first eight bytes.
 pub(crate) const MAGIC: &[u8; 8] = b"PORTESDF";
@@ -51,10 +51,11 @@ pub fn write_esdf<const D: usize>(
     grid: &Grid<D>,
     distances: &[f32],
     status: Option<&[u8]>,
-) -> Result<(), IoError> {
+) -> Result<()> {
     let path = path.as_ref();
-    check_esdf(path, grid, distances, status)?;
-    write_atomic(path, |w| write_to(w, grid, distances, status))
+    let field = Samples { grid, distances, status };
+    field.check(path)?;
+    write_atomic(path, |w| field.write_to(w))
 }
 
 /// The same as bytes in memory.
@@ -65,64 +66,66 @@ pub fn esdf_to_bytes<const D: usize>(
     grid: &Grid<D>,
     distances: &[f32],
     status: Option<&[u8]>,
-) -> Result<Vec<u8>, IoError> {
+) -> Result<Vec<u8>> {
     let name = Path::new("esdf.bin");
-    check_esdf(name, grid, distances, status)?;
+    let field = Samples { grid, distances, status };
+    field.check(name)?;
     let mut bytes = Vec::new();
-    write_to(&mut bytes, grid, distances, status).map_err(|e| IoError::os(name, "write it", e))?;
+    field.write_to(&mut bytes).map_err(|e| IoError::os(name, "write it", e))?;
     Ok(bytes)
 }
 
-fn check_esdf<const D: usize>(
-    path: &Path,
-    grid: &Grid<D>,
-    distances: &[f32],
-    status: Option<&[u8]>,
-) -> Result<(), IoError> {
-    let cells = grid.checked_len().filter(|&n| n as u64 <= MOST_CELLS);
-    let fits = cells == Some(distances.len()) && status.is_none_or(|s| s.len() == distances.len());
-    if !fits || distances.is_empty() {
-        let value = format!(
-            "{:?} for {} distances and {:?} states",
-            grid.shape,
-            distances.len(),
-            status.map(<[u8]>::len)
-        );
-        let advice = format!("give one value per cell, from 1 to {MOST_CELLS} of them");
-        return Err(IoError::unwritable(path, "the shape", value, advice));
-    }
-    let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
-    if !(resolution > 0.0 && resolution.is_finite() && origin.iter().all(|v| v.is_finite())) {
-        let value = format!("{resolution} at {origin:?}");
-        return Err(IoError::unwritable(path, "the resolution", value, "give finite values, above zero"));
-    }
-    Ok(())
+/// What a file holds.
+struct Samples<'a, const D: usize> {
+    grid: &'a Grid<D>,
+    distances: &'a [f32],
+    status: Option<&'a [u8]>,
 }
 
-fn write_to<const D: usize>(
-    w: &mut impl Write,
-    grid: &Grid<D>,
-    distances: &[f32],
-    status: Option<&[u8]>,
-) -> std::io::Result<()> {
-    let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
-    w.write_all(MAGIC)?;
-    for word in [1, D as u32] {
-        w.write_all(&word.to_le_bytes())?;
+impl<const D: usize> Samples<'_, D> {
+    fn check(&self, path: &Path) -> Result<()> {
+        let Self { grid, distances, status } = *self;
+        let cells = grid.checked_len().filter(|&n| n as u64 <= MOST_CELLS);
+        let fits = cells == Some(distances.len()) && status.is_none_or(|s| s.len() == distances.len());
+        if !fits || distances.is_empty() {
+            let value = format!(
+                "{:?} for {} distances and {:?} states",
+                grid.shape,
+                distances.len(),
+                status.map(<[u8]>::len)
+            );
+            let advice = format!("give one value per cell, from 1 to {MOST_CELLS} of them");
+            return Err(IoError::unwritable(path, "the shape", value, advice));
+        }
+        let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
+        if !(resolution > 0.0 && resolution.is_finite() && origin.iter().all(|v| v.is_finite())) {
+            let value = format!("{resolution} at {origin:?}");
+            return Err(IoError::unwritable(path, "the resolution", value, "give finite values, above zero"));
+        }
+        Ok(())
     }
-    for k in 0..3 {
-        w.write_all(&(grid.shape.get(k).map_or(1, |&s| s as u32)).to_le_bytes())?;
+
+    fn write_to(&self, w: &mut impl Write) -> io::Result<()> {
+        let Self { grid, distances, status } = *self;
+        let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
+        w.write_all(MAGIC)?;
+        for word in [1, D as u32] {
+            w.write_all(&word.to_le_bytes())?;
+        }
+        for k in 0..3 {
+            w.write_all(&(grid.shape.get(k).map_or(1, |&s| s as u32)).to_le_bytes())?;
+        }
+        w.write_all(&u32::from(status.is_some()).to_le_bytes())?;
+        for k in 0..3 {
+            w.write_all(&origin.get(k).copied().unwrap_or(0.0).to_le_bytes())?;
+        }
+        w.write_all(&resolution.to_le_bytes())?;
+        for chunk in distances.chunks(1 << 14) {
+            let bytes: Vec<u8> = chunk.iter().flat_map(|d| d.to_le_bytes()).collect();
+            w.write_all(&bytes)?;
+        }
+        w.write_all(status.unwrap_or(&[]))
     }
-    w.write_all(&u32::from(status.is_some()).to_le_bytes())?;
-    for k in 0..3 {
-        w.write_all(&origin.get(k).copied().unwrap_or(0.0).to_le_bytes())?;
-    }
-    w.write_all(&resolution.to_le_bytes())?;
-    for chunk in distances.chunks(1 << 14) {
-        let bytes: Vec<u8> = chunk.iter().flat_map(|d| d.to_le_bytes()).collect();
-        w.write_all(&bytes)?;
-    }
-    w.write_all(status.unwrap_or(&[]))
 }
 
 impl EsdfFile {
@@ -130,7 +133,7 @@ impl EsdfFile {
     ///
     /// # Errors
     /// [`IoError::Binary`] where a field is wrong or the file's length is not what the header announces.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Self::from_reader(BufReader::<File>::with_capacity(1 << 16, open_file(path)?), path)
     }
@@ -139,7 +142,7 @@ impl EsdfFile {
     ///
     /// # Errors
     /// As [`EsdfFile::read`].
-    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self, IoError> {
+    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self> {
         Self::from_reader(Cursor::new(bytes), name)
     }
 
@@ -147,7 +150,7 @@ impl EsdfFile {
     ///
     /// # Errors
     /// As [`EsdfFile::read`], and [`IoError::Os`] where reading fails.
-    pub fn from_reader(mut reader: impl Read + Seek, path: &Path) -> Result<Self, IoError> {
+    pub fn from_reader(mut reader: impl Read + Seek, path: &Path) -> Result<Self> {
         let failed = |e| IoError::os(path, "read it", e);
         let length = reader.seek(SeekFrom::End(0)).map_err(failed)?;
         reader.rewind().map_err(failed)?;
@@ -155,32 +158,19 @@ impl EsdfFile {
         reader.by_ref().take(HEADER).read_to_end(&mut header).map_err(failed)?;
         let Ok(h) = <[u8; HEADER as usize]>::try_from(&header[..]) else {
             let value = format!("{} bytes", header.len());
-            return Err(IoError::binary(
-                path,
-                0,
-                "the header",
-                value,
-                "give an esdf.bin: its header has 64 bytes",
-            ));
+            let advice = "give an esdf.bin: its header has 64 bytes";
+            return Err(IoError::binary(path, 0, "the header", value, advice));
         };
         if &h[..8] != MAGIC {
             let advice = "give an esdf.bin: it starts with PORTESDF";
             return Err(IoError::binary(path, 0, "the magic", shown(&h[..8]), advice));
         }
-        match word(&h, 12) {
+        match u32_at(&h, 12) {
             2 => Ok(Self::Two(body(&h, reader, length, path)?)),
             3 => Ok(Self::Three(body(&h, reader, length, path)?)),
-            d => Err(IoError::binary(path, 12, "the dimension", d.to_string(), "it must be 2 or 3")),
+            d => Err(IoError::binary(path, 12, "the dimension", d, "it must be 2 or 3")),
         }
     }
-}
-
-fn word(h: &[u8; 64], at: usize) -> u32 {
-    u32::from_le_bytes([h[at], h[at + 1], h[at + 2], h[at + 3]])
-}
-
-fn double(h: &[u8; 64], at: usize) -> f64 {
-    f64::from_le_bytes(std::array::from_fn(|k| h[at + k]))
 }
 
 fn body<const D: usize>(
@@ -188,32 +178,28 @@ fn body<const D: usize>(
     mut reader: impl Read,
     length: u64,
     path: &Path,
-) -> Result<EsdfGrid<D>, IoError> {
+) -> Result<EsdfGrid<D>> {
     let bad = |at: u64, field: &str, value: String, advice: &str| {
         Err(IoError::binary(path, at, field, value, advice))
     };
-    let (version, flags) = (word(h, 8), word(h, 28));
+    let (version, flags) = (u32_at(h, 8), u32_at(h, 28));
     if version != 1 {
         return bad(8, "the version", version.to_string(), "this program reads version 1; use a newer one");
     }
     if flags > 1 {
         return bad(28, "the flags", flags.to_string(), "this program reads bit 0 only; use a newer one");
     }
-    let shape: [u32; 3] = std::array::from_fn(|k| word(h, 16 + 4 * k));
+    let shape: [u32; 3] = std::array::from_fn(|k| u32_at(h, 16 + 4 * k));
     let cells = shape.iter().try_fold(1u64, |n, &s| n.checked_mul(u64::from(s)));
     let cells = match cells.filter(|n| (1..=MOST_CELLS).contains(n)) {
         Some(n) if shape[D..].iter().all(|&s| s == 1) => n,
         _ => {
-            return bad(
-                16,
-                "the shape",
-                format!("{shape:?}"),
-                "give from 1 to 2^29 cells, 1 along an unused axis",
-            );
+            let advice = "give from 1 to 2^29 cells, 1 along an unused axis";
+            return bad(16, "the shape", format!("{shape:?}"), advice);
         }
     };
-    let origin: [f64; D] = std::array::from_fn(|k| double(h, 32 + 8 * k));
-    let resolution = double(h, 56);
+    let origin: [f64; D] = std::array::from_fn(|k| f64::from_bits(u64_at(h, 32 + 8 * k)));
+    let resolution = f64::from_bits(u64_at(h, 56));
     if !origin.iter().all(|v| v.is_finite()) {
         return bad(32, "the origin", format!("{origin:?}"), "give finite numbers (metres)");
     }
@@ -223,7 +209,7 @@ fn body<const D: usize>(
     let expected = HEADER + cells * if flags == 1 { 5 } else { 4 };
     let wrong_length = |length: u64| {
         let advice = format!("the header announces {expected}: the file is cut off or damaged");
-        Err(IoError::binary(path, length.min(expected), "the file length", length.to_string(), advice))
+        Err(IoError::binary(path, length.min(expected), "the file length", length, advice))
     };
     if length != expected {
         return wrong_length(length);
@@ -259,13 +245,13 @@ fn body<const D: usize>(
         EsdfGrid::from_samples(grid, distances)
     };
     // One sample and one status a cell were read.
-    field.map_err(|e| IoError::binary(path, 16, "the shape", format!("{shape:?}"), e.to_string()))
+    field.map_err(|e| IoError::binary(path, 16, "the shape", format!("{shape:?}"), e))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, bad_bytes};
+    use crate::testing::{Random, bad_bytes, says, temporary};
 
     fn field<const D: usize>(shape: [usize; D], with_status: bool) -> EsdfGrid<D> {
         let mut random = Random(4);
@@ -284,8 +270,7 @@ mod tests {
     }
 
     fn bytes_of<const D: usize>(field: &EsdfGrid<D>) -> Vec<u8> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("esdf.bin");
+        let (_folder, path) = temporary("esdf.bin");
         write(field, &path);
         let bytes = std::fs::read(&path).unwrap();
         // As text: NaN does not equal itself.
@@ -348,7 +333,7 @@ mod tests {
         }
         let mut huge = good.clone();
         huge[16..28].fill(0xff);
-        assert!(EsdfFile::parse(&huge, "e".as_ref()).unwrap_err().to_string().contains("the shape"));
+        says(EsdfFile::parse(&huge, "e".as_ref()), "the shape");
         assert!(EsdfFile::parse(&good[..80], "e".as_ref()).is_err());
     }
 

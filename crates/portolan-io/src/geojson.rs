@@ -12,7 +12,7 @@ use serde_json::value::RawValue;
 
 use crate::bytes::{Input, open, write_atomic};
 use crate::error::shown;
-use crate::{IoError, Polyline};
+use crate::{IoError, Polyline, Result};
 
 /// The longest file that is read (bytes).
 const LONGEST: u64 = 256 << 20;
@@ -21,7 +21,7 @@ const LONGEST: u64 = 256 << 20;
 ///
 /// # Errors
 /// [`IoError::Unwritable`] for a coordinate that is not finite, else as [`write_atomic`].
-pub fn write_geojson(path: impl AsRef<Path>, lines: &[Polyline]) -> Result<(), IoError> {
+pub fn write_geojson(path: impl AsRef<Path>, lines: &[Polyline]) -> Result<()> {
     let path = path.as_ref();
     check_finite(path, lines)?;
     write_atomic(path, |w| write_to(w, lines))
@@ -31,7 +31,7 @@ pub fn write_geojson(path: impl AsRef<Path>, lines: &[Polyline]) -> Result<(), I
 ///
 /// # Errors
 /// [`IoError::Unwritable`] for a coordinate that is not finite.
-pub fn geojson_to_bytes(lines: &[Polyline]) -> Result<Vec<u8>, IoError> {
+pub fn geojson_to_bytes(lines: &[Polyline]) -> Result<Vec<u8>> {
     let name = Path::new("contour.geojson");
     check_finite(name, lines)?;
     let mut bytes = Vec::new();
@@ -40,7 +40,7 @@ pub fn geojson_to_bytes(lines: &[Polyline]) -> Result<Vec<u8>, IoError> {
 }
 
 /// Refuses coordinates that no text format can hold.
-pub(crate) fn check_finite(path: &Path, lines: &[Polyline]) -> Result<(), IoError> {
+pub(crate) fn check_finite(path: &Path, lines: &[Polyline]) -> Result<()> {
     match lines.iter().flatten().find(|p| !p.iter().all(|v| v.is_finite())) {
         Some(p) => Err(IoError::unwritable(path, "a point", format!("{p:?}"), "give finite coordinates")),
         None => Ok(()),
@@ -66,7 +66,7 @@ fn write_to(w: &mut impl Write, lines: &[Polyline]) -> io::Result<()> {
 ///
 /// # Errors
 /// [`IoError::Text`] where the file is not GeoJSON or longer than 256 MiB.
-pub fn read_geojson(path: impl AsRef<Path>) -> Result<Vec<Polyline>, IoError> {
+pub fn read_geojson(path: impl AsRef<Path>) -> Result<Vec<Polyline>> {
     parse_geojson(open(path)?)
 }
 
@@ -74,21 +74,16 @@ pub fn read_geojson(path: impl AsRef<Path>) -> Result<Vec<Polyline>, IoError> {
 ///
 /// # Errors
 /// As [`read_geojson`].
-pub fn parse_geojson(mut input: Input) -> Result<Vec<Polyline>, IoError> {
+pub fn parse_geojson(mut input: Input) -> Result<Vec<Polyline>> {
     let bytes = input.read_all(LONGEST)?;
     let failed = |e: serde_json::Error| {
-        let value = shown(e.to_string().as_bytes());
-        IoError::text(
-            input.path(),
-            e.line() as u64,
-            "the GeoJSON",
-            value,
-            "write lines as a Feature or geometry",
-        )
+        let value = shown(e.to_string());
+        let advice = "write lines as a Feature or geometry";
+        IoError::text(input.path(), e.line() as u64, "the GeoJSON", value, advice)
     };
     let mut lines = Vec::new();
     let top: Object = serde_json::from_slice(&bytes).map_err(failed)?;
-    top.collect(&mut lines).map_err(failed)?;
+    top.collect(&mut lines, 0).map_err(failed)?;
     if let Some(i) = lines.iter().position(|l| !l.iter().flatten().all(|v| v.is_finite())) {
         let field = format!("a coordinate of line string {i}");
         return Err(IoError::text(input.path(), 1, field, "not finite", "write finite numbers"));
@@ -112,11 +107,7 @@ struct Object<'a> {
 }
 
 impl Object<'_> {
-    fn collect(&self, lines: &mut Vec<Polyline>) -> serde_json::Result<()> {
-        self.collect_below(lines, 0)
-    }
-
-    fn collect_below(&self, lines: &mut Vec<Polyline>, depth: u32) -> serde_json::Result<()> {
+    fn collect(&self, lines: &mut Vec<Polyline>, depth: u32) -> serde_json::Result<()> {
         use serde::de::Error;
         // Collections in collections: the raw values are parsed level by level, so that the parser's own limit
         // does not count them.
@@ -125,33 +116,26 @@ impl Object<'_> {
         }
         let text = || self.coordinates.map(RawValue::get).ok_or_else(|| Error::missing_field("coordinates"));
         let inner = |raw: &RawValue, lines: &mut Vec<Polyline>| {
-            serde_json::from_str::<Object>(raw.get())?.collect_below(lines, depth + 1)
+            serde_json::from_str::<Object>(raw.get())?.collect(lines, depth + 1)
         };
-        match self.kind.as_str() {
-            "Feature" => self.geometry.map_or(Ok(()), |g| inner(g, lines)),
-            "FeatureCollection" => self.features.iter().flatten().try_for_each(|f| inner(f, lines)),
-            "GeometryCollection" => self.geometries.iter().flatten().try_for_each(|g| inner(g, lines)),
-            "Point" | "MultiPoint" => Ok(()),
-            "LineString" => {
-                lines.push(line(serde_json::from_str(text()?)?));
-                Ok(())
+        let found: Vec<Vec<Position>> = match self.kind.as_str() {
+            "Feature" => return self.geometry.map_or(Ok(()), |g| inner(g, lines)),
+            "FeatureCollection" => return self.features.iter().flatten().try_for_each(|f| inner(f, lines)),
+            "GeometryCollection" => {
+                return self.geometries.iter().flatten().try_for_each(|g| inner(g, lines));
             }
-            "MultiLineString" | "Polygon" => {
-                lines.extend(serde_json::from_str::<Vec<Vec<Position>>>(text()?)?.into_iter().map(line));
-                Ok(())
-            }
+            "Point" | "MultiPoint" => return Ok(()),
+            "LineString" => vec![serde_json::from_str(text()?)?],
+            "MultiLineString" | "Polygon" => serde_json::from_str(text()?)?,
             "MultiPolygon" => {
-                let polygons = serde_json::from_str::<Vec<Vec<Vec<Position>>>>(text()?)?;
-                lines.extend(polygons.into_iter().flatten().map(line));
-                Ok(())
+                let polygons: Vec<Vec<Vec<Position>>> = serde_json::from_str(text()?)?;
+                polygons.into_iter().flatten().collect()
             }
-            other => Err(Error::custom(format!("the type {other} is not GeoJSON"))),
-        }
+            other => return Err(Error::custom(format!("the type {other} is not GeoJSON"))),
+        };
+        lines.extend(found.into_iter().map(|line| line.into_iter().map(|p| p.0).collect()));
+        Ok(())
     }
-}
-
-fn line(positions: Vec<Position>) -> Polyline {
-    positions.into_iter().map(|p| p.0).collect()
 }
 
 /// x and y; further numbers are allowed and ignored.
@@ -182,9 +166,9 @@ impl<'de> Deserialize<'de> for Position {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, bad_bytes};
+    use crate::testing::{Random, no_panic, says, temporary};
 
-    fn parse(text: impl Into<Vec<u8>>) -> Result<Vec<Polyline>, IoError> {
+    fn parse(text: impl Into<Vec<u8>>) -> Result<Vec<Polyline>> {
         parse_geojson(Input::from_reader(io::Cursor::new(text.into()), "c.geojson".as_ref())?)
     }
 
@@ -193,8 +177,7 @@ mod tests {
         let mut random = Random(8);
         let mut point = || [random.unit() * 4e6, -random.unit() * 1e-7];
         let lines: Vec<Polyline> = (0..9).map(|n| (0..n).map(|_| point()).collect()).collect();
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("c.geojson");
+        let (_folder, path) = temporary("c.geojson");
         write_geojson(&path, &lines).unwrap();
         assert_eq!(read_geojson(&path).unwrap(), lines);
         write_geojson(&path, &[]).unwrap();
@@ -222,8 +205,7 @@ mod tests {
             ("{\"type\":\"LineString\",\n\"coordinates\":[[1]]}", "the GeoJSON is"),
             ("", "c.geojson: line 1: the GeoJSON is \"EOF"),
         ] {
-            let error = parse(text).unwrap_err().to_string();
-            assert!(error.contains(part) && !error.contains('\n'), "{error}");
+            says(parse(text), part);
         }
         let deep = "{\"type\":\"GeometryCollection\",\"geometries\":[".repeat(1000);
         assert!(parse(deep).is_err());
@@ -233,8 +215,6 @@ mod tests {
     fn no_bytes_make_it_panic() {
         let good =
             br#"{"type":"Feature","geometry":{"type":"MultiLineString","coordinates":[[[1,2],[3,4]]]}}"#;
-        for bytes in bad_bytes(good, 12, 4000) {
-            let _ = parse(bytes);
-        }
+        no_panic(good, 12, 4000, parse);
     }
 }

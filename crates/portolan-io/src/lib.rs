@@ -71,7 +71,7 @@ pub use carmen::{
 pub use container::{Chunk, Container, ContainerWriter};
 pub use costmap::write_costmap;
 pub use detect::{FileKind, detect};
-pub use error::IoError;
+pub use error::{IoError, Result};
 pub use esdf_bin::{EsdfFile, esdf_to_bytes, write_esdf};
 pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};

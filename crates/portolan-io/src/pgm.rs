@@ -1,11 +1,11 @@
 //! Netpbm gray maps: `P5` (binary) and `P2` (text), 8 and 16 bits.
 
-use std::io::{self, BufRead, Read, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use crate::bytes::{Input, open, parse_f64, read_failed};
 use crate::error::shown;
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// The most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 27;
@@ -28,7 +28,7 @@ impl Pgm {
     ///
     /// # Errors
     /// As [`Pgm::parse`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         Self::parse(open(path)?)
     }
 
@@ -37,8 +37,8 @@ impl Pgm {
     ///
     /// # Errors
     /// [`IoError::Binary`] for a wrong header and for too few pixels.
-    pub fn parse(mut input: Input) -> Result<Self, IoError> {
-        let mut header = Header { input: &mut input, offset: 0, last: b' ' };
+    pub fn parse(mut input: Input) -> Result<Self> {
+        let mut header = Header { input: &mut input, offset: 0 };
         let magic = [header.byte()?, header.byte()?].map(|b| b.unwrap_or(b' '));
         let text = match &magic {
             b"P5" => false,
@@ -74,7 +74,7 @@ impl Pgm {
     ///
     /// # Errors
     /// [`IoError::Unwritable`] where the size does not fit the pixels, else as [`write_atomic`].
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
         if self.width.checked_mul(self.height) != Some(self.pixels.len()) || self.max_value == 0 {
             let value = format!("{} x {} for {} pixels", self.width, self.height, self.pixels.len());
@@ -97,7 +97,7 @@ impl Pgm {
     }
 }
 
-fn binary_pixels(input: &mut Input, offset: u64, count: u64, max_value: u64) -> Result<Vec<u16>, IoError> {
+fn binary_pixels(input: &mut Input, offset: u64, count: u64, max_value: u64) -> Result<Vec<u16>> {
     let width = if max_value < 256 { 1 } else { 2 };
     let bytes = input.read_up_to(count * width)?;
     if bytes.len() as u64 != count * width {
@@ -112,7 +112,7 @@ fn binary_pixels(input: &mut Input, offset: u64, count: u64, max_value: u64) -> 
     if let Some(i) = pixels.iter().position(|&v| u64::from(v) > max_value) {
         let advice = format!("the header announces at most {max_value}");
         let at = offset + i as u64 * width;
-        return Err(IoError::binary(input.path(), at, "a pixel", pixels[i].to_string(), advice));
+        return Err(IoError::binary(input.path(), at, "a pixel", pixels[i], advice));
     }
     Ok(pixels)
 }
@@ -120,17 +120,15 @@ fn binary_pixels(input: &mut Input, offset: u64, count: u64, max_value: u64) -> 
 struct Header<'a> {
     input: &'a mut Input,
     offset: u64,
-    last: u8,
 }
 
 impl Header<'_> {
-    fn byte(&mut self) -> Result<Option<u8>, IoError> {
+    fn byte(&mut self) -> Result<Option<u8>> {
         let mut byte = [0];
         match self.input.read(&mut byte) {
             Ok(0) => Ok(None),
             Ok(_) => {
                 self.offset += 1;
-                self.last = byte[0];
                 Ok(Some(byte[0]))
             }
             Err(e) => Err(read_failed(self.input.path(), self.input.compression(), self.offset, e)),
@@ -138,7 +136,7 @@ impl Header<'_> {
     }
 
     /// The next number; exactly one byte behind it is consumed as well.
-    fn number(&mut self, field: &str, allowed: std::ops::RangeInclusive<u64>) -> Result<u64, IoError> {
+    fn number(&mut self, field: &str, allowed: std::ops::RangeInclusive<u64>) -> Result<u64> {
         let mut word = Vec::new();
         let mut at = self.offset;
         loop {
@@ -157,33 +155,18 @@ impl Header<'_> {
         })
     }
 
-    fn skip_comment(&mut self) -> Result<(), IoError> {
-        loop {
-            let (used, ended) = match self.input.fill_buf() {
-                Ok([]) => return Ok(()),
-                Ok(bytes) => match bytes.iter().position(|b| *b == b'\n') {
-                    Some(i) => (i + 1, true),
-                    None => (bytes.len(), false),
-                },
-                Err(e) => {
-                    return Err(read_failed(self.input.path(), self.input.compression(), self.offset, e));
-                }
-            };
-            self.input.consume(used);
-            self.offset += used as u64;
-            if ended {
-                return Ok(());
-            }
-        }
+    fn skip_comment(&mut self) -> Result<()> {
+        while self.byte()?.is_some_and(|b| b != b'\n') {}
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, bad_bytes};
+    use crate::testing::{Random, no_panic, says, temporary};
 
-    fn parse(bytes: impl Into<Vec<u8>>) -> Result<Pgm, IoError> {
+    fn parse(bytes: impl Into<Vec<u8>>) -> Result<Pgm> {
         Pgm::parse(Input::from_reader(io::Cursor::new(bytes.into()), "m.pgm".as_ref())?)
     }
 
@@ -198,8 +181,7 @@ mod tests {
 
     #[test]
     fn round_trips() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("m.pgm");
+        let (_folder, path) = temporary("m.pgm");
         let mut random = Random(1);
         for max_value in [1, 255, 256, 65_535] {
             let pixels = (0..35).map(|_| random.below(max_value as usize + 1) as u16).collect();
@@ -226,17 +208,14 @@ mod tests {
             (b"P2 1 1 7\n8", "a pixel is \"8\""),
             (b"", "the magic is"),
         ] {
-            let error = parse(bytes).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(parse(bytes), part);
         }
     }
 
     #[test]
     fn no_bytes_make_it_panic() {
         for good in [&b"P5 # c\n4 3\n255\nabcdefghijkl"[..], b"P2\n2 2 9\n1 2 3 4\n"] {
-            for bytes in bad_bytes(good, 9, 3000) {
-                let _ = parse(bytes);
-            }
+            no_panic(good, 9, 3000, parse);
         }
     }
 }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::IoError;
 use crate::bytes::{Input, Lines, open, parse_f64};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 /// The most points of a file.
 const MOST_POINTS: usize = 1 << 25;
@@ -24,7 +24,7 @@ impl QueryPoints {
     ///
     /// # Errors
     /// [`IoError::Text`] with line, field and value.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         Self::parse(open(path)?)
     }
 
@@ -32,14 +32,12 @@ impl QueryPoints {
     ///
     /// # Errors
     /// As [`QueryPoints::read`].
-    pub fn parse(input: Input) -> Result<Self, IoError> {
+    pub fn parse(input: Input) -> Result<Self> {
         let mut lines = Lines::of(input);
         let path = lines.path().to_owned();
         let (mut two, mut three) = (Vec::new(), Vec::new());
         let mut columns = None;
-        loop {
-            let number = lines.number() + 1;
-            let Some(line) = lines.next_line()? else { break };
+        while let Some((number, line)) = lines.next_numbered()? {
             let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
             // A byte order mark, as spreadsheets write it.
             let content = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content).trim_ascii();
@@ -51,7 +49,7 @@ impl QueryPoints {
             if !(2..=3).contains(&count) || columns.is_some_and(|c| c != count) {
                 let expected = columns.map_or("2 (x,y) or 3 (x,y,z)".to_owned(), |c| format!("{c} as above"));
                 let advice = format!("write {expected}, separated by commas");
-                return Err(IoError::text(&path, number, "the number of fields", count.to_string(), advice));
+                return Err(IoError::text(&path, number, "the number of fields", count, advice));
             }
             columns = Some(count);
             let mut names = words.clone().zip([b"x", b"y", b"z"]);
@@ -96,9 +94,9 @@ impl QueryPoints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::bad_bytes;
+    use crate::testing::{no_panic, says};
 
-    fn parse(text: impl Into<Vec<u8>>) -> Result<QueryPoints, IoError> {
+    fn parse(text: impl Into<Vec<u8>>) -> Result<QueryPoints> {
         QueryPoints::parse(Input::from_reader(std::io::Cursor::new(text.into()), "q.csv".as_ref())?)
     }
 
@@ -111,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_line_field_and_value() {
+    fn errors_name_line_field_and_value_and_no_bytes_make_it_panic() {
         for (text, part) in [
             ("1,2\n3,abc\n", "q.csv: line 2: y is \"abc\"; write a finite number"),
             ("1,2\n3\n", "line 2: the number of fields is 1; write 2 as above"),
@@ -124,15 +122,8 @@ mod tests {
             ("1,2\nx,y\n", "line 2: x is \"x\""),
             ("# none\n", "the number of points is 0"),
         ] {
-            let error = parse(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(parse(text), part);
         }
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
-        for bytes in bad_bytes(b"x,y\n1,2\n# c\n3.5,-4e1\n", 13, 3000) {
-            let _ = parse(bytes);
-        }
+        no_panic(b"x,y\n1,2\n# c\n3.5,-4e1\n", 13, 3000, parse);
     }
 }

@@ -12,9 +12,9 @@ use std::path::Path;
 
 use portolan::geom::Pose;
 
-use crate::IoError;
-use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::bytes::{Input, Lines, columns, open, parse_f64};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 /// The most poses of a file.
 const MOST_POSES: usize = 1 << 23;
@@ -36,7 +36,7 @@ pub struct TimedPose<const D: usize> {
 /// # Errors
 /// [`IoError::Text`] for a line that is not a pose, for lines with different numbers of columns, for poses that
 /// are not finite or not 2-D, and for a file without poses.
-pub fn read_poses_2d(path: impl AsRef<Path>) -> Result<Vec<TimedPose<2>>, IoError> {
+pub fn read_poses_2d(path: impl AsRef<Path>) -> Result<Vec<TimedPose<2>>> {
     parse_poses_2d(open(path)?)
 }
 
@@ -44,22 +44,23 @@ pub fn read_poses_2d(path: impl AsRef<Path>) -> Result<Vec<TimedPose<2>>, IoErro
 ///
 /// # Errors
 /// As [`read_poses_2d`].
-pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>, IoError> {
+pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>> {
     let mut lines = Lines::of(input);
     let path = lines.path().to_owned();
     let mut poses = Vec::new();
-    let mut columns = None;
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
-        let (values, count) = numbers(line, number, &path)?;
+    let mut width = None;
+    let finite = |word: &[u8]| parse_f64(word).filter(|v| v.is_finite());
+    while let Some((number, line)) = lines.next_numbered()? {
+        let (values, count) = columns::<9>(line, |b| b == b',', finite).map_err(|(word, column)| {
+            IoError::text(&path, number, column, shown(word), "write a finite number")
+        })?;
         let values = &values[..count];
         if values.is_empty() {
             continue;
         }
-        if *columns.get_or_insert(count) != count {
+        if *width.get_or_insert(count) != count {
             let advice = "give every line the same columns";
-            return Err(IoError::text(&path, number, "the number of columns", count.to_string(), advice));
+            return Err(IoError::text(&path, number, "the number of columns", count, advice));
         }
         let pose = match *values {
             [x, y, theta] => TimedPose { time: None, pose: Pose::<2>::new(x, y, theta) },
@@ -72,13 +73,10 @@ pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>, IoError> {
             }
             _ => {
                 let advice = "write 3 (x y theta), 4 (t x y theta) or 8 (t tx ty tz qx qy qz qw)";
-                return Err(IoError::text(&path, number, "the number of columns", count.to_string(), advice));
+                return Err(IoError::text(&path, number, "the number of columns", count, advice));
             }
         };
-        if poses.len() == MOST_POSES {
-            let value = format!("more than {MOST_POSES}");
-            return Err(IoError::text(&path, number, "the number of poses", value, "split the file"));
-        }
+        IoError::unless_full(&path, number, poses.len(), MOST_POSES, "poses", "file")?;
         poses.push(pose);
     }
     if poses.is_empty() {
@@ -86,21 +84,6 @@ pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>, IoError> {
         return Err(IoError::text(&path, lines.number(), "the number of poses", "0", advice));
     }
     Ok(poses)
-}
-
-/// The finite numbers of a line, at most nine of them.
-fn numbers(line: &[u8], number: u64, path: &Path) -> Result<([f64; 9], usize), IoError> {
-    let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
-    let words = content.split(|b| b.is_ascii_whitespace() || *b == b',').filter(|w| !w.is_empty());
-    let (mut values, mut count) = ([0.0; 9], 0);
-    for word in words.take(9) {
-        values[count] = parse_f64(word).filter(|v| v.is_finite()).ok_or_else(|| {
-            let field = format!("column {}", count + 1);
-            IoError::text(path, number, field, shown(word), "write a finite number")
-        })?;
-        count += 1;
-    }
-    Ok((values, count))
 }
 
 fn pose_2d(x: f64, y: f64, xyzw: [f64; 4]) -> Result<Pose<2>, &'static str> {
@@ -117,9 +100,9 @@ fn pose_2d(x: f64, y: f64, xyzw: [f64; 4]) -> Result<Pose<2>, &'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::bad_bytes;
+    use crate::testing::{no_panic, says};
 
-    fn parse(text: impl Into<Vec<u8>>) -> Result<Vec<TimedPose<2>>, IoError> {
+    fn parse(text: impl Into<Vec<u8>>) -> Result<Vec<TimedPose<2>>> {
         parse_poses_2d(Input::from_reader(std::io::Cursor::new(text.into()), "p.txt".as_ref())?)
     }
 
@@ -134,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_place() {
+    fn errors_name_the_place_and_no_bytes_make_it_panic() {
         for (text, part) in [
             ("1 2 3\n1 2\n", "p.txt: line 2: the number of columns is 2; give every line"),
             ("1 2\n", "line 1: the number of columns is 2; write 3"),
@@ -144,15 +127,8 @@ mod tests {
             ("0 0 0 0 0.5 0.5 0.5 0.5\n", "turn about z only"),
             ("# nothing\n", "the number of poses is 0"),
         ] {
-            let error = parse(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(parse(text), part);
         }
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
-        for bytes in bad_bytes(b"1 2 3 # c\n4 5 6\n7,8,9,\n", 5, 3000) {
-            let _ = parse(bytes);
-        }
+        no_panic(b"1 2 3 # c\n4 5 6\n7,8,9,\n", 5, 3000, parse);
     }
 }

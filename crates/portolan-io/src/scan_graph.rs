@@ -7,9 +7,9 @@ use std::path::Path;
 
 use portolan::geom::Pose;
 
-use crate::IoError;
 use crate::bytes::{Endian, Input, Scalar, open};
 use crate::points::{CloudBuilder, PointCloudFile, most_bytes};
+use crate::{IoError, Result};
 
 /// One scan of a graph.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub struct ScanGraphNode {
 /// # Errors
 /// [`IoError::Binary`] for a file that is cut off, for lengths that are not those of points and poses, and for a pose that
 /// is not finite.
-pub fn read_scan_graph(path: impl AsRef<Path>) -> Result<Vec<ScanGraphNode>, IoError> {
+pub fn read_scan_graph(path: impl AsRef<Path>) -> Result<Vec<ScanGraphNode>> {
     parse_scan_graph(open(path)?)
 }
 
@@ -35,7 +35,7 @@ pub fn read_scan_graph(path: impl AsRef<Path>) -> Result<Vec<ScanGraphNode>, IoE
 ///
 /// # Errors
 /// As [`read_scan_graph`].
-pub fn parse_scan_graph(mut input: Input) -> Result<Vec<ScanGraphNode>, IoError> {
+pub fn parse_scan_graph(mut input: Input) -> Result<Vec<ScanGraphNode>> {
     let bytes = input.read_all(most_bytes(&input))?;
     let mut reader = Reader { bytes: &bytes, at: 0, path: input.path() };
     let count = reader.u32("the number of scans")?;
@@ -55,7 +55,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn node(&mut self) -> Result<ScanGraphNode, IoError> {
+    fn node(&mut self) -> Result<ScanGraphNode> {
         let points = self.u32("the number of points")?;
         let mut builder = CloudBuilder::new(true);
         for i in 0..points {
@@ -76,7 +76,7 @@ impl Reader<'_> {
     }
 
     /// A vector of doubles behind its length.
-    fn vector<const N: usize>(&mut self, field: &str) -> Result<[f64; N], IoError> {
+    fn vector<const N: usize>(&mut self, field: &str) -> Result<[f64; N]> {
         let start = self.at as u64;
         let length = self.u32(field)?;
         if length as usize != N {
@@ -88,11 +88,11 @@ impl Reader<'_> {
         Ok(std::array::from_fn(|k| Scalar::F64.read(&bytes[8 * k..], Endian::Little)))
     }
 
-    fn u32(&mut self, field: &str) -> Result<u32, IoError> {
+    fn u32(&mut self, field: &str) -> Result<u32> {
         Ok(Scalar::U32.read(self.take(4, field)?, Endian::Little) as u32)
     }
 
-    fn take(&mut self, count: usize, field: &str) -> Result<&[u8], IoError> {
+    fn take(&mut self, count: usize, field: &str) -> Result<&[u8]> {
         let end = self.at + count;
         let Some(bytes) = self.bytes.get(self.at..end) else {
             let value = format!("{} bytes", self.bytes.len() - self.at);
@@ -107,9 +107,9 @@ impl Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{no_panic, real_data, says};
 
-    fn read(bytes: Vec<u8>) -> Result<Vec<ScanGraphNode>, IoError> {
+    fn read(bytes: Vec<u8>) -> Result<Vec<ScanGraphNode>> {
         parse_scan_graph(Input::from_reader(std::io::Cursor::new(bytes), "a.graph".as_ref())?)
     }
 
@@ -143,16 +143,11 @@ mod tests {
 
     #[test]
     fn errors_name_the_place_and_no_bytes_make_it_panic() {
-        let error = read(one_scan()[..20].to_vec()).unwrap_err().to_string();
-        assert!(error.contains("a.graph: byte 12: a point is 8 bytes; it takes 24"), "{error}");
+        says(read(one_scan()[..20].to_vec()), "a.graph: byte 12: a point is 8 bytes; it takes 24");
         let mut wrong = one_scan();
         wrong[8] = 9;
-        assert!(
-            read(wrong).unwrap_err().to_string().contains("byte 8: a point is 9 numbers; 3 are expected")
-        );
-        for bytes in bad_bytes(&one_scan(), 3, 3000) {
-            let _ = read(bytes);
-        }
+        says(read(wrong), "byte 8: a point is 9 numbers; 3 are expected");
+        no_panic(&one_scan(), 3, 3000, read);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::path::Path;
 use portolan::geom::Aabb;
 
 use crate::geojson::check_finite;
-use crate::{IoError, Polyline, write_atomic};
+use crate::{Polyline, Result, write_atomic};
 
 /// How a contour is drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,8 +38,8 @@ const FAR: f64 = 10_000.0;
 /// relative to the point in the attribute `data-origin`.
 ///
 /// # Errors
-/// [`IoError::Unwritable`] for a coordinate that is not finite, else as [`write_atomic`].
-pub fn write_svg(path: impl AsRef<Path>, lines: &[Polyline], style: &SvgStyle) -> Result<(), IoError> {
+/// [`crate::IoError::Unwritable`] for a coordinate that is not finite, else as [`write_atomic`].
+pub fn write_svg(path: impl AsRef<Path>, lines: &[Polyline], style: &SvgStyle) -> Result<()> {
     let path = path.as_ref();
     check_finite(path, lines)?;
     let mut bounds = Aabb::<2>::EMPTY;
@@ -93,10 +93,8 @@ mod tests {
     use super::*;
 
     fn svg(lines: &[Polyline]) -> String {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("c.svg");
-        write_svg(&path, lines, &SvgStyle { margin: 1.0, ..SvgStyle::default() }).unwrap();
-        std::fs::read_to_string(path).unwrap()
+        let style = SvgStyle { margin: 1.0, ..SvgStyle::default() };
+        String::from_utf8(crate::testing::written(|path| write_svg(path, lines, &style))).unwrap()
     }
 
     #[test]

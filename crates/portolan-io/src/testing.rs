@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use crate::Result;
+
 /// SplitMix64 *(Steele, Lea, Flood 2014)*.
 pub(crate) struct Random(pub(crate) u64);
 
@@ -55,6 +57,41 @@ pub(crate) fn bad_bytes(good: &[u8], seed: u64, count: usize) -> Vec<Vec<u8>> {
     all
 }
 
+/// Reads variants of a good file: none may make it panic, and errors are of one line.
+pub(crate) fn no_panic<T>(
+    good: impl AsRef<[u8]>,
+    seed: u64,
+    count: usize,
+    read: impl Fn(Vec<u8>) -> Result<T>,
+) {
+    for bytes in bad_bytes(good.as_ref(), seed, count) {
+        if let Err(e) = read(bytes) {
+            assert!(!e.to_string().contains('\n'), "{e}");
+        }
+    }
+}
+
+/// A folder that goes when it is dropped, and the path of a file in it.
+pub(crate) fn temporary(name: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    (folder, path)
+}
+
+/// The bytes that a writer makes.
+pub(crate) fn written(write: impl FnOnce(&Path) -> Result<()>) -> Vec<u8> {
+    let (_folder, path) = temporary("file");
+    write(&path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+/// Asserts an error of one line that has this part.
+#[track_caller]
+pub(crate) fn says<T>(result: Result<T>, part: &str) {
+    let error = result.err().unwrap().to_string();
+    assert!(error.contains(part) && !error.contains('\n'), "{error}");
+}
+
 /// A file of the real data, or `None` with a loud line where it is not there.
 pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("PORTOLAN_DATA").map(PathBuf::from);
@@ -63,14 +100,13 @@ pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    // Not `eprintln!`, which the test harness swallows: a skipped test must be seen.
-    let shown = path.display();
-    writeln!(
-        std::io::stderr(),
-        "SKIPPED: {shown} is not there (set PORTOLAN_DATA to the folder of real data)"
-    )
-    .unwrap();
+    skipped(&format!("{} is not there (set PORTOLAN_DATA to the folder of real data)", path.display()));
     None
+}
+
+/// Says that a test was skipped. Not by `eprintln!`, which the test harness swallows: it must be seen.
+fn skipped(why: &str) {
+    writeln!(std::io::stderr(), "SKIPPED: {why}").unwrap();
 }
 
 /// A Python with a package.
@@ -85,11 +121,7 @@ pub(crate) fn python(package: &str) -> Option<Python> {
         return Some(python);
     }
     let shown = python.0.display();
-    writeln!(
-        std::io::stderr(),
-        "SKIPPED: {shown} has no {package} (set PORTOLAN_PYTHON to a Python that has)"
-    )
-    .unwrap();
+    skipped(&format!("{shown} has no {package} (set PORTOLAN_PYTHON to a Python that has)"));
     None
 }
 

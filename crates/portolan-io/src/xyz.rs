@@ -12,10 +12,10 @@
 
 use std::path::Path;
 
-use crate::IoError;
 use crate::bytes::{Input, Lines, Scalar, open, parse_f64};
 use crate::error::shown;
-use crate::points::{CloudBuilder, PointCloudFile, channel, is_time};
+use crate::points::{CloudBuilder, PointCloudFile, PointFields, is_time};
+use crate::{IoError, Result};
 
 /// The most columns of a line.
 const MOST_COLUMNS: usize = 64;
@@ -27,19 +27,17 @@ const MOST_POINTS: usize = 1 << 30;
 /// # Errors
 /// [`IoError::Text`] for a line that is not a point, for lines with different numbers of columns, and for a file without
 /// points. `nan` is a number: such points are refused and counted.
-pub fn read_xyz(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+pub fn read_xyz(path: impl AsRef<Path>) -> Result<PointCloudFile> {
     parse(open(path)?)
 }
 
-pub(crate) fn parse(input: Input) -> Result<PointCloudFile, IoError> {
+pub(crate) fn parse(input: Input) -> Result<PointCloudFile> {
     let mut lines = Lines::of(input);
     let path = lines.path().to_owned();
     let mut builder = CloudBuilder::new(true);
     let mut columns: Option<Columns> = None;
     let (mut row, mut first) = (0, true);
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         // A header may be a comment: "//X,Y,Z" is what CloudCompare writes.
         let (content, comment) = split_comment(line);
         let content = if first && content.is_empty() { comment } else { content };
@@ -81,18 +79,17 @@ pub(crate) fn parse(input: Input) -> Result<PointCloudFile, IoError> {
             None => columns.insert(Columns::guessed(values).ok_or_else(|| {
                 let advice =
                     "write 3 (x y z), 4 (x y z intensity), 6 (x y z r g b) or 7, or a first line of names";
-                IoError::text(&path, number, "the number of columns", count.to_string(), advice)
+                IoError::text(&path, number, "the number of columns", count, advice)
             })?),
         };
         if count != columns.count {
             let advice = format!("write {} as above", columns.count);
-            return Err(IoError::text(&path, number, "the number of columns", count.to_string(), advice));
+            return Err(IoError::text(&path, number, "the number of columns", count, advice));
         }
-        if row == MOST_POINTS {
-            let value = format!("more than {MOST_POINTS}");
-            return Err(IoError::text(&path, number, "the number of points", value, "split the file"));
-        }
-        columns.push(&mut builder, row, values);
+        IoError::unless_full(&path, number, row, MOST_POINTS, "points", "file")?;
+        // Colors are bytes, and times seconds.
+        let scalar = |k| if columns.fields.time == Some(k) { Scalar::F64 } else { Scalar::U8 };
+        builder.push_fields(row, &columns.fields, |k| (values[k], scalar(k)));
         row += 1;
     }
     if row == 0 {
@@ -133,23 +130,12 @@ fn words(content: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// Which column holds what.
-#[derive(Clone, Debug, PartialEq)]
 struct Columns {
     count: usize,
-    position: [usize; 3],
-    intensity: Option<usize>,
-    color: Option<[usize; 3]>,
-    normal: Option<[usize; 3]>,
-    ring: Option<usize>,
-    time: Option<usize>,
+    fields: PointFields<usize>,
 }
 
 impl Columns {
-    fn plain(count: usize) -> Self {
-        let position = [0, 1, 2];
-        Self { count, position, intensity: None, color: None, normal: None, ring: None, time: None }
-    }
-
     /// From a line of names; `None` where it does not name x, y and z.
     fn named(content: &[u8]) -> Option<Self> {
         let names: Vec<String> = words(content)
@@ -157,60 +143,39 @@ impl Columns {
             .collect();
         let find = |wanted: &[&str]| names.iter().position(|n| wanted.contains(&n.as_str()));
         let three = |a: &[&str], b: &[&str], c: &[&str]| Some([find(a)?, find(b)?, find(c)?]);
-        Some(Self {
+        let fields = PointFields {
             position: three(&["x"], &["y"], &["z"])?,
             intensity: find(&["intensity", "i", "reflectivity", "reflectance", "scalar_intensity"]),
             color: three(&["r", "red"], &["g", "green"], &["b", "blue"]),
             normal: three(&["nx", "normal_x"], &["ny", "normal_y"], &["nz", "normal_z"]),
             ring: find(&["ring"]),
             time: names.iter().position(|n| is_time(n)),
-            count: names.len(),
-        })
+        };
+        Some(Self { count: names.len(), fields })
     }
 
     /// From the first line of numbers.
     fn guessed(values: &[f64]) -> Option<Self> {
-        let plain = Self::plain(values.len());
         let bytes = |v: &[f64]| v.iter().all(|v| v.fract() == 0.0 && (0.0..=255.0).contains(v));
-        Some(match values.len() {
-            3 => plain,
-            4 => Self { intensity: Some(3), ..plain },
-            6 if bytes(&values[3..]) => Self { color: Some([3, 4, 5]), ..plain },
-            6 => Self { normal: Some([3, 4, 5]), ..plain },
-            7 => Self { intensity: Some(3), color: Some([4, 5, 6]), ..plain },
+        let (intensity, color, normal) = match values.len() {
+            3 => (None, None, None),
+            4 => (Some(3), None, None),
+            6 if bytes(&values[3..]) => (None, Some([3, 4, 5]), None),
+            6 => (None, None, Some([3, 4, 5])),
+            7 => (Some(3), Some([4, 5, 6]), None),
             _ => return None,
-        })
-    }
-
-    fn push(&self, builder: &mut CloudBuilder, row: usize, values: &[f64]) {
-        if !builder.push(row, self.position.map(|k| values[k])) {
-            return;
-        }
-        let cloud = &mut builder.cloud;
-        if let Some(k) = self.intensity {
-            cloud.intensity.push(values[k] as f32);
-        }
-        if let Some(columns) = self.color {
-            cloud.colors.push(columns.map(|k| channel(values[k], Scalar::U8)));
-        }
-        if let Some(columns) = self.normal {
-            cloud.normals.push(columns.map(|k| values[k] as f32));
-        }
-        if let Some(k) = self.ring {
-            cloud.rings.push(values[k] as u16);
-        }
-        if let Some(k) = self.time {
-            builder.times.push(values[k]);
-        }
+        };
+        let fields = PointFields { position: [0, 1, 2], intensity, color, normal, ring: None, time: None };
+        Some(Self { count: values.len(), fields })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{no_panic, real_data, says};
 
-    fn read(text: impl Into<Vec<u8>>) -> Result<PointCloudFile, IoError> {
+    fn read(text: impl Into<Vec<u8>>) -> Result<PointCloudFile> {
         parse(Input::from_reader(std::io::Cursor::new(text.into()), "a.xyz".as_ref())?)
     }
 
@@ -250,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_place() {
+    fn errors_name_the_place_and_no_bytes_make_it_panic() {
         for (text, part) in [
             ("1 2 3\n1 2\n", "a.xyz: line 2: the number of columns is 2; write 3 as above"),
             ("1 2\n", "line 1: the number of columns is 2; write 3 (x y z)"),
@@ -259,16 +224,9 @@ mod tests {
             ("lon lat h\n1 2 3\n", "line 1: column 1 is \"lon\""),
             ("# nothing\n", "the number of points is 0"),
         ] {
-            let error = read(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(read(text), part);
         }
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
-        for bytes in bad_bytes(b"x,y,z,r,g,b\n1,2,3,4,5,6\n#c\n7,8,9,1,2,3\n", 17, 3000) {
-            let _ = read(bytes);
-        }
+        no_panic(b"x,y,z,r,g,b\n1,2,3,4,5,6\n#c\n7,8,9,1,2,3\n", 17, 3000, read);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::IoError;
+use crate::{IoError, Result};
 
 /// Removes the temporary file unless it was renamed.
 struct Temporary(Option<PathBuf>);
@@ -30,16 +30,13 @@ impl Drop for Temporary {
 pub fn write_atomic(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), IoError> {
+) -> Result<()> {
     let mut write = Some(write);
     // Not generic from here on: compiled once, not once for each thing that is written.
     replace(path.as_ref(), &mut |file| write.take().map_or(Ok(()), |write| write(file)))
 }
 
-fn replace(
-    path: &Path,
-    write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), IoError> {
+fn replace(path: &Path, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
     let failed = |e| IoError::os(path, "write it", e);
     // Through a symbolic link the file behind it is replaced, not the link.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -52,12 +49,8 @@ fn replace(
         _ => {}
     }
     let Some(name) = target.file_name() else {
-        return Err(IoError::unwritable(
-            path,
-            "the file name",
-            "missing",
-            "name a file in an existing folder",
-        ));
+        let advice = "name a file in an existing folder";
+        return Err(IoError::unwritable(path, "the file name", "missing", advice));
     };
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let unique = format!(".{}.{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
@@ -82,6 +75,7 @@ fn finish(file: File, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{says, temporary};
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).unwrap();
@@ -90,14 +84,13 @@ mod tests {
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.bin");
+        let (folder, path) = temporary("map.bin");
         write_atomic(&path, |w| w.write_all(b"old")).unwrap();
         let failed = write_atomic(&path, |w| {
             w.write_all(&[0; 1 << 20])?;
             Err(io::Error::other("disk on fire"))
         });
-        assert!(failed.unwrap_err().to_string().contains("map.bin: cannot write it: disk on fire"));
+        says(failed, "map.bin: cannot write it: disk on fire");
         assert_eq!(
             (fs::read(&path).unwrap(), names(folder.path())),
             (b"old".to_vec(), vec!["map.bin".into()])

@@ -4,7 +4,7 @@ use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 
 use super::{Compression, Input, read_failed};
-use crate::IoError;
+use crate::{IoError, Result};
 
 /// The longest line that any text format here may have (bytes).
 const LONGEST_LINE: usize = 4 << 20;
@@ -42,8 +42,14 @@ impl<R: BufRead> Lines<R> {
         self.number
     }
 
+    /// The number of the next line, and the line.
+    pub(crate) fn next_numbered(&mut self) -> Result<Option<(u64, &[u8])>> {
+        let number = self.number + 1;
+        Ok(self.next_line()?.map(|line| (number, line)))
+    }
+
     /// The next line without its end, `None` at the end of the file.
-    pub(crate) fn next_line(&mut self) -> Result<Option<&[u8]>, IoError> {
+    pub(crate) fn next_line(&mut self) -> Result<Option<&[u8]>> {
         self.line.clear();
         let limit = LONGEST_LINE as u64 + 2;
         let read = self.reader.by_ref().take(limit).read_until(b'\n', &mut self.line);
@@ -60,13 +66,8 @@ impl<R: BufRead> Lines<R> {
         }
         if self.line.len() > LONGEST_LINE {
             let value = format!("longer than {LONGEST_LINE} bytes");
-            return Err(IoError::text(
-                &self.path,
-                self.number,
-                "the line",
-                value,
-                "check that this is a text file",
-            ));
+            let advice = "check that this is a text file";
+            return Err(IoError::text(&self.path, self.number, "the line", value, advice));
         }
         Ok(Some(&self.line))
     }
@@ -75,6 +76,7 @@ impl<R: BufRead> Lines<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::says;
 
     #[test]
     fn ends_of_lines_are_dropped_and_long_lines_refused() {
@@ -86,6 +88,6 @@ mod tests {
         assert_eq!(lines.number(), 3);
         let long = vec![b'z'; 3 * LONGEST_LINE];
         let mut lines = Lines::plain(&long[..], Path::new("x"));
-        assert!(lines.next_line().unwrap_err().to_string().contains("x: line 1: the line is longer than"));
+        says(lines.next_line(), "x: line 1: the line is longer than");
     }
 }

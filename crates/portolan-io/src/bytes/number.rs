@@ -5,6 +5,35 @@ pub(crate) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty())
 }
 
+/// The numbers of a line before its comment, at most `N` of them, and how many; `Err` is the word that is none and its column.
+pub(crate) fn columns<const N: usize>(
+    line: &[u8],
+    separates: impl Fn(u8) -> bool,
+    number: impl Fn(&[u8]) -> Option<f64>,
+) -> Result<([f64; N], usize), (&[u8], String)> {
+    let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
+    let words = content.split(|b| b.is_ascii_whitespace() || separates(*b));
+    let (mut values, mut count) = ([0.0; N], 0);
+    for word in words.filter(|w| !w.is_empty()).take(N) {
+        values[count] = number(word).ok_or_else(|| (word, format!("column {}", count + 1)))?;
+        count += 1;
+    }
+    Ok((values, count))
+}
+
+/// The whole number that a word spells.
+pub(crate) fn whole<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// The line of a header that begins at `at`, which moves behind it; `None` where none ends within 64 KiB.
+pub(crate) fn header_line<'a>(bytes: &'a [u8], at: &mut usize) -> Option<&'a [u8]> {
+    let length = bytes[*at..].iter().take(1 << 16).position(|b| *b == b'\n')?;
+    let line = &bytes[*at..*at + length];
+    *at += length + 1;
+    Some(line)
+}
+
 const POWERS_OF_TEN: [f64; 19] =
     [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18];
 
@@ -42,7 +71,7 @@ pub(crate) fn parse_f64(word: &[u8]) -> Option<f64> {
 
 #[cold]
 fn slow(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
+    whole(word)
 }
 
 #[cfg(test)]

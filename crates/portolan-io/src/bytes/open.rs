@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use crate::IoError;
+use crate::{IoError, Result};
 
 /// So many bytes come with the first [`BufRead::fill_buf`] of any input, where it has them: enough to find its format.
 const HEAD: u64 = 64;
@@ -52,7 +52,7 @@ impl Input {
     ///
     /// # Errors
     /// [`IoError::Os`] where the first bytes cannot be read.
-    pub fn from_reader(reader: impl Read + 'static, name: &Path) -> Result<Self, IoError> {
+    pub fn from_reader(reader: impl Read + 'static, name: &Path) -> Result<Self> {
         let mut reader = BufReader::with_capacity(1 << 16, reader);
         let mut head = Vec::with_capacity(HEAD as usize);
         // A pipe may deliver byte by byte, so the magic is read, not peeked.
@@ -85,7 +85,7 @@ impl Input {
     ///
     /// # Errors
     /// [`IoError::Compression`] or [`IoError::Os`] where reading fails.
-    pub fn read_up_to(&mut self, limit: u64) -> Result<Vec<u8>, IoError> {
+    pub fn read_up_to(&mut self, limit: u64) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let result = self.reader.by_ref().take(limit).read_to_end(&mut bytes);
         match result {
@@ -98,7 +98,7 @@ impl Input {
     ///
     /// # Errors
     /// As [`Input::read_up_to`], and [`IoError::Binary`] for a content of more than `limit` bytes.
-    pub fn read_all(&mut self, limit: u64) -> Result<Vec<u8>, IoError> {
+    pub fn read_all(&mut self, limit: u64) -> Result<Vec<u8>> {
         let bytes = self.read_up_to(limit.saturating_add(1))?;
         if bytes.len() as u64 > limit {
             let value = format!("more than {limit} bytes");
@@ -128,13 +128,13 @@ impl BufRead for Input {
 ///
 /// # Errors
 /// [`IoError::IsFolder`] for a folder, [`IoError::Os`] where the file cannot be opened or read.
-pub fn open(path: impl AsRef<Path>) -> Result<Input, IoError> {
+pub fn open(path: impl AsRef<Path>) -> Result<Input> {
     let path = path.as_ref();
     Input::from_reader(open_file(path)?, path)
 }
 
 /// Opens a file as it is.
-pub(crate) fn open_file(path: &Path) -> Result<File, IoError> {
+pub(crate) fn open_file(path: &Path) -> Result<File> {
     let file = File::open(path).map_err(|e| IoError::os(path, "open it", e))?;
     let about = file.metadata().map_err(|e| IoError::os(path, "read its metadata", e))?;
     if about.is_dir() {
@@ -160,6 +160,7 @@ pub(crate) fn read_failed(path: &Path, compression: Compression, offset: u64, ca
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::says;
     use std::io::Write;
 
     fn gz(bytes: &[u8]) -> Vec<u8> {
@@ -174,7 +175,7 @@ mod tests {
         w.finish().unwrap()
     }
 
-    fn unpack(bytes: Vec<u8>) -> Result<Vec<u8>, IoError> {
+    fn unpack(bytes: Vec<u8>) -> Result<Vec<u8>> {
         Input::from_reader(io::Cursor::new(bytes), Path::new("x"))?.read_all(1 << 24)
     }
 
@@ -220,7 +221,7 @@ mod tests {
     fn bombs_stop_at_the_limit() {
         let bomb = gz(&vec![b'a'; 20 << 20]);
         let error = Input::from_reader(io::Cursor::new(bomb), Path::new("x")).unwrap().read_all(1 << 20);
-        assert!(error.unwrap_err().to_string().contains("more than 1048576 bytes"));
+        says(error, "more than 1048576 bytes");
     }
 
     #[test]

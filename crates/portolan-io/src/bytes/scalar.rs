@@ -65,6 +65,16 @@ impl Scalar {
     }
 }
 
+/// The little-endian number at a place of bytes that are there.
+pub(crate) fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
+}
+
+/// See [`u32_at`].
+pub(crate) fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

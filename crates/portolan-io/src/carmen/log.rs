@@ -7,8 +7,8 @@ use portolan::scan::{RangeLimits, Scan};
 
 use super::reading::Reading;
 use super::stats::CarmenStats;
-use crate::IoError;
 use crate::bytes::{Input, Lines, open};
+use crate::{IoError, Result};
 
 /// Bearings that scans share, with their unit vectors.
 #[derive(Clone, Debug)]
@@ -80,7 +80,7 @@ impl CarmenLog {
     ///
     /// # Errors
     /// See [`CarmenLog::parse`] and [`open`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         Self::parse(open(path)?)
     }
 
@@ -89,8 +89,8 @@ impl CarmenLog {
     /// # Errors
     /// [`IoError::NoScans`] where no line is a usable scan, [`IoError::Text`] for a line longer than 4 MiB or
     /// a log that would need gigabytes, and the errors of reading.
-    pub fn parse(input: Input) -> Result<Self, IoError> {
-        Reading::new().run(Lines::of(input))
+    pub fn parse(input: Input) -> Result<Self> {
+        Reading::default().run(Lines::of(input))
     }
 
     /// The file that the log comes from.
@@ -134,7 +134,7 @@ impl CarmenLog {
     ///
     /// # Errors
     /// [`IoError::Unwritable`] where the numbers of poses and scans differ.
-    pub fn with_poses(mut self, world_from_laser: &[Pose<2>]) -> Result<Self, IoError> {
+    pub fn with_poses(mut self, world_from_laser: &[Pose<2>]) -> Result<Self> {
         if world_from_laser.len() != self.len() {
             let advice = format!("give one pose for each of the {} scans of the log", self.len());
             let value = world_from_laser.len().to_string();

@@ -52,65 +52,13 @@ pub(super) fn parse_scan(
     let before = readings.len();
     let mut words = Words { words: fields(rest), message };
     let head = match message {
-        ScanMessage::Flaser => flaser(&mut words, readings),
-        ScanMessage::RobotLaser1 => robot_laser(&mut words, readings),
+        ScanMessage::Flaser => words.flaser(readings),
+        ScanMessage::RobotLaser1 => words.robot_laser(readings),
     };
     if head.is_err() {
         readings.truncate(before);
     }
     head
-}
-
-fn flaser<'a>(
-    words: &mut Words<impl Iterator<Item = &'a [u8]>>,
-    readings: &mut Vec<f64>,
-) -> Result<ScanHead, Refusal> {
-    let beams = words.beams()?;
-    words.readings(beams, readings)?;
-    let pose = words.pose("x y theta")?;
-    for _ in 0..3 {
-        words.number("odometry pose")?;
-    }
-    let time = words.tail()?;
-    Ok(ScanHead { fan: FanShape::flaser(beams), pose, time, max_range: None })
-}
-
-fn robot_laser<'a>(
-    words: &mut Words<impl Iterator<Item = &'a [u8]>>,
-    readings: &mut Vec<f64>,
-) -> Result<ScanHead, Refusal> {
-    words.number("laser_type")?;
-    let start = words.number("start_angle")?;
-    words.number("field_of_view")?;
-    let step = words.number("angular_resolution")?;
-    let max_range = words.number("maximum_range")?;
-    words.number("accuracy")?;
-    words.number("remission_mode")?;
-    let beams = words.beams()?;
-    let fan = FanShape { start, step, beams };
-    // A single beam needs no resolution; more than a turn (and some rounding) is not a 2-D fan.
-    let turns = step * (beams - 1) as f64 / TAU;
-    if !(start.abs() <= 2.0 * TAU && step.is_finite() && (beams == 1 || (step > 0.0 && turns <= 1.01))) {
-        let text =
-            format!("ROBOTLASER1 has start_angle {start} and angular_resolution {step} for {beams} beams");
-        return Err((ScanFault::BadFan, text));
-    }
-    words.readings(beams, readings)?;
-    let remissions = words.count("the number of remissions")?;
-    if remissions > MOST_BEAMS {
-        let text = format!("ROBOTLASER1 announces {remissions} remissions, more than {MOST_BEAMS}");
-        return Err((ScanFault::TooManyBeams, text));
-    }
-    for _ in 0..remissions {
-        words.number("remission")?;
-    }
-    let pose = words.pose("laser_x laser_y laser_theta")?;
-    for _ in 0..8 {
-        words.number("robot pose, velocities, safety distances and turn axis")?;
-    }
-    let time = words.tail()?;
-    let max_range = (max_range.is_finite() && max_range > 0.0).then_some(max_range);
-    Ok(ScanHead { fan, pose, time, max_range })
 }
 
 /// The words of a scan line that were not read yet.
@@ -120,6 +68,53 @@ struct Words<I> {
 }
 
 impl<'a, I: Iterator<Item = &'a [u8]>> Words<I> {
+    fn flaser(&mut self, readings: &mut Vec<f64>) -> Result<ScanHead, Refusal> {
+        let beams = self.beams()?;
+        self.readings(beams, readings)?;
+        let pose = self.pose("x y theta")?;
+        for _ in 0..3 {
+            self.number("odometry pose")?;
+        }
+        let time = self.tail()?;
+        Ok(ScanHead { fan: FanShape::flaser(beams), pose, time, max_range: None })
+    }
+
+    fn robot_laser(&mut self, readings: &mut Vec<f64>) -> Result<ScanHead, Refusal> {
+        self.number("laser_type")?;
+        let start = self.number("start_angle")?;
+        self.number("field_of_view")?;
+        let step = self.number("angular_resolution")?;
+        let max_range = self.number("maximum_range")?;
+        self.number("accuracy")?;
+        self.number("remission_mode")?;
+        let beams = self.beams()?;
+        let fan = FanShape { start, step, beams };
+        // A single beam needs no resolution; more than a turn (and some rounding) is not a 2-D fan.
+        let turns = step * (beams - 1) as f64 / TAU;
+        if !(start.abs() <= 2.0 * TAU && step.is_finite() && (beams == 1 || (step > 0.0 && turns <= 1.01))) {
+            let text = format!(
+                "ROBOTLASER1 has start_angle {start} and angular_resolution {step} for {beams} beams"
+            );
+            return Err((ScanFault::BadFan, text));
+        }
+        self.readings(beams, readings)?;
+        let remissions = self.count("the number of remissions")?;
+        if remissions > MOST_BEAMS {
+            let text = format!("ROBOTLASER1 announces {remissions} remissions, more than {MOST_BEAMS}");
+            return Err((ScanFault::TooManyBeams, text));
+        }
+        for _ in 0..remissions {
+            self.number("remission")?;
+        }
+        let pose = self.pose("laser_x laser_y laser_theta")?;
+        for _ in 0..8 {
+            self.number("robot pose, velocities, safety distances and turn axis")?;
+        }
+        let time = self.tail()?;
+        let max_range = (max_range.is_finite() && max_range > 0.0).then_some(max_range);
+        Ok(ScanHead { fan, pose, time, max_range })
+    }
+
     #[inline(always)]
     fn number(&mut self, field: &str) -> Result<f64, Refusal> {
         match self.words.next() {

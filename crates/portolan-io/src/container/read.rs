@@ -1,15 +1,16 @@
 //! Reading a container.
 
 use std::collections::HashSet;
+use std::fmt::Display;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::{
     ContainerWriter, ENTRY, HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_of,
 };
-use crate::IoError;
-use crate::bytes::open_file;
+use crate::bytes::{open_file, u32_at, u64_at};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 /// A chunk as the index lists it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +40,7 @@ impl Container {
     ///
     /// # Errors
     /// As [`Container::from_reader`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Self::from_reader(open_file(path)?, path)
     }
@@ -48,7 +49,7 @@ impl Container {
     ///
     /// # Errors
     /// [`IoError::Os`] where reading fails, and as [`Container::parse`].
-    pub fn from_reader(mut reader: impl Read, name: &Path) -> Result<Self, IoError> {
+    pub fn from_reader(mut reader: impl Read, name: &Path) -> Result<Self> {
         let failed = |e| IoError::os(name, "read it", e);
         let mut bytes = Vec::new();
         // Sources of another kind may be huge: the header is checked first.
@@ -62,18 +63,12 @@ impl Container {
     ///
     /// # Errors
     /// [`IoError::Binary`] where header or index are damaged or claim what cannot be.
-    pub fn parse(bytes: Vec<u8>, name: &Path) -> Result<Self, IoError> {
+    pub fn parse(bytes: Vec<u8>, name: &Path) -> Result<Self> {
         let header = Header::of(&bytes, name)?;
         let index = usize::try_from(header.index).ok().filter(|&at| (HEADER..=bytes.len()).contains(&at));
         let Some(index) = index else {
             let advice = format!("the file has {} bytes: it is cut off", bytes.len());
-            return Err(IoError::binary(
-                name,
-                16,
-                "the position of the index",
-                header.index.to_string(),
-                advice,
-            ));
+            return Err(IoError::binary(name, 16, "the position of the index", header.index, advice));
         };
         if crc32c::crc32c(&bytes[index..]) != header.index_crc {
             let advice = "the file is cut off or damaged: copy it again";
@@ -97,14 +92,9 @@ impl Container {
     ///
     /// # Errors
     /// As [`Container::unpack`].
-    pub fn get(&self, tag: &str, name: &str) -> Result<Option<Vec<u8>>, IoError> {
+    pub fn get(&self, tag: &str, name: &str) -> Result<Option<Vec<u8>>> {
         let chunk = self.chunks.iter().find(|c| c.tag == tag && c.name == name);
         chunk.map(|c| self.unpack(c)).transpose()
-    }
-
-    /// The chunks with this tag, in the order of the file.
-    pub fn tagged<'a>(&'a self, tag: &'a str) -> impl Iterator<Item = &'a Chunk> + 'a {
-        self.chunks.iter().filter(move |c| c.tag == tag)
     }
 
     /// The content of one of [`Container::chunks`]. Memory grows as it is unpacked, and no farther than the
@@ -112,9 +102,9 @@ impl Container {
     ///
     /// # Errors
     /// [`IoError::Binary`] where the chunk is damaged or not as long as announced.
-    pub fn unpack(&self, chunk: &Chunk) -> Result<Vec<u8>, IoError> {
+    pub fn unpack(&self, chunk: &Chunk) -> Result<Vec<u8>> {
         let bad = |value: String, advice: &str| {
-            let field = format!("chunk {} {}", chunk.tag, shown(chunk.name.as_bytes()));
+            let field = format!("chunk {} {}", chunk.tag, shown(&chunk.name));
             Err(IoError::binary(&self.path, chunk.position as u64, field, value, advice))
         };
         let stored = self.stored(chunk);
@@ -145,7 +135,7 @@ impl Container {
     ///
     /// # Errors
     /// [`IoError::Unwritable`] in principle only: what was read can be written.
-    pub fn writer(&self, mut keep: impl FnMut(&Chunk) -> bool) -> Result<ContainerWriter, IoError> {
+    pub fn writer(&self, mut keep: impl FnMut(&Chunk) -> bool) -> Result<ContainerWriter> {
         let mut writer = ContainerWriter::new();
         for chunk in self.chunks.iter().filter(|c| keep(c)) {
             writer.stored_chunk(&chunk.tag, &chunk.name, chunk.length, self.stored(chunk))?;
@@ -161,99 +151,70 @@ struct Header {
 }
 
 impl Header {
-    fn of(bytes: &[u8], path: &Path) -> Result<Self, IoError> {
-        let bad = |at, field: &str, value: String, advice: &str| {
+    fn of(bytes: &[u8], path: &Path) -> Result<Self> {
+        let bad = |at, field: &str, value: &dyn Display, advice: &str| {
             Err(IoError::binary(path, at, field, value, advice))
         };
         let magic = &bytes[..bytes.len().min(8)];
         if magic != MAGIC {
-            return bad(0, "the magic", shown(magic), "give a map.portolan: it starts with PORTOLAN");
+            return bad(0, "the magic", &shown(magic), "give a map.portolan: it starts with PORTOLAN");
         }
         if bytes.len() < HEADER {
-            return bad(
-                8,
-                "the header",
-                format!("{} bytes", bytes.len()),
-                "the file is cut off: copy it again",
-            );
+            let advice = "the file is cut off: copy it again";
+            return bad(8, "the header", &format!("{} bytes", bytes.len()), advice);
         }
         let version = u32_at(bytes, 8);
         if version != VERSION {
-            return bad(
-                8,
-                "the version",
-                version.to_string(),
-                "this program reads version 1; use a newer one",
-            );
+            return bad(8, "the version", &version, "this program reads version 1; use a newer one");
         }
         if crc32c::crc32c(&bytes[..28]) != u32_at(bytes, 28) {
-            return bad(
-                28,
-                "the checksum of the header",
-                "wrong".into(),
-                "the file is damaged: copy it again",
-            );
+            return bad(28, "the checksum of the header", &"wrong", "the file is damaged: copy it again");
         }
         Ok(Self { count: u32_at(bytes, 12), index: u64_at(bytes, 16), index_crc: u32_at(bytes, 24) })
     }
 }
 
-fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chunk>, IoError> {
+fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chunk>> {
     let mut chunks = Vec::new();
     let mut names = HashSet::new();
     let (mut at, mut position) = (index, HEADER);
     if count as usize > MOST_CHUNKS {
         let advice = "a container has at most 2^20 chunks: the file is damaged";
-        return Err(IoError::binary(path, 12, "the number of chunks", count.to_string(), advice));
+        return Err(IoError::binary(path, 12, "the number of chunks", count, advice));
     }
     for _ in 0..count {
-        let bad = |offset: usize, field: &str, value: String, advice: &str| {
+        let bad = |offset: usize, field: &str, value: &dyn Display, advice: &str| {
             Err(IoError::binary(path, (at + offset) as u64, field, value, advice))
         };
         let Some(entry) = bytes.get(at..at + ENTRY) else {
-            return bad(
-                0,
-                "the index",
-                format!("{} entries", chunks.len()),
-                "the header announces more: the file is cut off",
-            );
+            let advice = "the header announces more: the file is cut off";
+            return bad(0, "the index", &format!("{} entries", chunks.len()), advice);
         };
         let Some(tag) = tag_of(std::array::from_fn(|k| entry[k])) else {
-            return bad(0, "a chunk tag", shown(&entry[..8]), "use 4 to 8 ASCII letters, digits or _");
+            return bad(0, "a chunk tag", &shown(&entry[..8]), "use 4 to 8 ASCII letters, digits or _");
         };
         let [place, stored_length, length] = [8, 16, 24].map(|k| u64_at(entry, k));
         if place != position as u64 {
-            return bad(
-                8,
-                "a chunk position",
-                place.to_string(),
-                "chunks must follow each other without gaps: the file is damaged",
-            );
+            let advice = "chunks must follow each other without gaps: the file is damaged";
+            return bad(8, "a chunk position", &place, advice);
         }
         if stored_length > (index - position) as u64 {
-            return bad(
-                16,
-                "a stored length",
-                stored_length.to_string(),
-                "it reaches beyond the chunks: the file is damaged",
-            );
+            let advice = "it reaches beyond the chunks: the file is damaged";
+            return bad(16, "a stored length", &stored_length, advice);
         }
         if length > LONGEST_CHUNK {
-            return bad(24, "a chunk length", length.to_string(), "chunks have at most 2^30 bytes");
+            return bad(24, "a chunk length", &length, "chunks have at most 2^30 bytes");
         }
         let name_length = u32_at(entry, 36) as usize;
         let name = bytes.get(at + ENTRY..at + ENTRY + name_length.min(LONGEST_NAME + 1));
         let name = name.filter(|n| n.len() <= LONGEST_NAME).and_then(|n| std::str::from_utf8(n).ok());
         let Some(name) = name else {
-            return bad(36, "a chunk name", format!("{name_length} bytes"), "use at most 255 bytes of UTF-8");
+            let advice = "use at most 255 bytes of UTF-8";
+            return bad(36, "a chunk name", &format!("{name_length} bytes"), advice);
         };
         if !names.insert((tag.clone(), name)) {
-            return bad(
-                0,
-                "a chunk name",
-                format!("{tag} {}", shown(name.as_bytes())),
-                "it is there twice: write the file again",
-            );
+            let advice = "it is there twice: write the file again";
+            return bad(0, "a chunk name", &format!("{tag} {}", shown(name)), advice);
         }
         let crc = u32_at(entry, 32);
         chunks.push(Chunk { tag, name: name.to_owned(), length, stored_length, position, crc });
@@ -267,18 +228,10 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
     Ok(chunks)
 }
 
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
-}
-
-fn u64_at(bytes: &[u8], at: usize) -> u64 {
-    u64::from_le_bytes(std::array::from_fn(|k| bytes[at + k]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Random, bad_bytes};
+    use crate::testing::{Random, bad_bytes, says, temporary};
 
     fn sample() -> Vec<u8> {
         let mut writer = ContainerWriter::new();
@@ -288,7 +241,7 @@ mod tests {
         writer.to_bytes()
     }
 
-    fn parse(bytes: &[u8]) -> Result<Container, IoError> {
+    fn parse(bytes: &[u8]) -> Result<Container> {
         Container::parse(bytes.to_vec(), "m.portolan".as_ref())
     }
 
@@ -311,8 +264,7 @@ mod tests {
 
     #[test]
     fn round_trips_and_is_deterministic() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.portolan");
+        let (_folder, path) = temporary("map.portolan");
         let mut random = Random(1);
         let noise: Vec<u8> = (0..300_000).map(|_| random.next() as u8).collect();
         let mut writer = ContainerWriter::new();
@@ -323,7 +275,10 @@ mod tests {
         assert_eq!(container.get("NOISE", "a").unwrap().unwrap(), noise);
         assert_eq!(container.get("ZERO", "b").unwrap().unwrap(), vec![0; 3 << 20]);
         assert_eq!(container.get("ZERO", "c").unwrap(), None);
-        assert_eq!((container.tagged("ZERO").count(), container.chunks()[1].length), (1, 3 << 20));
+        assert_eq!(
+            (container.chunks().iter().filter(|c| c.tag == "ZERO").count(), container.chunks()[1].length),
+            (1, 3 << 20)
+        );
         assert_eq!(std::fs::read(&path).unwrap(), writer.to_bytes());
         assert_eq!(sample(), sample());
         assert!(parse(&ContainerWriter::new().to_bytes()).unwrap().chunks().is_empty());
@@ -381,7 +336,7 @@ mod tests {
         }
         assert!(writer.chunk("GOOD", &"n".repeat(256), &[]).is_err());
         writer.chunk("GOOD", "n", &[]).unwrap();
-        assert!(writer.chunk("GOOD", "n", &[]).unwrap_err().to_string().contains("used twice"));
+        says(writer.chunk("GOOD", "n", &[]), "used twice");
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! Writing a container.
 
 use std::collections::HashSet;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::Path;
 
 use super::{HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_bytes};
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// zstd's own default: small gains above it, at several times the cost.
 const LEVEL: i32 = 3;
@@ -41,49 +42,30 @@ impl ContainerWriter {
     ///
     /// # Errors
     /// [`IoError::Unwritable`] where one of these does not hold or tag and name were used before.
-    pub fn chunk(&mut self, tag: &str, name: &str, content: &[u8]) -> Result<(), IoError> {
-        let bad = |field: &str, value: String, advice: &str| {
-            Err(IoError::unwritable(unnamed(), field, value, advice))
-        };
+    pub fn chunk(&mut self, tag: &str, name: &str, content: &[u8]) -> Result<()> {
         if content.len() as u64 > LONGEST_CHUNK {
-            return bad(
-                "the chunk length",
-                content.len().to_string(),
-                "spread it over chunks of at most 1 GiB",
-            );
+            return unfit("the chunk length", content.len(), "spread it over chunks of at most 1 GiB");
         }
         match zstd::bulk::compress(content, LEVEL) {
             Ok(stored) => self.stored_chunk(tag, name, content.len() as u64, &stored),
-            Err(e) => bad("the chunk", e.to_string(), "free some memory"),
+            Err(e) => unfit("the chunk", e, "free some memory"),
         }
     }
 
     /// Adds a chunk that is packed already.
-    pub(super) fn stored_chunk(
-        &mut self,
-        tag: &str,
-        name: &str,
-        length: u64,
-        stored: &[u8],
-    ) -> Result<(), IoError> {
-        let bad = |field: &str, value: &str, advice: &str| {
-            Err(IoError::unwritable(unnamed(), field, value, advice))
-        };
+    pub(super) fn stored_chunk(&mut self, tag: &str, name: &str, length: u64, stored: &[u8]) -> Result<()> {
         let Some(tag8) = tag_bytes(tag) else {
-            return bad("the chunk tag", tag, "use 4 to 8 ASCII letters, digits or _");
+            return unfit("the chunk tag", tag, "use 4 to 8 ASCII letters, digits or _");
         };
         if name.len() > LONGEST_NAME {
-            return bad("the chunk name", name, "use at most 255 bytes");
+            return unfit("the chunk name", name, "use at most 255 bytes");
         }
         if self.count as usize == MOST_CHUNKS {
-            return bad("the number of chunks", "2^20", "join some chunks");
+            return unfit("the number of chunks", "2^20", "join some chunks");
         }
         if !self.names.insert((tag8, name.to_owned())) {
-            return bad(
-                "the chunk name",
-                &format!("{tag} {name}, used twice"),
-                "give every chunk its own name",
-            );
+            let value = format!("{tag} {name}, used twice");
+            return unfit("the chunk name", value, "give every chunk its own name");
         }
         let position = (HEADER + self.blocks.len()) as u64;
         self.entries.extend(tag8);
@@ -119,7 +101,7 @@ impl ContainerWriter {
     ///
     /// # Errors
     /// As [`write_atomic`].
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         write_atomic(path, |w| {
             w.write_all(&self.header())?;
             w.write_all(&self.blocks)?;
@@ -129,6 +111,6 @@ impl ContainerWriter {
 }
 
 /// Chunks are checked before the file has a name.
-fn unnamed() -> &'static Path {
-    Path::new("container")
+fn unfit(field: &str, value: impl Display, advice: &str) -> Result<()> {
+    Err(IoError::unwritable(Path::new("container"), field, value, advice))
 }

@@ -6,7 +6,7 @@ use portolan::geom::Pose;
 use portolan::scan::{Frame, Origin};
 
 use super::{LogWriter, matrix_rows};
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// `calib.txt` has placeholders for the projections of four cameras, and `Tr`, which readers need.
 pub(super) fn texts(camera_from_lidar: &Pose<3>) -> Vec<(&'static str, String)> {
@@ -23,29 +23,21 @@ impl LogWriter {
         world_from_camera: &Pose<3>,
         seconds: f64,
         frame: &Frame,
-    ) -> Result<(), IoError> {
+    ) -> Result<()> {
         let path = self.folder.join("velodyne").join(format!("{:06}.bin", self.count));
         let points: Vec<[f32; 3]> = match frame {
             Frame::Image(image) => image.points().map(|(_, p)| p.map(|v| v as f32)).collect(),
             Frame::Points(scan) if scan.origin == Origin::Common([0.0; 3]) => scan.points.clone(),
             Frame::Points(_) => {
                 let advice = "KITTI's rays begin at the origin of the points; move the points and the pose";
-                return Err(IoError::unwritable(
-                    &path,
-                    "the origin of rays",
-                    "not at the origin of the points",
-                    advice,
-                ));
+                let value = "not at the origin of the points";
+                return Err(IoError::unwritable(&path, "the origin of rays", value, advice));
             }
         };
         write_atomic(&path, |out| {
-            for [x, y, z] in points {
-                // Intensity is not simulated.
-                for v in [x, y, z, 0.0] {
-                    out.write_all(&v.to_le_bytes())?;
-                }
-            }
-            Ok(())
+            // Intensity is not simulated.
+            let mut values = points.iter().flat_map(|[x, y, z]| [*x, *y, *z, 0.0]);
+            values.try_for_each(|v| out.write_all(&v.to_le_bytes()))
         })?;
         let pose = matrix_rows(world_from_camera).map(|r| r.join(" ")).join(" ");
         self.text("poses.txt").push_str(&(pose + "\n"));

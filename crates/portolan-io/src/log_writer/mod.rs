@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use portolan::geom::Pose;
 use portolan::scan::{Frame, Pinhole, Projection, RangeImage};
 
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// How a log lies in its folder.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,7 @@ impl LogWriter {
     ///
     /// # Errors
     /// [`IoError::Os`] where a folder cannot be made.
-    pub fn create(folder: impl Into<PathBuf>, layout: LogLayout) -> Result<Self, IoError> {
+    pub fn create(folder: impl Into<PathBuf>, layout: LogLayout) -> Result<Self> {
         let folder = folder.into();
         let (folders, texts): (&[&str], _) = match &layout {
             LogLayout::Kitti { camera_from_lidar } => (&["velodyne"], kitti::texts(camera_from_lidar)),
@@ -70,7 +70,7 @@ impl LogWriter {
     ///
     /// # Errors
     /// [`IoError::Unwritable`] for a scan that the layout cannot hold, [`IoError::Os`] where writing fails.
-    pub fn push(&mut self, world_from_sensor: &Pose<3>, seconds: f64, frame: &Frame) -> Result<(), IoError> {
+    pub fn push(&mut self, world_from_sensor: &Pose<3>, seconds: f64, frame: &Frame) -> Result<()> {
         match self.layout {
             LogLayout::Kitti { camera_from_lidar } => {
                 let world_from_camera = *world_from_sensor * camera_from_lidar.inverse();
@@ -87,7 +87,7 @@ impl LogWriter {
     ///
     /// # Errors
     /// [`IoError::Os`] where writing fails.
-    pub fn finish(mut self) -> Result<usize, IoError> {
+    pub fn finish(mut self) -> Result<usize> {
         if let Some((Pinhole { fx, fy, cx, cy }, _)) = self.camera {
             self.texts.push(match self.layout {
                 LogLayout::TumRgbd => ("calibration.txt", format!("{fx} {fy} {cx} {cy}\n")),
@@ -109,7 +109,7 @@ impl LogWriter {
     }
 
     /// The image of a pinhole camera, the same camera as before.
-    fn image<'a>(&mut self, frame: &'a Frame) -> Result<&'a RangeImage, IoError> {
+    fn image<'a>(&mut self, frame: &'a Frame) -> Result<&'a RangeImage> {
         let refuse = |value: &str, advice: &str| {
             Err(IoError::unwritable(&self.folder, format!("scan {}", self.count), value, advice))
         };
@@ -127,7 +127,7 @@ impl LogWriter {
     }
 }
 
-fn write_text(path: &Path, text: &str) -> Result<(), IoError> {
+fn write_text(path: &Path, text: &str) -> Result<()> {
     write_atomic(path, |out| std::io::Write::write_all(out, text.as_bytes()))
 }
 

@@ -7,10 +7,10 @@ use png::{BitDepth, ColorType, Encoder};
 use portolan::geom::Pose;
 use portolan::scan::RangeImage;
 
-use crate::{IoError, write_atomic};
+use crate::{Result, write_atomic};
 
 /// A 16-bit gray picture of so many units per metre; 0 for pixels without a surface, and for values beyond 16 bits.
-pub(super) fn depth_png(path: &Path, image: &RangeImage, units_per_metre: f64) -> Result<(), IoError> {
+pub(super) fn depth_png(path: &Path, image: &RangeImage, units_per_metre: f64) -> Result<()> {
     let units = |v: &f32| {
         let units = (f64::from(*v) * units_per_metre).round();
         // 65535 means "no reading" to many readers.
@@ -21,17 +21,11 @@ pub(super) fn depth_png(path: &Path, image: &RangeImage, units_per_metre: f64) -
 }
 
 /// An 8-bit RGB picture.
-pub(super) fn color_png(path: &Path, image: &RangeImage) -> Result<(), IoError> {
+pub(super) fn color_png(path: &Path, image: &RangeImage) -> Result<()> {
     png(path, image, ColorType::Rgb, BitDepth::Eight, image.colors.as_flattened())
 }
 
-fn png(
-    path: &Path,
-    image: &RangeImage,
-    color: ColorType,
-    depth: BitDepth,
-    bytes: &[u8],
-) -> Result<(), IoError> {
+fn png(path: &Path, image: &RangeImage, color: ColorType, depth: BitDepth, bytes: &[u8]) -> Result<()> {
     write_atomic(path, |out| {
         let mut encoder = Encoder::new(out.by_ref(), image.columns as u32, image.rows as u32);
         encoder.set_color(color);

@@ -5,17 +5,13 @@ use portolan::scan::Frame;
 
 use super::picture::{color_png, depth_png};
 use super::{LogWriter, matrix_rows, write_text};
-use crate::IoError;
+use crate::Result;
 
 /// Units of a depth image per metre.
 const UNITS: f64 = 1000.0;
 
 impl LogWriter {
-    pub(super) fn push_seven_scenes(
-        &mut self,
-        world_from_camera: &Pose<3>,
-        frame: &Frame,
-    ) -> Result<(), IoError> {
+    pub(super) fn push_seven_scenes(&mut self, world_from_camera: &Pose<3>, frame: &Frame) -> Result<()> {
         let image = self.image(frame)?;
         let file = |what: &str| self.folder.join(format!("frame-{:06}.{what}", self.count));
         depth_png(&file("depth.png"), image, UNITS)?;

@@ -5,7 +5,7 @@ use portolan::scan::Frame;
 
 use super::LogWriter;
 use super::picture::{color_png, depth_png, quaternion};
-use crate::IoError;
+use crate::Result;
 
 /// Units of a depth image per metre.
 const UNITS: f64 = 5000.0;
@@ -25,7 +25,7 @@ impl LogWriter {
         world_from_camera: &Pose<3>,
         seconds: f64,
         frame: &Frame,
-    ) -> Result<(), IoError> {
+    ) -> Result<()> {
         let image = self.image(frame)?;
         let stamp = format!("{seconds:.6}");
         depth_png(&self.folder.join(format!("depth/{stamp}.png")), image, UNITS)?;

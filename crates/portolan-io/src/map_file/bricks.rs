@@ -8,7 +8,7 @@ use super::header::Entry;
 use super::part_name;
 use super::reading::{AGAIN, Reading};
 use crate::error::shown;
-use crate::{ContainerWriter, IoError};
+use crate::{ContainerWriter, IoError, Result};
 
 /// A plane of bricks is cut into chunks of so many bricks, so that only one of them is in memory beside the map.
 const BRICKS_PER_PART: usize = 1 << 15;
@@ -25,7 +25,7 @@ impl Reading<'_> {
         entry: &Entry,
         planes: [(&str, usize); N],
         brick: impl Fn([&[u8]; N]) -> Option<C::Brick>,
-    ) -> Result<Bricks<C, D>, IoError> {
+    ) -> Result<Bricks<C, D>> {
         let (lattice, tag) = (self.lattice(entry)?, &*entry.chunk);
         let keys = self.keys(tag)?;
         let lengths = planes.map(|(_, cell_bytes)| cell_bytes * block_cells::<D>());
@@ -48,7 +48,7 @@ impl Reading<'_> {
             for (i, key) in keys.by_ref().take(bricks).enumerate() {
                 let of_brick = std::array::from_fn(|k| &contents[k][i * lengths[k]..][..lengths[k]]);
                 let Some(brick) = brick(of_brick) else {
-                    let field = format!("a cell of brick {:?} in chunk {}", key.0, shown(tag.as_bytes()));
+                    let field = format!("a cell of brick {:?} in chunk {}", key.0, shown(tag));
                     return Err(self.bad(field, "not finite or negative", AGAIN));
                 };
                 self.possible(&entry.map, store.insert(key, brick))?;
@@ -59,19 +59,19 @@ impl Reading<'_> {
 
     fn uneven(&self, tag: &str) -> IoError {
         let advice = "every part of a plane must hold whole bricks, as many as that part of the other planes";
-        self.bad(format!("the division of chunk {} into parts", shown(tag.as_bytes())), "uneven", advice)
+        self.bad(format!("the division of chunk {} into parts", shown(tag)), "uneven", advice)
     }
 
     /// The keys of a chunk's bricks, in ascending order and within the range of cell indices.
-    fn keys<const D: usize>(&mut self, tag: &str) -> Result<Vec<BlockKey<D>>, IoError> {
-        let field = format!("the length of chunk {} keys", shown(tag.as_bytes()));
+    fn keys<const D: usize>(&mut self, tag: &str) -> Result<Vec<BlockKey<D>>> {
+        let field = format!("the length of chunk {} keys", shown(tag));
         if self.parts(tag, "keys").is_empty() {
             return Err(self.bad(field, "missing", AGAIN));
         }
         let (length, key_bytes) = (self.length(tag, "keys"), D * size_of::<i32>());
         if !length.is_multiple_of(key_bytes as u64) {
             let advice = format!("give {key_bytes} bytes for each key");
-            return Err(self.bad(field, format!("{length} bytes"), &advice));
+            return Err(self.bad(field, format!("{length} bytes"), advice));
         }
         self.take(length / key_bytes as u64 * BRICK_OVERHEAD)?;
         let bytes = self.plane(tag, "keys", length)?;
@@ -82,7 +82,7 @@ impl Reading<'_> {
         let bad = (0..keys.len()).find(|&i| !in_range(&keys[i]) || i > 0 && keys[i - 1] >= keys[i]);
         match bad {
             Some(i) => {
-                let field = format!("key {i} of chunk {}", shown(tag.as_bytes()));
+                let field = format!("key {i} of chunk {}", shown(tag));
                 let advice = "keys must ascend, the last index first, and lie within 2^27 of zero";
                 Err(self.bad(field, format!("{:?}", keys[i].0), advice))
             }
@@ -96,7 +96,7 @@ pub(super) fn write_keys<C: Cell, const D: usize>(
     writer: &mut ContainerWriter,
     tag: &str,
     store: &Bricks<C, D>,
-) -> Result<(), IoError> {
+) -> Result<()> {
     write_parts(writer, tag, "keys", &store.keys(), |key, bytes| {
         bytes.extend(key.0.iter().flat_map(|v| v.to_le_bytes()));
     })
@@ -109,7 +109,7 @@ pub(super) fn write_bricks<C: Cell, const D: usize>(
     name: &str,
     store: &Bricks<C, D>,
     content: impl Fn(&C::Brick, &mut Vec<u8>),
-) -> Result<(), IoError> {
+) -> Result<()> {
     write_parts(writer, tag, name, &store.keys(), |key, bytes| {
         if let Some(brick) = store.brick(key) {
             content(brick, bytes);
@@ -123,7 +123,7 @@ fn write_parts<const D: usize>(
     name: &str,
     keys: &[BlockKey<D>],
     content: impl Fn(BlockKey<D>, &mut Vec<u8>),
-) -> Result<(), IoError> {
+) -> Result<()> {
     if keys.is_empty() {
         return writer.chunk(tag, name, &[]);
     }

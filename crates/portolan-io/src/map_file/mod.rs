@@ -22,7 +22,6 @@ mod bricks;
 mod content;
 mod header;
 mod kind;
-mod maps;
 mod read;
 mod reading;
 mod settings;

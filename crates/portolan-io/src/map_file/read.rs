@@ -6,23 +6,23 @@ use portolan::cell::{
     Cell, ColorBrick, DistanceBrick, DistancePlanes, LogOdds8, LogOddsValue, Planes, SignedDistance, TsdfRule,
 };
 use portolan::geom::Grid;
+use portolan::map::{DenseTsdf, OccupancyGrid, OccupancyTree, TsdfConfig};
 use portolan::store::{Dense, Tree, TreeRecords};
 use serde_json::Value;
 
 use super::header::Entry;
 use super::kind::Kind;
-use super::maps::{SWEEP, grid_of, tree_of, tsdf_of};
 use super::reading::{AGAIN, MEMORY, Reading};
-use super::settings::{ColorSettings, OccupancySettings, TsdfSettings};
+use super::settings::{ColorSettings, OccupancySettings, SWEEP, TsdfSettings};
 use super::{ColorBricks, MapFile, OccupancyBricks, TsdfBricks, sweep_of, weights_of};
 use crate::error::shown;
-use crate::{Container, IoError};
+use crate::{Container, Result};
 
 /// The dimension of a `map.portolan`: which [`MapFile`] reads it.
 ///
 /// # Errors
-/// [`IoError::Binary`] where the header is missing or damaged, or the dimension neither 2 nor 3.
-pub fn map_dimension(container: &Container) -> Result<usize, IoError> {
+/// [`crate::IoError::Binary`] where the header is missing or damaged, or the dimension neither 2 nor 3.
+pub fn map_dimension(container: &Container) -> Result<usize> {
     Reading::new(container, MEMORY)?.dimension()
 }
 
@@ -31,7 +31,7 @@ impl<const D: usize> MapFile<D> {
     ///
     /// # Errors
     /// As [`MapFile::from_container`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         Self::read_within(path, MEMORY)
     }
 
@@ -39,7 +39,7 @@ impl<const D: usize> MapFile<D> {
     ///
     /// # Errors
     /// As [`MapFile::from_container`].
-    pub fn read_within(path: impl AsRef<Path>, memory: u64) -> Result<Self, IoError> {
+    pub fn read_within(path: impl AsRef<Path>, memory: u64) -> Result<Self> {
         Self::from_container(&Container::read(path)?, memory)
     }
 
@@ -47,16 +47,16 @@ impl<const D: usize> MapFile<D> {
     ///
     /// # Errors
     /// As [`MapFile::from_container`].
-    pub fn parse(bytes: Vec<u8>, name: &Path) -> Result<Self, IoError> {
+    pub fn parse(bytes: Vec<u8>, name: &Path) -> Result<Self> {
         Self::from_container(&Container::parse(bytes, name)?, MEMORY)
     }
 
     /// Reads maps that need at most `memory` bytes. [`Container::from_reader`] makes a container of any source.
     ///
     /// # Errors
-    /// [`IoError::Binary`] where the container or a map in it is damaged, claims what cannot be, has another
+    /// [`crate::IoError::Binary`] where the container or a map in it is damaged, claims what cannot be, has another
     /// dimension, or needs more memory; the claim is checked before memory is taken.
-    pub fn from_container(container: &Container, memory: u64) -> Result<Self, IoError> {
+    pub fn from_container(container: &Container, memory: u64) -> Result<Self> {
         let mut reading = Reading::new(container, memory)?;
         let mut file = Self::default();
         let mut kinds = Vec::new();
@@ -79,28 +79,32 @@ impl<const D: usize> MapFile<D> {
 }
 
 impl Reading<'_> {
-    fn map<const D: usize>(&mut self, kind: Kind, map: Value, file: &mut MapFile<D>) -> Result<(), IoError> {
+    fn map<const D: usize>(&mut self, kind: Kind, map: Value, file: &mut MapFile<D>) -> Result<()> {
         let mut entry: Entry = self.typed(kind.names::<D>().map, map)?;
         let settings = Value::Object(std::mem::take(&mut entry.settings));
         let map = &*entry.map;
         match kind {
             Kind::Grid => {
-                let settings = self.typed(map, settings)?;
+                let settings: OccupancySettings = self.typed(map, settings)?;
                 let store = self.dense_occupancy(&entry)?;
-                file.grid = Some(self.possible(map, grid_of(store, &settings))?);
+                file.grid = Some(self.possible(map, OccupancyGrid::from_store(store, settings.model))?);
             }
             Kind::Tree => {
-                let settings = self.typed(map, settings)?;
+                let settings: OccupancySettings = self.typed(map, settings)?;
                 let store = self.tree(&entry)?;
-                file.tree = Some(self.possible(map, tree_of(store, &settings))?);
+                file.tree = Some(self.possible(map, OccupancyTree::from_store(store, settings.model))?);
             }
             Kind::Tsdf => {
                 let settings: TsdfSettings = self.typed(map, settings)?;
                 let weights = self.chosen(map, "weight model", &settings.weights, weights_of)?;
                 let sweep = settings.more.get(SWEEP).and_then(Value::as_str).unwrap_or_default();
-                let sweep = self.chosen(map, SWEEP, sweep, sweep_of)?;
+                let beams = self.chosen(map, SWEEP, sweep, sweep_of)?;
                 let store = self.dense_distances(&entry)?;
-                file.tsdf = Some(self.possible(map, tsdf_of(store, &settings, weights, sweep))?);
+                let TsdfSettings { truncation, w_max, carve_weight, .. } = settings;
+                let w_max = w_max.unwrap_or(f32::INFINITY);
+                let rest = TsdfConfig::default();
+                let config = TsdfConfig { truncation, w_max, carve_weight, beams, weights, ..rest };
+                file.tsdf = Some(self.possible(map, DenseTsdf::from_stores(store, None, config))?);
             }
             Kind::OccupancyBricks => {
                 let OccupancySettings { model, more } = self.typed(map, settings)?;
@@ -132,24 +136,18 @@ impl Reading<'_> {
     }
 
     /// The setting that a word chooses.
-    fn chosen<T>(
-        &self,
-        map: &str,
-        setting: &str,
-        word: &str,
-        of: impl Fn(&str) -> Option<T>,
-    ) -> Result<T, IoError> {
+    fn chosen<T>(&self, map: &str, setting: &str, word: &str, of: impl Fn(&str) -> Option<T>) -> Result<T> {
         let field = || format!("the {setting} of map {map}");
-        of(word).ok_or_else(|| self.bad(field(), shown(word.as_bytes()), "use a newer program"))
+        of(word).ok_or_else(|| self.bad(field(), shown(word), "use a newer program"))
     }
 
-    fn finite(&self, map: &str, field: &str, value: f32, fits: bool) -> Result<(), IoError> {
+    fn finite(&self, map: &str, field: &str, value: f32, fits: bool) -> Result<()> {
         let fits = fits && value.is_finite();
         self.possible(map, if fits { Ok(()) } else { Err(format!("{field} is {value}")) })
     }
 
     /// The grid of a dense map, with a number of cells that fits the file's limits.
-    fn grid<const D: usize>(&self, entry: &Entry) -> Result<Grid<D>, IoError> {
+    fn grid<const D: usize>(&self, entry: &Entry) -> Result<Grid<D>> {
         let shape = entry.place.shape.as_deref().unwrap_or_default();
         let cells = shape.iter().try_fold(1u64, |n, &s| n.checked_mul(s));
         match <[u64; D]>::try_from(shape) {
@@ -158,21 +156,18 @@ impl Reading<'_> {
             }
             _ => {
                 let advice = format!("give the cells along {D} axes, in all from 1 to 2^31");
-                Err(self.bad("the shape", format!("{shape:?}"), &advice))
+                Err(self.bad("the shape", format!("{shape:?}"), advice))
             }
         }
     }
 
-    fn dense_occupancy<const D: usize>(&mut self, entry: &Entry) -> Result<Dense<LogOdds8, D>, IoError> {
+    fn dense_occupancy<const D: usize>(&mut self, entry: &Entry) -> Result<Dense<LogOdds8, D>> {
         let grid = self.grid(entry)?;
         let plane = self.plane(&entry.chunk, "occupancy", grid.len() as u64)?;
         self.as_long_as_its_shape(entry, Dense::from_planes(grid, log_odds(plane)))
     }
 
-    fn dense_distances<const D: usize>(
-        &mut self,
-        entry: &Entry,
-    ) -> Result<Dense<SignedDistance, D>, IoError> {
+    fn dense_distances<const D: usize>(&mut self, entry: &Entry) -> Result<Dense<SignedDistance, D>> {
         let grid = self.grid(entry)?;
         let bytes = 4 * grid.len() as u64;
         let distance = floats(&self.plane(&entry.chunk, "distance", bytes)?);
@@ -182,11 +177,11 @@ impl Reading<'_> {
         self.as_long_as_its_shape(entry, Dense::from_planes(grid, planes))
     }
 
-    fn as_long_as_its_shape<T>(&self, entry: &Entry, store: Option<T>) -> Result<T, IoError> {
+    fn as_long_as_its_shape<T>(&self, entry: &Entry, store: Option<T>) -> Result<T> {
         store.ok_or_else(|| self.bad(format!("map {}", entry.map), "not as long as its shape", AGAIN))
     }
 
-    fn tree<const D: usize>(&mut self, entry: &Entry) -> Result<Tree<LogOdds8, D>, IoError> {
+    fn tree<const D: usize>(&mut self, entry: &Entry) -> Result<Tree<LogOdds8, D>> {
         let lattice = self.lattice(entry)?;
         let length = self.length(&entry.chunk, "occupancy");
         let content = self.plane(&entry.chunk, "occupancy", length)?;

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::header::Entry;
 use super::{MapHeader, UnknownChunk, VERSION, part_name};
 use crate::error::shown;
-use crate::{Container, IoError};
+use crate::{Container, IoError, Result};
 
 /// The longest header (bytes of JSON).
 const LONGEST_HEADER: u64 = 64 << 20;
@@ -36,7 +36,7 @@ pub(super) struct Reading<'a> {
 
 impl<'a> Reading<'a> {
     /// Reads the header; `memory` is what all content may take (bytes).
-    pub(super) fn new(container: &'a Container, memory: u64) -> Result<Self, IoError> {
+    pub(super) fn new(container: &'a Container, memory: u64) -> Result<Self> {
         let (path, chunks) = (container.path(), container.chunks());
         let places = chunks.iter().enumerate().map(|(i, c)| ((c.tag.as_str(), c.name.as_str()), i)).collect();
         let used = vec![false; chunks.len()];
@@ -46,7 +46,7 @@ impl<'a> Reading<'a> {
     }
 
     /// The dimension that the header announces.
-    pub(super) fn dimension(&self) -> Result<usize, IoError> {
+    pub(super) fn dimension(&self) -> Result<usize> {
         match self.fields.get("dimension").and_then(Value::as_u64) {
             Some(2) => Ok(2),
             Some(3) => Ok(3),
@@ -58,11 +58,11 @@ impl<'a> Reading<'a> {
     }
 
     /// The entries of the maps of a file that must have this dimension.
-    pub(super) fn maps(&mut self, dimension: usize) -> Result<Vec<Value>, IoError> {
+    pub(super) fn maps(&mut self, dimension: usize) -> Result<Vec<Value>> {
         let found = self.dimension()?;
         if found != dimension {
             let advice = format!("give a {dimension}-D map");
-            return Err(self.bad("the dimension", found.to_string(), &advice));
+            return Err(self.bad("the dimension", found, advice));
         }
         match self.fields.remove("maps") {
             Some(Value::Array(maps)) => Ok(maps),
@@ -71,7 +71,7 @@ impl<'a> Reading<'a> {
     }
 
     /// What the writer noted, and the chunks that were not read.
-    pub(super) fn finish(mut self) -> Result<(MapHeader, Vec<UnknownChunk>), IoError> {
+    pub(super) fn finish(mut self) -> Result<(MapHeader, Vec<UnknownChunk>)> {
         let mut unknown = Vec::new();
         for (i, chunk) in self.container.chunks().iter().enumerate() {
             if !self.used[i] {
@@ -82,28 +82,27 @@ impl<'a> Reading<'a> {
         self.fields.retain(|key, _| !["version", "dimension", "maps"].contains(&key.as_str()));
         let fields = std::mem::take(&mut self.fields);
         let header = serde_json::from_value(Value::Object(fields));
-        let header = header.map_err(|e| self.bad("the header", shown(e.to_string().as_bytes()), AGAIN))?;
+        let header = header.map_err(|e| self.bad("the header", shown(e.to_string()), AGAIN))?;
         Ok((header, unknown))
     }
 
     /// An error about the header, which is the first chunk.
-    pub(super) fn bad(&self, field: impl Into<String>, value: impl Into<String>, advice: &str) -> IoError {
+    pub(super) fn bad(&self, field: impl Display, value: impl Display, advice: impl Display) -> IoError {
         IoError::binary(self.path, 32, field, value, advice)
     }
 
     /// A part of a map's entry in the header, typed.
-    pub(super) fn typed<T: DeserializeOwned>(&self, map: &str, part: Value) -> Result<T, IoError> {
-        serde_json::from_value(part)
-            .map_err(|e| self.bad(format!("map {map}"), shown(e.to_string().as_bytes()), AGAIN))
+    pub(super) fn typed<T: DeserializeOwned>(&self, map: &str, part: Value) -> Result<T> {
+        serde_json::from_value(part).map_err(|e| self.bad(format!("map {map}"), shown(e.to_string()), AGAIN))
     }
 
     /// The result, or the error that the map is not possible.
-    pub(super) fn possible<T, E: Display>(&self, map: &str, result: Result<T, E>) -> Result<T, IoError> {
+    pub(super) fn possible<T, E: Display>(&self, map: &str, result: Result<T, E>) -> Result<T> {
         result.map_err(|e| self.bad(format!("map {map}"), format!("not possible ({e})"), AGAIN))
     }
 
     /// The lattice of a map, whose cell indices must be exact.
-    pub(super) fn lattice<const D: usize>(&self, entry: &Entry) -> Result<Lattice<D>, IoError> {
+    pub(super) fn lattice<const D: usize>(&self, entry: &Entry) -> Result<Lattice<D>> {
         const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
         let Entry { map, place, .. } = entry;
         let r = place.resolution;
@@ -114,32 +113,32 @@ impl<'a> Reading<'a> {
             Ok(origin) if origin.iter().all(|v| (v / r).abs() < LARGEST_INDEX) => Ok(Lattice::new(origin, r)),
             _ => {
                 let advice = format!("give {D} numbers within 2^45 cells of zero");
-                Err(self.bad("the origin", format!("{:?} at {r} m", place.origin), &advice))
+                Err(self.bad("the origin", format!("{:?} at {r} m", place.origin), advice))
             }
         }
     }
 
     /// Takes `bytes` of the allowed memory.
-    pub(super) fn take(&mut self, bytes: u64) -> Result<(), IoError> {
+    pub(super) fn take(&mut self, bytes: u64) -> Result<()> {
         match self.memory.checked_sub(bytes) {
             Some(left) => self.memory = left,
             None => {
                 let advice = format!("only {} bytes of memory are left for it: allow more", self.memory);
-                return Err(self.bad("a length of map data", bytes.to_string(), &advice));
+                return Err(self.bad("a length of map data", bytes, advice));
             }
         }
         Ok(())
     }
 
     /// The content of chunk `i`, out of the allowed memory.
-    pub(super) fn unpack(&mut self, i: usize) -> Result<Vec<u8>, IoError> {
+    pub(super) fn unpack(&mut self, i: usize) -> Result<Vec<u8>> {
         let chunk = &self.container.chunks()[i];
         self.take(chunk.length)?;
         self.used[i] = true;
         self.container.unpack(chunk)
     }
 
-    fn header(&mut self) -> Result<Map<String, Value>, IoError> {
+    fn header(&mut self) -> Result<Map<String, Value>> {
         let Some(at) = self.container.chunks().iter().position(|c| c.tag == "HEAD" && c.name.is_empty())
         else {
             return Err(self.bad("chunk HEAD", "missing", "give a map.portolan that `map` wrote"));
@@ -150,7 +149,7 @@ impl<'a> Reading<'a> {
         }
         let bytes = self.unpack(at)?;
         let header: Value = serde_json::from_slice(&bytes)
-            .map_err(|e| self.bad("the header", shown(e.to_string().as_bytes()), AGAIN))?;
+            .map_err(|e| self.bad("the header", shown(e.to_string()), AGAIN))?;
         let Value::Object(header) = header else {
             return Err(self.bad("the header", "not a JSON object", AGAIN));
         };
@@ -174,18 +173,18 @@ impl<'a> Reading<'a> {
     }
 
     /// The chunks of a plane that must have `length` bytes, in order.
-    pub(super) fn parts_of_length(&self, tag: &str, name: &str, length: u64) -> Result<Vec<usize>, IoError> {
+    pub(super) fn parts_of_length(&self, tag: &str, name: &str, length: u64) -> Result<Vec<usize>> {
         let (parts, there) = (self.parts(tag, name), self.length(tag, name));
         if parts.is_empty() || there != length {
-            let field = format!("the length of chunk {} {name}", shown(tag.as_bytes()));
+            let field = format!("the length of chunk {} {name}", shown(tag));
             let advice = format!("the header announces {length} bytes: write the file again");
-            return Err(self.bad(field, there.to_string(), &advice));
+            return Err(self.bad(field, there, advice));
         }
         Ok(parts)
     }
 
     /// A plane of `length` bytes.
-    pub(super) fn plane(&mut self, tag: &str, name: &str, length: u64) -> Result<Vec<u8>, IoError> {
+    pub(super) fn plane(&mut self, tag: &str, name: &str, length: u64) -> Result<Vec<u8>> {
         let mut plane = Vec::new();
         for i in self.parts_of_length(tag, name, length)? {
             let part = self.unpack(i)?;
@@ -199,7 +198,7 @@ impl<'a> Reading<'a> {
     }
 
     /// The poses of the sensor; empty where the file has no such chunk.
-    pub(super) fn poses<const D: usize>(&mut self) -> Result<Vec<Pose<D>>, IoError> {
+    pub(super) fn poses<const D: usize>(&mut self) -> Result<Vec<Pose<D>>> {
         if self.parts("POSES", "sensor").is_empty() {
             return Ok(Vec::new());
         }
@@ -207,7 +206,7 @@ impl<'a> Reading<'a> {
         let pose_bytes = (D * D + D) * size_of::<f64>();
         if bytes.len() % pose_bytes != 0 {
             let advice = format!("give {pose_bytes} bytes for each pose");
-            return Err(self.bad("the length of chunk POSES sensor", bytes.len().to_string(), &advice));
+            return Err(self.bad("the length of chunk POSES sensor", bytes.len(), advice));
         }
         let number = |bytes: &[u8], i: usize| f64::from_le_bytes(std::array::from_fn(|k| bytes[8 * i + k]));
         let poses: Vec<Pose<D>> = bytes

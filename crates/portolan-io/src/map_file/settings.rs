@@ -38,6 +38,22 @@ pub(super) struct TsdfSettings {
     pub(super) more: Map<String, Value>,
 }
 
+/// The name of the setting that only dense TSDFs have.
+pub(super) const SWEEP: &str = "sweep";
+
+impl TsdfSettings {
+    pub(super) fn new(
+        truncation: f64,
+        w_max: f32,
+        carve_weight: f32,
+        weights: WeightModel,
+        more: Map<String, Value>,
+    ) -> Self {
+        let w_max = Some(w_max).filter(|w| w.is_finite());
+        Self { truncation, w_max, carve_weight, weights: weights_word(weights).into(), more }
+    }
+}
+
 /// Settings of a map of colors.
 #[derive(Serialize, Deserialize)]
 pub(super) struct ColorSettings {

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::*;
 use crate::testing::{Random, bad_bytes};
-use crate::{Chunk, Container, IoError};
+use crate::{Chunk, Container, Result};
 
 /// Runs a test in both dimensions.
 macro_rules! in_2d_and_3d {
@@ -138,7 +138,7 @@ fn full<const D: usize>(seed: u64) -> MapFile<D> {
     }
 }
 
-fn parse<const D: usize>(bytes: Vec<u8>) -> Result<MapFile<D>, IoError> {
+fn parse<const D: usize>(bytes: Vec<u8>) -> Result<MapFile<D>> {
     MapFile::parse(bytes, "m".as_ref())
 }
 

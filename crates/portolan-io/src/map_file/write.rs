@@ -5,15 +5,14 @@ use std::path::Path;
 use portolan::cell::{LogOdds8, LogOddsValue, Planes};
 use portolan::geom::Pose;
 use portolan::store::{Store, Tree};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::bricks::{write_bricks, write_keys};
 use super::header::{Entry, Place};
 use super::kind::Kind;
-use super::maps::{of_grid, of_tree, of_tsdf};
-use super::settings::{ColorSettings, OccupancySettings, TsdfSettings, weights_word};
-use super::{ColorBricks, MapFile, OccupancyBricks, VERSION, part_name};
-use crate::{ContainerWriter, IoError};
+use super::settings::{ColorSettings, OccupancySettings, SWEEP, TsdfSettings, sweep_word};
+use super::{ColorBricks, MapFile, OccupancyBricks, TsdfBricks, VERSION, part_name};
+use crate::{ContainerWriter, IoError, Result};
 
 /// A dense plane is cut into chunks of this many bytes.
 const CHUNK: usize = 1 << 30;
@@ -23,7 +22,7 @@ impl<const D: usize> MapFile<D> {
     ///
     /// # Errors
     /// As [`crate::write_atomic`].
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         self.writer()?.write(path)
     }
 
@@ -31,15 +30,15 @@ impl<const D: usize> MapFile<D> {
     ///
     /// # Errors
     /// [`IoError::Unwritable`] where a map does not fit the format.
-    pub fn to_bytes(&self) -> Result<Vec<u8>, IoError> {
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
         Ok(self.writer()?.to_bytes())
     }
 
-    fn writer(&self) -> Result<ContainerWriter, IoError> {
+    fn writer(&self) -> Result<ContainerWriter> {
         let mut writer = ContainerWriter::new();
         let header = self.header_text().map_err(|e| {
             let advice = "give finite numbers";
-            IoError::unwritable("map.portolan".as_ref(), "the header", e.to_string(), advice)
+            IoError::unwritable("map.portolan".as_ref(), "the header", e, advice)
         })?;
         writer.chunk("HEAD", "", header.as_bytes())?;
         self.write_dense(&mut writer)?;
@@ -66,15 +65,21 @@ impl<const D: usize> MapFile<D> {
 
     fn entries(&self) -> serde_json::Result<Vec<Entry>> {
         let mut entries = Vec::new();
-        if let Some((store, settings)) = self.grid.as_ref().map(of_grid) {
-            entries.push(Entry::new::<D>(Kind::Grid, Place::of_grid(store.grid()), &settings)?);
+        if let Some(map) = &self.grid {
+            let settings = OccupancySettings { model: *map.model(), more: Map::new() };
+            entries.push(Entry::new::<D>(Kind::Grid, Place::of_grid(map.store().grid()), &settings)?);
         }
-        if let Some((store, settings)) = self.tree.as_ref().map(of_tree) {
-            let place = Place { depth: Some(store.depth()), ..Place::of_lattice(store.lattice()) };
+        if let Some(map) = &self.tree {
+            let settings = OccupancySettings { model: *map.model(), more: Map::new() };
+            let place = Place::of_lattice(map.store().lattice());
+            let place = Place { depth: Some(map.store().depth()), ..place };
             entries.push(Entry::new::<D>(Kind::Tree, place, &settings)?);
         }
-        if let Some((store, settings)) = self.tsdf.as_ref().map(of_tsdf) {
-            entries.push(Entry::new::<D>(Kind::Tsdf, Place::of_grid(store.grid()), &settings)?);
+        if let Some(map) = &self.tsdf {
+            let c = map.config();
+            let more = Map::from_iter([(SWEEP.to_owned(), sweep_word(c.beams).into())]);
+            let settings = TsdfSettings::new(c.truncation, c.w_max, c.carve_weight, c.weights, more);
+            entries.push(Entry::new::<D>(Kind::Tsdf, Place::of_grid(map.store().grid()), &settings)?);
         }
         if let Some(OccupancyBricks { store, model, more }) = &self.occupancy_bricks {
             let settings = OccupancySettings { model: *model, more: more.clone() };
@@ -82,13 +87,8 @@ impl<const D: usize> MapFile<D> {
             entries.push(Entry::new::<D>(Kind::OccupancyBricks, place, &settings)?);
         }
         if let Some(map) = &self.tsdf_bricks {
-            let settings = TsdfSettings {
-                truncation: map.truncation,
-                w_max: Some(map.w_max).filter(|w| w.is_finite()),
-                carve_weight: map.carve_weight,
-                weights: weights_word(map.weights).into(),
-                more: map.more.clone(),
-            };
+            let TsdfBricks { truncation, w_max, carve_weight, weights, ref more, .. } = *map;
+            let settings = TsdfSettings::new(truncation, w_max, carve_weight, weights, more.clone());
             let place = Place::of_lattice(map.store.lattice());
             entries.push(Entry::new::<D>(Kind::TsdfBricks, place, &settings)?);
         }
@@ -100,16 +100,16 @@ impl<const D: usize> MapFile<D> {
         Ok(entries)
     }
 
-    fn write_dense(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
-        if let Some((store, _)) = self.grid.as_ref().map(of_grid) {
-            let plane: Vec<u8> = store.planes().iter().map(|v| v.0 as u8).collect();
+    fn write_dense(&self, writer: &mut ContainerWriter) -> Result<()> {
+        if let Some(map) = &self.grid {
+            let plane: Vec<u8> = map.store().planes().iter().map(|v| v.0 as u8).collect();
             write_plane(writer, Kind::Grid.names::<D>().chunk, "occupancy", &plane)?;
         }
-        if let Some((store, _)) = self.tree.as_ref().map(of_tree) {
-            write_plane(writer, Kind::Tree.names::<D>().chunk, "occupancy", &tree_bytes(store))?;
+        if let Some(map) = &self.tree {
+            write_plane(writer, Kind::Tree.names::<D>().chunk, "occupancy", &tree_bytes(map.store()))?;
         }
-        if let Some((store, _)) = self.tsdf.as_ref().map(of_tsdf) {
-            let planes = store.planes();
+        if let Some(map) = &self.tsdf {
+            let planes = map.store().planes();
             for (name, plane) in [("distance", planes.distances()), ("weight", planes.weights())] {
                 let mut bytes = Vec::new();
                 put_floats(plane, &mut bytes);
@@ -119,7 +119,7 @@ impl<const D: usize> MapFile<D> {
         Ok(())
     }
 
-    fn write_bricks(&self, writer: &mut ContainerWriter) -> Result<(), IoError> {
+    fn write_bricks(&self, writer: &mut ContainerWriter) -> Result<()> {
         if let Some(map) = &self.occupancy_bricks {
             let tag = Kind::OccupancyBricks.names::<D>().chunk;
             write_keys(writer, tag, &map.store)?;
@@ -162,7 +162,7 @@ fn put_floats(values: &[f32], bytes: &mut Vec<u8>) {
     bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
 }
 
-fn write_plane(writer: &mut ContainerWriter, tag: &str, name: &str, bytes: &[u8]) -> Result<(), IoError> {
+fn write_plane(writer: &mut ContainerWriter, tag: &str, name: &str, bytes: &[u8]) -> Result<()> {
     if bytes.is_empty() {
         return writer.chunk(tag, name, bytes);
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::bytes::{Input, fields, open, parse_f64};
-use crate::{IoError, ply};
+use crate::{Result, ply};
 
 /// How much of a file is read (unpacked bytes).
 const HEAD: u64 = 64 << 10;
@@ -45,16 +45,16 @@ pub struct MeshCounts {
 /// OBJ has no header, and that of GLB is not read.
 ///
 /// # Errors
-/// [`IoError`] where the file cannot be opened or read.
-pub fn mesh_counts(path: impl AsRef<Path>) -> Result<Option<MeshCounts>, IoError> {
+/// [`crate::IoError`] where the file cannot be opened or read.
+pub fn mesh_counts(path: impl AsRef<Path>) -> Result<Option<MeshCounts>> {
     parse_mesh_counts(&mut open(path)?)
 }
 
 /// [`mesh_counts`] from any input, of which it reads at most 64 KiB.
 ///
 /// # Errors
-/// [`IoError`] where the input cannot be read.
-pub fn parse_mesh_counts(input: &mut Input) -> Result<Option<MeshCounts>, IoError> {
+/// [`crate::IoError`] where the input cannot be read.
+pub fn parse_mesh_counts(input: &mut Input) -> Result<Option<MeshCounts>> {
     let head = input.read_up_to(HEAD)?;
     Ok(ply::mesh_counts(&head, input.path()).map(|(vertices, faces)| MeshCounts { vertices, faces }))
 }
@@ -95,13 +95,12 @@ mod tests {
     use super::super::testing::tetrahedron;
     use super::super::{write_glb, write_obj, write_ply_mesh};
     use super::*;
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{bad_bytes, real_data, temporary};
     use portolan::surface::Mesh;
 
     #[test]
     fn headers_tell_how_much_there_is() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh");
+        let (folder, path) = temporary("mesh");
         let mesh = tetrahedron([0.0; 3]);
         write_ply_mesh(&path, &mesh).unwrap();
         assert_eq!(mesh_counts(&path).unwrap(), Some(MeshCounts { vertices: 4, faces: Some(4) }));

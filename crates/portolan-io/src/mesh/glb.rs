@@ -7,7 +7,7 @@ use portolan::surface::Mesh;
 use serde_json::{Value, json};
 
 use super::check;
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// Types of components in glTF.
 const FLOAT: u32 = 5126;
@@ -29,7 +29,7 @@ const ELEMENTS: u32 = 34963;
 ///
 /// # Errors
 /// As [`write_ply_mesh`](super::write_ply_mesh), and where the file would be longer than the 4 GiB that the format holds.
-pub fn write_glb(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
+pub fn write_glb(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     let path = path.as_ref();
     let (layout, text, total) = prepared(path, mesh)?;
     write_atomic(path, |w| write_to(w, mesh, &layout, &text, total))
@@ -39,7 +39,7 @@ pub fn write_glb(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_glb`].
-pub fn glb_to_bytes(mesh: &Mesh) -> Result<Vec<u8>, IoError> {
+pub fn glb_to_bytes(mesh: &Mesh) -> Result<Vec<u8>> {
     let name = Path::new("mesh.glb");
     let (layout, text, total) = prepared(name, mesh)?;
     let mut bytes = Vec::with_capacity(total as usize);
@@ -48,7 +48,7 @@ pub fn glb_to_bytes(mesh: &Mesh) -> Result<Vec<u8>, IoError> {
 }
 
 /// Where everything goes, the padded document, and the length of the file.
-fn prepared(path: &Path, mesh: &Mesh) -> Result<(Layout, Vec<u8>, u32), IoError> {
+fn prepared(path: &Path, mesh: &Mesh) -> Result<(Layout, Vec<u8>, u32)> {
     check(path, mesh)?;
     let layout = if mesh.triangles.is_empty() { Layout::EMPTY } else { Layout::of(mesh) };
     let mut text = document(mesh, &layout).to_string().into_bytes();
@@ -56,7 +56,7 @@ fn prepared(path: &Path, mesh: &Mesh) -> Result<(Layout, Vec<u8>, u32), IoError>
     let total = 12 + 8 + text.len() as u64 + if layout.end > 0 { 8 + layout.end } else { 0 };
     let Ok(total) = u32::try_from(total) else {
         let advice = "write PLY, or mesh at a coarser resolution";
-        return Err(IoError::unwritable(path, "the file's length (bytes)", total.to_string(), advice));
+        return Err(IoError::unwritable(path, "the file's length (bytes)", total, advice));
     };
     Ok((layout, text, total))
 }
@@ -181,10 +181,7 @@ mod tests {
     use super::*;
 
     fn written(mesh: &Mesh) -> (Value, Vec<u8>) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh.glb");
-        write_glb(&path, mesh).unwrap();
-        let file = std::fs::read(path).unwrap();
+        let file = crate::testing::written(|path| write_glb(path, mesh));
         assert_eq!(file, glb_to_bytes(mesh).unwrap());
         let mut bytes = Bytes(&file);
         assert_eq!((bytes.take(), bytes.u32(), bytes.u32()), (*b"glTF", 2, file.len() as u32));

@@ -15,26 +15,18 @@ use std::path::Path;
 
 use portolan::surface::Mesh;
 
-use crate::IoError;
+use crate::{IoError, Result};
 
 /// Refuses a mesh whose arrays do not fit together, or with a coordinate that is not finite.
-fn check(path: &Path, mesh: &Mesh) -> Result<(), IoError> {
+fn check(path: &Path, mesh: &Mesh) -> Result<()> {
     let vertices = mesh.vertices.len();
     let refuse =
         |field: &str, value: String, advice: &str| Err(IoError::unwritable(path, field, value, advice));
-    if !mesh.normals.is_empty() && mesh.normals.len() != vertices {
-        return refuse(
-            "the number of normals",
-            mesh.normals.len().to_string(),
-            "give one per vertex, or an empty list",
-        );
-    }
-    if !mesh.colors.is_empty() && mesh.colors.len() != vertices {
-        return refuse(
-            "the number of colors",
-            mesh.colors.len().to_string(),
-            "give one per vertex, or an empty list",
-        );
+    for (list, length) in [("normals", mesh.normals.len()), ("colors", mesh.colors.len())] {
+        if length != 0 && length != vertices {
+            let field = format!("the number of {list}");
+            return refuse(&field, length.to_string(), "give one per vertex, or an empty list");
+        }
     }
     if let Some(t) = mesh.triangles.iter().find(|t| t.iter().any(|&v| v as usize >= vertices)) {
         return refuse("a triangle", format!("{t:?}"), "use indices of existing vertices");
@@ -88,11 +80,11 @@ mod testing {
 mod tests {
     use super::testing::tetrahedron;
     use super::*;
+    use crate::testing::temporary;
 
     #[test]
     fn what_does_not_fit_together_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh");
+        let (_folder, path) = temporary("mesh");
         let refused = |mesh: &Mesh| {
             for written in [write_ply_mesh(&path, mesh), write_glb(&path, mesh), write_obj(&path, mesh)] {
                 assert!(matches!(written, Err(IoError::Unwritable { .. })));

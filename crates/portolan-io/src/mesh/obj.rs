@@ -6,7 +6,7 @@ use std::path::Path;
 use portolan::surface::Mesh;
 
 use super::check;
-use crate::{IoError, write_atomic};
+use crate::{Result, write_atomic};
 
 /// Writes a mesh as OBJ text: `v x y z`, with `r g b` in `[0, 1]` after it where the mesh has colors (which most
 /// readers understand), `vn` where it has normals, `f` counted from 1.
@@ -15,7 +15,7 @@ use crate::{IoError, write_atomic};
 ///
 /// # Errors
 /// As [`write_ply_mesh`](super::write_ply_mesh).
-pub fn write_obj(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
+pub fn write_obj(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     let path = path.as_ref();
     check(path, mesh)?;
     write_atomic(path, |w| write_to(w, mesh))
@@ -58,10 +58,7 @@ mod tests {
     use super::*;
 
     fn written(mesh: &Mesh) -> String {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh.obj");
-        write_obj(&path, mesh).unwrap();
-        std::fs::read_to_string(path).unwrap()
+        String::from_utf8(crate::testing::written(|path| write_obj(path, mesh))).unwrap()
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::path::Path;
 use portolan::surface::Mesh;
 
 use super::check;
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// World coordinates beyond this (metres) are written as `double`: up to it an f32 is no coarser than 0.06 mm.
 const NEAR: f64 = 1000.0;
@@ -20,7 +20,7 @@ const NEAR: f64 = 1000.0;
 /// # Errors
 /// [`IoError::Unwritable`] where the mesh's arrays do not fit together or a coordinate is not finite, else as
 /// [`write_atomic`].
-pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError> {
+pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     let path = path.as_ref();
     check(path, mesh)?;
     write_atomic(path, |w| write_to(w, mesh))
@@ -30,7 +30,7 @@ pub fn write_ply_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<(), IoError
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_ply_mesh`].
-pub fn ply_mesh_to_bytes(mesh: &Mesh) -> Result<Vec<u8>, IoError> {
+pub fn ply_mesh_to_bytes(mesh: &Mesh) -> Result<Vec<u8>> {
     let name = Path::new("mesh.ply");
     check(name, mesh)?;
     let mut bytes = Vec::new();
@@ -83,10 +83,7 @@ mod tests {
     use super::*;
 
     fn written(mesh: &Mesh) -> (String, Vec<u8>) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("mesh.ply");
-        write_ply_mesh(&path, mesh).unwrap();
-        let bytes = std::fs::read(path).unwrap();
+        let bytes = crate::testing::written(|path| write_ply_mesh(path, mesh));
         assert_eq!(bytes, ply_mesh_to_bytes(mesh).unwrap());
         let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
         (String::from_utf8(bytes[..end].to_vec()).unwrap(), bytes[end..].to_vec())

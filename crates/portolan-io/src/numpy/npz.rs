@@ -8,9 +8,9 @@ use std::path::Path;
 use flate2::read::DeflateDecoder;
 
 use super::{NpyArray, npy};
-use crate::IoError;
-use crate::bytes::{open_file, write_atomic};
+use crate::bytes::{open_file, u32_at, write_atomic};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 const LOCAL: &[u8; 4] = b"PK\x03\x04";
 const CENTRAL: &[u8; 4] = b"PK\x01\x02";
@@ -27,7 +27,7 @@ const MOST_BYTES: u64 = 1 << 32;
 /// # Errors
 /// [`IoError::Unwritable`] where an array does not have one value per cell, a name is empty, repeated or not plain ASCII,
 /// or the file would reach 4 GiB; else as [`write_atomic`].
-pub fn write_npz(path: impl AsRef<Path>, arrays: &[(&str, &NpyArray)]) -> Result<(), IoError> {
+pub fn write_npz(path: impl AsRef<Path>, arrays: &[(&str, &NpyArray)]) -> Result<()> {
     let path = path.as_ref();
     let refuse =
         |field: &str, value: String, advice: &str| Err(IoError::unwritable(path, field, value, advice));
@@ -37,11 +37,7 @@ pub fn write_npz(path: impl AsRef<Path>, arrays: &[(&str, &NpyArray)]) -> Result
         npy::check(path, array)?;
         let plain = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
         if !plain || name.len() > 100 || arrays[..k].iter().any(|(other, _)| other == name) {
-            return refuse(
-                "the name of an array",
-                shown(name.as_bytes()),
-                "give each a unique name in ASCII",
-            );
+            return refuse("the name of an array", shown(&name), "give each a unique name in ASCII");
         }
         let mut sum = Summed::default();
         npy::write(&mut sum, array).map_err(|e| IoError::os(path, "write it", e))?;
@@ -117,13 +113,13 @@ impl Write for Summed {
 ///
 /// # Errors
 /// [`IoError::Binary`] where the file is not a zip archive of arrays of numbers, is cut off, or damaged.
-pub fn read_npz(path: impl AsRef<Path>) -> Result<Vec<(String, NpyArray)>, IoError> {
+pub fn read_npz(path: impl AsRef<Path>) -> Result<Vec<(String, NpyArray)>> {
     let path = path.as_ref();
     parse_npz(BufReader::new(open_file(path)?), path)
 }
 
 fn word(bytes: &[u8], at: usize) -> u64 {
-    u64::from(u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]))
+    u64::from(u32_at(bytes, at))
 }
 
 fn short(bytes: &[u8], at: usize) -> usize {
@@ -134,7 +130,7 @@ fn short(bytes: &[u8], at: usize) -> usize {
 ///
 /// # Errors
 /// As [`read_npz`].
-pub fn parse_npz(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String, NpyArray)>, IoError> {
+pub fn parse_npz(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String, NpyArray)>> {
     let failed = |e| IoError::os(path, "read it", e);
     let bad = |at: u64, field: &str, value: String| {
         let advice = "give a .npz as numpy.savez writes it; this one is cut off, damaged or of another kind";
@@ -179,7 +175,7 @@ pub fn parse_npz(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String,
         }
         let local = bytes_at(offset, 30)?;
         if &local[..4] != LOCAL || short(entry, 8) & 1 == 1 {
-            return Err(bad(offset, "the header of an array", shown(name.as_bytes())));
+            return Err(bad(offset, "the header of an array", shown(&name)));
         }
         let data_at = offset + 30 + short(&local, 26) as u64 + short(&local, 28) as u64;
         let data = bytes_at(data_at, packed)?;
@@ -189,7 +185,7 @@ pub fn parse_npz(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String,
                 // One byte more than announced is enough to refuse it, without unpacking the rest.
                 let mut out = Vec::new();
                 let read = DeflateDecoder::new(&data[..]).take(unpacked + 1).read_to_end(&mut out);
-                read.map_err(|_| bad(data_at, "the packed data", shown(name.as_bytes())))?;
+                read.map_err(|_| bad(data_at, "the packed data", shown(&name)))?;
                 out
             }
             m => return Err(bad(offset, "the method of packing", m.to_string())),
@@ -197,7 +193,7 @@ pub fn parse_npz(mut file: impl Read + Seek, path: &Path) -> Result<Vec<(String,
         let mut sum = flate2::Crc::new();
         sum.update(&data);
         if data.len() as u64 != unpacked || u64::from(sum.sum()) != crc {
-            return Err(bad(data_at, "the check sum of an array", shown(name.as_bytes())));
+            return Err(bad(data_at, "the check sum of an array", shown(&name)));
         }
         let array = npy::parse_npy(&data[..], path)?;
         arrays.push((name.strip_suffix(".npy").unwrap_or(&name).to_owned(), array));
@@ -211,7 +207,7 @@ mod tests {
 
     use super::*;
     use crate::NpyValues;
-    use crate::testing::{bad_bytes, python};
+    use crate::testing::{no_panic, python, says, temporary};
 
     fn arrays() -> Vec<(&'static str, NpyArray)> {
         vec![
@@ -238,8 +234,7 @@ mod tests {
 
     #[test]
     fn round_trips_with_the_same_bytes_every_time() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npz");
+        let (_folder, path) = temporary("a.npz");
         let bytes = written(&path);
         assert_eq!(text(&read_npz(&path).unwrap()), text(&arrays()));
         assert_eq!(bytes, written(&path));
@@ -250,8 +245,7 @@ mod tests {
     #[test]
     fn numpy_reads_it_and_we_read_numpys() {
         let Some(python) = python("numpy") else { return };
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npz");
+        let (folder, path) = temporary("a.npz");
         written(&path);
         let script = "import sys, numpy as np\n\
             a = np.load(sys.argv[1])\n\
@@ -272,11 +266,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_refused() {
+    fn what_is_wrong_is_refused_and_no_bytes_make_it_panic() {
         let one = NpyArray::number(1.0);
         for names in [["a", "a"], ["", "b"], ["a/b", "b"], ["a.b", "b"]] {
             let list = names.map(|n| (n, &one));
-            assert!(write_npz("never.npz", &list).unwrap_err().to_string().contains("the name of an array"));
+            says(write_npz("never.npz", &list), "the name of an array");
         }
         let folder = tempfile::tempdir().unwrap();
         let good = written(&folder.path().join("a.npz"));
@@ -287,14 +281,6 @@ mod tests {
         let at = good.windows(4).position(|w| w == [0, 0, 0x80, 0x3f]).unwrap();
         damaged[at] ^= 1;
         assert!(error(&damaged).contains("the check sum of an array is \"distance.npy\""));
-    }
-
-    #[test]
-    fn no_bytes_make_it_panic() {
-        let folder = tempfile::tempdir().unwrap();
-        let good = written(&folder.path().join("a.npz"));
-        for bytes in bad_bytes(&good, 22, 3000) {
-            let _ = parse_npz(Cursor::new(bytes), "a.npz".as_ref());
-        }
+        no_panic(&good, 22, 3000, |bytes| parse_npz(Cursor::new(bytes), "a.npz".as_ref()));
     }
 }

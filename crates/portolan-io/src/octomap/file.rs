@@ -6,9 +6,9 @@ use portolan::cell::LogOdds32;
 use portolan::store::Tree;
 
 use super::header::{Header, Kind};
+use super::read;
 use super::stored::Stored;
-use super::{read, write};
-use crate::{Compression, IoError};
+use crate::{Compression, Result};
 
 /// An OctoMap file: the tree of log odds, and the rest of the file.
 ///
@@ -33,9 +33,9 @@ impl OctomapTree {
     /// stamps are not in the file) and `ColorOcTree` (whose colors are passed over) are read.
     ///
     /// # Errors
-    /// [`IoError`] where a field is wrong, a log odds is not finite, the number of nodes differs from the header's, they
+    /// [`crate::IoError`] where a field is wrong, a log odds is not finite, the number of nodes differs from the header's, they
     /// would take more than 4 GiB (a file that is not packed: 16 GiB), or bytes are missing or left over.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let input = crate::open(&path)?;
         let packed = input.compression();
         read::read(input, packed, path.as_ref())
@@ -45,7 +45,7 @@ impl OctomapTree {
     ///
     /// # Errors
     /// As [`OctomapTree::read`].
-    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self, IoError> {
+    pub fn parse(bytes: &[u8], name: &Path) -> Result<Self> {
         read::read(bytes, Compression::Plain, name)
     }
 
@@ -93,23 +93,5 @@ impl OctomapTree {
     /// Whether the file had colors, which are not kept.
     pub fn colors_left_out(&self) -> bool {
         self.colors_left_out
-    }
-
-    /// Writes a `.bt`. Read from a `.bt` it has the same bytes; else every leaf becomes free or occupied and equal leaves
-    /// are merged, as OctoMap's `writeBinary` does it. Comments and class name stay.
-    ///
-    /// # Errors
-    /// As [`crate::write_atomic`].
-    pub fn write_bt(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
-        write::file_bt(self, path.as_ref())
-    }
-
-    /// Writes an `.ot`. Nodes are those of the file that was read, and read from an `.ot` without colors it has the same
-    /// bytes. Comments stay; the class is `OcTree`, or `OcTreeStamped` where it was.
-    ///
-    /// # Errors
-    /// As [`crate::write_atomic`].
-    pub fn write_ot(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
-        write::file_ot(self, path.as_ref())
     }
 }

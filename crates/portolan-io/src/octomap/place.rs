@@ -7,16 +7,13 @@ use portolan::cell::LogOddsValue;
 use portolan::store::{Store, Tree};
 
 use super::{DEPTH, HALF};
-use crate::IoError;
+use crate::{IoError, Result};
 
 /// How far an origin may be from a multiple of the resolution (cells).
 const OFF: f64 = 1e-6;
 
 /// The tree in OctoMap's place and depth.
-pub(super) fn placed<'a, V: LogOddsValue>(
-    tree: &'a Tree<V, 3>,
-    path: &Path,
-) -> Result<Cow<'a, Tree<V, 3>>, IoError> {
+pub(super) fn placed<'a, V: LogOddsValue>(tree: &'a Tree<V, 3>, path: &Path) -> Result<Cow<'a, Tree<V, 3>>> {
     let (origin, resolution) = (tree.lattice().origin, tree.lattice().resolution);
     if !(1e-9..=1e9).contains(&resolution) {
         let value = format!("{resolution} m");
@@ -49,6 +46,6 @@ pub(super) fn placed<'a, V: LogOddsValue>(
     // Cannot fail: the box was checked. A tree without leaves fits anywhere.
     let moved = tree.moved_to(first, DEPTH);
     moved.map(Cow::Owned).ok_or_else(|| {
-        IoError::unwritable(path, "the depth of the map", tree.depth().to_string(), "give one from 3 to 28")
+        IoError::unwritable(path, "the depth of the map", tree.depth(), "give one from 3 to 28")
     })
 }

@@ -1,5 +1,6 @@
 //! Reading the nodes.
 
+use std::fmt::Display;
 use std::io::{BufRead, ErrorKind};
 use std::path::Path;
 
@@ -14,10 +15,10 @@ use super::{
 };
 use crate::bytes::read_failed;
 use crate::error::shown;
-use crate::{Compression, IoError};
+use crate::{Compression, IoError, Result};
 
 /// Reads a file of either kind.
-pub(super) fn read(reader: impl BufRead, packed: Compression, path: &Path) -> Result<OctomapTree, IoError> {
+pub(super) fn read(reader: impl BufRead, packed: Compression, path: &Path) -> Result<OctomapTree> {
     let memory = if packed == Compression::Plain { MOST_MEMORY_PLAIN } else { MOST_MEMORY_PACKED };
     read_within(reader, packed, path, memory)
 }
@@ -28,12 +29,12 @@ pub(super) fn read_within(
     packed: Compression,
     path: &Path,
     memory: u64,
-) -> Result<OctomapTree, IoError> {
+) -> Result<OctomapTree> {
     let header = Header::read(&mut reader, packed, path)?;
     let color = header.kind == Kind::Ot && header.class == "ColorOcTree";
     if header.kind == Kind::Ot && !color && !["OcTree", "OcTreeStamped"].contains(&header.class.as_str()) {
         let advice = "OcTree, OcTreeStamped and ColorOcTree are read; write it as .bt with OctoMap";
-        return Err(IoError::binary(path, 0, "the class (id)", shown(header.class.as_bytes()), advice));
+        return Err(IoError::binary(path, 0, "the class (id)", shown(header.class), advice));
     }
     let mut nodes = Nodes {
         path,
@@ -64,9 +65,8 @@ pub(super) fn read_within(
     let resolution = header.resolution;
     let origin = [f64::from(-HALF) * resolution; 3];
     let tree = Tree::from_records(origin, resolution, DEPTH, &nodes.records);
-    let tree = tree.map_err(|e| {
-        IoError::binary(path, nodes.offset, "the tree", e.to_string(), "copy or download the file again")
-    })?;
+    let tree = tree
+        .map_err(|e| IoError::binary(path, nodes.offset, "the tree", e, "copy or download the file again"))?;
     let mut stored = nodes.stored;
     stored.sort();
     let [free, occupied] = nodes.leaves;
@@ -94,13 +94,13 @@ struct Nodes<'a, R> {
 }
 
 impl<R: BufRead> Nodes<'_, R> {
-    fn bad<T>(&self, offset: u64, field: &str, value: impl ToString, advice: &str) -> Result<T, IoError> {
-        Err(IoError::binary(self.path, offset, field, value.to_string(), advice))
+    fn bad<T>(&self, offset: u64, field: &str, value: impl Display, advice: &str) -> Result<T> {
+        Err(IoError::binary(self.path, offset, field, value, advice))
     }
 
     /// The next `N` bytes.
     #[inline]
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], IoError> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
         let mut bytes = [0; N];
         let mut got = 0;
         while got < N {
@@ -123,7 +123,7 @@ impl<R: BufRead> Nodes<'_, R> {
         Ok(bytes)
     }
 
-    fn count(&mut self, offset: u64) -> Result<(), IoError> {
+    fn count(&mut self, offset: u64) -> Result<()> {
         self.nodes += 1;
         if self.nodes > self.announced {
             let advice = format!("the header announces {}: the file is damaged", self.announced);
@@ -133,7 +133,7 @@ impl<R: BufRead> Nodes<'_, R> {
     }
 
     /// The number of a new inner node and its record. What it takes is charged first.
-    fn inner(&mut self, offset: u64) -> Result<(u32, usize), IoError> {
+    fn inner(&mut self, offset: u64) -> Result<(u32, usize)> {
         let beside = (self.stored.open.len() + self.stored.values.len()) as u64;
         let taken = (self.records.masks.len() as u64 + 1) * NODE_MEMORY + beside * STORED_MEMORY;
         if taken > self.memory {
@@ -154,12 +154,12 @@ impl<R: BufRead> Nodes<'_, R> {
         Slot::Leaf(LogOdds32(value))
     }
 
-    fn too_deep<T>(&self, offset: u64) -> Result<T, IoError> {
+    fn too_deep<T>(&self, offset: u64) -> Result<T> {
         self.bad(offset, "the depth of a node", "17", "a tree has 16 levels: the file is damaged")
     }
 
     /// An inner node of a `.bt`, `height` levels above the finest.
-    fn bt(&mut self, height: u32) -> Result<Slot<LogOdds32>, IoError> {
+    fn bt(&mut self, height: u32) -> Result<Slot<LogOdds32>> {
         let offset = self.offset;
         let word = u16::from_le_bytes(self.take()?);
         if word == 0 {
@@ -193,7 +193,7 @@ impl<R: BufRead> Nodes<'_, R> {
 
     /// A node of an `.ot`, `height` levels above the finest: what it is, its value (of an inner node the largest below),
     /// and whether it is an inner node in the file.
-    fn ot(&mut self, height: u32) -> Result<(Slot<LogOdds32>, LogOdds32, bool), IoError> {
+    fn ot(&mut self, height: u32) -> Result<(Slot<LogOdds32>, LogOdds32, bool)> {
         let offset = self.offset;
         self.count(offset)?;
         let value = f32::from_le_bytes(self.take()?);
@@ -230,7 +230,7 @@ impl<R: BufRead> Nodes<'_, R> {
     }
 
     /// Checks that the file ends with the tree.
-    fn end(&mut self) -> Result<(), IoError> {
+    fn end(&mut self) -> Result<()> {
         if self.nodes != self.announced {
             let advice = format!("the header announces {}: the file is damaged", self.announced);
             return self.bad(self.offset, "the number of nodes", self.nodes, &advice);
@@ -239,12 +239,8 @@ impl<R: BufRead> Nodes<'_, R> {
             Ok([]) => Ok(()),
             Ok(rest) => {
                 let value = shown(&rest[..rest.len().min(16)]);
-                self.bad(
-                    self.offset,
-                    "the data after the last node",
-                    value,
-                    "the tree ends before it: cut it off",
-                )
+                let advice = "the tree ends before it: cut it off";
+                self.bad(self.offset, "the data after the last node", value, advice)
             }
             Err(e) => Err(read_failed(self.path, self.packed, self.offset, e)),
         }

@@ -6,15 +6,7 @@ use portolan::store::{Bricks, Slot, Store, Tree, TreeRecords};
 
 use super::*;
 use crate::Compression;
-use crate::testing::{Random, bad_bytes, real_data};
-
-/// The bytes that a writer makes.
-fn written(write: impl FnOnce(&Path) -> Result<(), crate::IoError>) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("tree");
-    write(&path).unwrap();
-    std::fs::read(&path).unwrap()
-}
+use crate::testing::{Random, bad_bytes, real_data, written};
 
 fn parse(bytes: &[u8]) -> Result<OctomapTree, crate::IoError> {
     OctomapTree::parse(bytes, Path::new("t.bt"))

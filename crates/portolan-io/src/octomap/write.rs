@@ -11,7 +11,7 @@ use super::header::{Header, Kind};
 use super::place::placed;
 use super::stored::{Cursor, Stored};
 use super::{OCTOMAP_FREE, OCTOMAP_OCCUPIED, OctomapTree};
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// Writes a tree as OctoMap's `.bt`: every leaf free or occupied (log odds 0 and above, as OctoMap has it), equal leaves
 /// merged.
@@ -19,7 +19,7 @@ use crate::{IoError, write_atomic};
 /// # Errors
 /// [`IoError::Unwritable`] where the tree's origin is not a multiple of its resolution or something was observed outside
 /// of OctoMap's 65,536 cells about the world's zero; else as [`write_atomic`].
-pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 3>) -> Result<(), IoError> {
+pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 3>) -> Result<()> {
     let path = path.as_ref();
     let (header, tree, stored) = bt(tree, path)?;
     write(&header, &tree, &stored, path)
@@ -29,7 +29,7 @@ pub fn write_octomap_bt<V: LogOddsValue>(path: impl AsRef<Path>, tree: &Tree<V, 
 ///
 /// # Errors
 /// [`IoError::Unwritable`] as [`write_octomap_bt`].
-pub fn octomap_bt_to_bytes<V: LogOddsValue>(tree: &Tree<V, 3>) -> Result<Vec<u8>, IoError> {
+pub fn octomap_bt_to_bytes<V: LogOddsValue>(tree: &Tree<V, 3>) -> Result<Vec<u8>> {
     let name = Path::new("octree.bt");
     let (header, tree, stored) = bt(tree, name)?;
     let mut bytes = Vec::new();
@@ -38,18 +38,13 @@ pub fn octomap_bt_to_bytes<V: LogOddsValue>(tree: &Tree<V, 3>) -> Result<Vec<u8>
 }
 
 /// What a `.bt` of a tree holds.
-fn bt<V: LogOddsValue>(
-    tree: &Tree<V, 3>,
-    path: &Path,
-) -> Result<(Header, Tree<LogOdds32, 3>, Stored), IoError> {
+fn bt<V: LogOddsValue>(tree: &Tree<V, 3>, path: &Path) -> Result<(Header, Tree<LogOdds32, 3>, Stored)> {
     let tree = likeliest(tree);
     let moved = match placed(&tree, path)? {
         Cow::Owned(moved) => Some(moved),
         Cow::Borrowed(_) => None,
     };
-    let tree = moved.unwrap_or(tree);
-    let stored = open_root(&tree);
-    let size = tree.nodes() as u64 + if stored.root_open { 8 } else { 0 };
+    let (tree, stored, size) = opened(moved.unwrap_or(tree));
     Ok((Header::new(Kind::Bt, size, tree.lattice().resolution), tree, stored))
 }
 
@@ -63,7 +58,7 @@ pub fn write_octomap_ot<V: LogOddsValue>(
     path: impl AsRef<Path>,
     tree: &Tree<V, 3>,
     quantum: f64,
-) -> Result<(), IoError> {
+) -> Result<()> {
     let path = path.as_ref();
     let tree = tree.map_values(|v| LogOdds32((v.units() * quantum) as f32));
     let mut infinite = None;
@@ -81,22 +76,31 @@ pub fn write_octomap_ot<V: LogOddsValue>(
     write(&header, &tree, &Stored::default(), path)
 }
 
-/// [`OctomapTree::write_bt`].
-pub(super) fn file_bt(file: &OctomapTree, path: &Path) -> Result<(), IoError> {
-    if file.header.kind == Kind::Bt {
-        return write(&file.header, &file.tree, &file.stored, path);
+impl OctomapTree {
+    /// Writes a `.bt`. Read from a `.bt` it has the same bytes; else every leaf becomes free or occupied and equal leaves
+    /// are merged, as OctoMap's `writeBinary` does it. Comments and class name stay.
+    ///
+    /// # Errors
+    /// As [`crate::write_atomic`].
+    pub fn write_bt(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        if self.header.kind == Kind::Bt {
+            return write(&self.header, &self.tree, &self.stored, path);
+        }
+        let (tree, stored, size) = opened(likeliest(&self.tree));
+        write(&self.header.changed(Kind::Bt, &self.header.class, size), &tree, &stored, path)
     }
-    let tree = likeliest(&file.tree);
-    let stored = open_root(&tree);
-    let size = tree.nodes() as u64 + if stored.root_open { 8 } else { 0 };
-    write(&file.header.changed(Kind::Bt, &file.header.class, size), &tree, &stored, path)
-}
 
-/// [`OctomapTree::write_ot`].
-pub(super) fn file_ot(file: &OctomapTree, path: &Path) -> Result<(), IoError> {
-    let class = if file.header.class == "OcTreeStamped" { "OcTreeStamped" } else { "OcTree" };
-    let header = file.header.changed(Kind::Ot, class, file.header.size);
-    write(&header, &file.tree, &file.stored, path)
+    /// Writes an `.ot`. Nodes are those of the file that was read, and read from an `.ot` without colors it has the same
+    /// bytes. Comments stay; the class is `OcTree`, or `OcTreeStamped` where it was.
+    ///
+    /// # Errors
+    /// As [`crate::write_atomic`].
+    pub fn write_ot(&self, path: impl AsRef<Path>) -> Result<()> {
+        let class = if self.header.class == "OcTreeStamped" { "OcTreeStamped" } else { "OcTree" };
+        let header = self.header.changed(Kind::Ot, class, self.header.size);
+        write(&header, &self.tree, &self.stored, path.as_ref())
+    }
 }
 
 /// Every leaf at one of two values.
@@ -104,12 +108,14 @@ fn likeliest<V: LogOddsValue>(tree: &Tree<V, 3>) -> Tree<LogOdds32, 3> {
     tree.map_values(|v| LogOdds32(if v.units() >= 0.0 { OCTOMAP_OCCUPIED } else { OCTOMAP_FREE }))
 }
 
-/// A `.bt` has inner nodes only, so that a root that is a leaf is written with its eight children.
-fn open_root(tree: &Tree<LogOdds32, 3>) -> Stored {
-    Stored { root_open: tree.inner_nodes() == 0 && tree.nodes() == 1, ..Stored::default() }
+/// A `.bt` has inner nodes only, so that a root that is a leaf is written with its eight children. With the number of nodes.
+fn opened(tree: Tree<LogOdds32, 3>) -> (Tree<LogOdds32, 3>, Stored, u64) {
+    let root_open = tree.inner_nodes() == 0 && tree.nodes() == 1;
+    let size = tree.nodes() as u64 + if root_open { 8 } else { 0 };
+    (tree, Stored { root_open, ..Stored::default() }, size)
 }
 
-fn write(header: &Header, tree: &Tree<LogOdds32, 3>, stored: &Stored, path: &Path) -> Result<(), IoError> {
+fn write(header: &Header, tree: &Tree<LogOdds32, 3>, stored: &Stored, path: &Path) -> Result<()> {
     write_atomic(path, |out| write_to(out, header, tree, stored))
 }
 

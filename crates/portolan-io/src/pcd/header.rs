@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::IoError;
-use crate::bytes::{Scalar, fields, parse_f64};
+use crate::bytes::{Scalar, fields, header_line, parse_f64, whole};
 use crate::error::shown;
 use crate::points::Viewpoint;
+use crate::{IoError, Result};
 
 /// The most fields, and the most values of a point.
 const MOST_FIELDS: usize = 256;
@@ -73,19 +73,16 @@ struct Lines<'a> {
     viewpoint: Option<Viewpoint>,
 }
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let mut lines = Lines::default();
     let (mut at, mut number) = (0, 0);
     let data = loop {
         number += 1;
-        let line_end = bytes[at..].iter().take(1 << 16).position(|b| *b == b'\n');
-        let Some(length) = line_end else {
+        let Some(line) = header_line(bytes, &mut at) else {
             let advice = "give a PCD file, whose header ends with a line DATA";
             let value = shown(&bytes[at..bytes.len().min(at + 48)]);
             return Err(IoError::text(path, number, "the header", value, advice));
         };
-        let line = &bytes[at..at + length];
-        at += length + 1;
         let mut words = fields(line);
         let Some(key) = words.next() else { continue };
         let words: Vec<&[u8]> = words.take(MOST_FIELDS + 1).collect();
@@ -131,7 +128,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
 }
 
 impl Lines<'_> {
-    fn fields(&self, data: Data, path: &Path) -> Result<Vec<Field>, IoError> {
+    fn fields(&self, data: Data, path: &Path) -> Result<Vec<Field>> {
         let n = self.names.len();
         let wrong =
             |what: &str, value: String, advice: &str| Err(IoError::text(path, 1, what, value, advice));
@@ -172,7 +169,7 @@ impl Lines<'_> {
     }
 
     /// Columns and rows.
-    fn shape(&self, path: &Path) -> Result<(usize, usize), IoError> {
+    fn shape(&self, path: &Path) -> Result<(usize, usize)> {
         let (width, height) = match (self.width, self.height, self.points) {
             (Some(width), height, _) => (width, height.unwrap_or(1)),
             (None, _, Some(points)) => (points, 1),
@@ -193,10 +190,6 @@ impl Lines<'_> {
 
 fn bad(path: &Path, number: u64, key: &[u8], value: &[u8], advice: &str) -> IoError {
     IoError::text(path, number, String::from_utf8_lossy(key), shown(value), advice)
-}
-
-fn whole(word: &[u8]) -> Option<usize> {
-    std::str::from_utf8(word).ok()?.parse().ok()
 }
 
 fn scalar(kind: &[u8], size: &[u8]) -> Option<Scalar> {

@@ -5,10 +5,10 @@ use std::path::Path;
 use super::columns::{Column, rgb};
 use super::header::{self, Data, Field, Header};
 use super::lzf;
-use crate::IoError;
 use crate::bytes::{Input, Scalar, fields, open, parse_f64};
 use crate::error::shown;
-use crate::points::{CloudBuilder, PointCloudFile, Viewpoint, channel, is_time, most_bytes, time_unit};
+use crate::points::{CloudBuilder, PointCloudFile, PointFields, Viewpoint, is_time, most_bytes};
+use crate::{IoError, Result};
 
 /// A header is no longer than this (bytes).
 const LONGEST_HEADER: u64 = 64 << 10;
@@ -18,22 +18,22 @@ const LONGEST_HEADER: u64 = 64 << 10;
 ///
 /// # Errors
 /// [`IoError::Text`] for a wrong header or a wrong line, [`IoError::Binary`] for a body that is too short or damaged.
-pub fn read_pcd(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+pub fn read_pcd(path: impl AsRef<Path>) -> Result<PointCloudFile> {
     parse(open(path)?)
 }
 
 /// The viewpoint in a file's header.
-pub(crate) fn read_viewpoint(path: &Path) -> Result<Option<Viewpoint>, IoError> {
+pub(crate) fn read_viewpoint(path: &Path) -> Result<Option<Viewpoint>> {
     let head = open(path)?.read_up_to(LONGEST_HEADER)?;
     Ok(header::parse(&head, path)?.viewpoint)
 }
 
-pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
+pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile> {
     let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }
 
-fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, IoError> {
+fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile> {
     let header = header::parse(bytes, path)?;
     let body = &bytes[header.body..];
     match header.data {
@@ -57,14 +57,14 @@ fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, IoError> {
 }
 
 /// Bytes of all points.
-fn size_of(header: &Header, path: &Path) -> Result<usize, IoError> {
+fn size_of(header: &Header, path: &Path) -> Result<usize> {
     header.points().checked_mul(header.stride).ok_or_else(|| {
         let value = format!("{} points of {} bytes", header.points(), header.stride);
         IoError::binary(path, header.body as u64, "the size of the data", value, "split the file")
     })
 }
 
-fn unpack(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, IoError> {
+fn unpack(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>> {
     let at = header.body as u64;
     let size = size_of(header, path)?;
     let word = |k: usize| {
@@ -76,7 +76,7 @@ fn unpack(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, IoError>
     };
     if unpacked_size != size {
         let advice = format!("{} points of {} bytes need {size}", header.points(), header.stride);
-        return Err(IoError::binary(path, at + 4, "the unpacked size", unpacked_size.to_string(), advice));
+        return Err(IoError::binary(path, at + 4, "the unpacked size", unpacked_size, advice));
     }
     let Some(packed) = body[8..].get(..packed_size) else {
         let value = format!("{} bytes", body.len() - 8);
@@ -90,7 +90,7 @@ fn unpack(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, IoError>
 }
 
 /// The text body as the binary body would be.
-fn text_to_binary(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, IoError> {
+fn text_to_binary(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>> {
     let kinds: Vec<(Scalar, bool)> = (header.fields.iter())
         .flat_map(|f| std::iter::repeat_n((f.scalar, f.name == "rgb" || f.name == "rgba"), f.count))
         .collect();
@@ -122,13 +122,7 @@ fn text_to_binary(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>, 
     }
     if points < header.points() {
         let advice = format!("the header announces {}: the file is cut off", header.points());
-        return Err(IoError::text(
-            path,
-            header.body_line,
-            "the number of points",
-            points.to_string(),
-            advice,
-        ));
+        return Err(IoError::text(path, header.body_line, "the number of points", points, advice));
     }
     Ok(out)
 }
@@ -153,49 +147,33 @@ fn put(out: &mut Vec<u8>, value: f64, scalar: Scalar, color: bool) {
 }
 
 /// The columns that a cloud is made of.
-fn cloud(body: &[u8], header: &Header, path: &Path) -> Result<PointCloudFile, IoError> {
+fn cloud(body: &[u8], header: &Header, path: &Path) -> Result<PointCloudFile> {
     let column = |field: &Field| Column::of(field, header, body);
     let named = |names: &[&str]| header.field(names).and_then(column);
     let three = |a, b, c| Some([named(&[a])?, named(&[b])?, named(&[c])?]);
     let Some(position) = three("x", "y", "z") else {
         let names: Vec<_> = header.fields.iter().map(|f| f.name.as_str()).collect();
         let advice = "give a cloud with fields x, y and z";
-        return Err(IoError::text(path, 1, "FIELDS", shown(names.join(" ").as_bytes()), advice));
+        return Err(IoError::text(path, 1, "FIELDS", shown(names.join(" ")), advice));
     };
-    let intensity = named(&["intensity", "i", "reflectivity", "reflectance"]);
     let packed = named(&["rgb", "rgba"]);
     let channels = three("r", "g", "b").or_else(|| three("red", "green", "blue"));
-    let normal = three("normal_x", "normal_y", "normal_z");
-    let ring = named(&["ring", "channel"]);
-    let time = header.fields.iter().find(|f| is_time(&f.name)).and_then(column);
-
-    let fine = position[0].scalar == Scalar::F64;
-    let mut builder = CloudBuilder::new(fine);
+    let fields = PointFields {
+        position,
+        intensity: named(&["intensity", "i", "reflectivity", "reflectance"]),
+        color: channels.filter(|_| packed.is_none()),
+        normal: three("normal_x", "normal_y", "normal_z"),
+        ring: named(&["ring", "channel"]),
+        time: header.fields.iter().find(|f| is_time(&f.name)).and_then(column),
+    };
+    let mut builder = CloudBuilder::new(position[0].scalar == Scalar::F64);
     builder.cloud.viewpoint = header.viewpoint;
     if header.height > 1 {
         builder.organize(header.width, header.height);
     }
     for i in 0..header.points() {
-        if !builder.push(i, position.map(|c| c.get(i))) {
-            continue;
-        }
-        if let Some(column) = intensity {
-            builder.cloud.intensity.push(column.get(i) as f32);
-        }
-        if let Some(column) = packed {
-            builder.cloud.colors.push(rgb(column.bits(i)));
-        } else if let Some(columns) = channels {
-            builder.cloud.colors.push(columns.map(|c| channel(c.get(i), c.scalar)));
-        }
-        if let Some(columns) = normal {
-            builder.cloud.normals.push(columns.map(|c| c.get(i) as f32));
-        }
-        if let Some(column) = ring {
-            builder.cloud.rings.push(column.get(i) as u16);
-        }
-        if let Some(column) = time {
-            builder.times.push(column.get(i) * time_unit(column.scalar));
-        }
+        let kept = builder.push_fields(i, &fields, |column| (column.get(i), column.scalar));
+        builder.cloud.colors.extend(packed.filter(|_| kept).map(|column| rgb(column.bits(i))));
     }
     Ok(builder.finish())
 }

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::points::{PointCloudFile, Viewpoint};
-use crate::{IoError, write_atomic};
+use crate::{IoError, Result, write_atomic};
 
 /// Writes a binary PCD file (version 0.7) with the fields that the cloud has; coordinates are doubles where it has an
 /// offset, else floats. Times are written as `timestamp` (doubles, seconds). An organized cloud gets its pixels without a
@@ -13,25 +13,11 @@ use crate::{IoError, write_atomic};
 /// # Errors
 /// [`IoError::Unwritable`] where a list is neither empty nor as long as the points, or where rows and columns do not hold
 /// the points, else as [`write_atomic`].
-pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), IoError> {
+pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<()> {
     let path = path.as_ref();
     let n = cloud.points.len();
-    let lists = [
-        ("intensities", cloud.intensity.len()),
-        ("times", cloud.times.len()),
-        ("rings", cloud.rings.len()),
-        ("colors", cloud.colors.len()),
-        ("normals", cloud.normals.len()),
-    ];
-    if let Some((name, length)) = lists.iter().find(|(_, length)| *length != 0 && *length != n) {
-        let value = length.to_string();
-        return Err(IoError::unwritable(
-            path,
-            format!("the number of {name}"),
-            value,
-            format!("give {n}, or an empty list"),
-        ));
-    }
+    let lists = [("times", cloud.times.len()), ("rings", cloud.rings.len())];
+    cloud.check_lists(path, &lists)?;
     if let Some(grid) = &cloud.grid {
         let size = grid.columns.saturating_mul(grid.rows);
         let ascending = grid.pixels.windows(2).all(|w| w[0] < w[1]);
@@ -50,20 +36,16 @@ pub fn write_pcd(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), I
 
 fn write_to(w: &mut impl Write, cloud: &PointCloudFile) -> io::Result<()> {
     let fine = cloud.offset != [0.0; 3];
-    let coordinate = if fine { (8, 'F') } else { (4, 'F') };
-    let mut fields = vec![("x", coordinate), ("y", coordinate), ("z", coordinate)];
-    for (name, field, has) in [
-        ("intensity", (4, 'F'), !cloud.intensity.is_empty()),
-        ("rgb", (4, 'F'), !cloud.colors.is_empty()),
-        ("normal_x", (4, 'F'), !cloud.normals.is_empty()),
-        ("normal_y", (4, 'F'), !cloud.normals.is_empty()),
-        ("normal_z", (4, 'F'), !cloud.normals.is_empty()),
-        ("ring", (2, 'U'), !cloud.rings.is_empty()),
-        ("timestamp", (8, 'F'), !cloud.times.is_empty()),
+    let mut fields = Vec::new();
+    for (names, field, has) in [
+        (&["x", "y", "z"][..], (if fine { 8 } else { 4 }, 'F'), true),
+        (&["intensity"], (4, 'F'), !cloud.intensity.is_empty()),
+        (&["rgb"], (4, 'F'), !cloud.colors.is_empty()),
+        (&["normal_x", "normal_y", "normal_z"], (4, 'F'), !cloud.normals.is_empty()),
+        (&["ring"], (2, 'U'), !cloud.rings.is_empty()),
+        (&["timestamp"], (8, 'F'), !cloud.times.is_empty()),
     ] {
-        if has {
-            fields.push((name, field));
-        }
+        fields.extend(names.iter().filter(|_| has).map(|name| (*name, field)));
     }
     let names: Vec<_> = fields.iter().map(|f| f.0.to_owned()).collect();
     let sizes: Vec<_> = fields.iter().map(|f| f.1.0.to_string()).collect();
@@ -105,11 +87,7 @@ fn write_to(w: &mut impl Write, cloud: &PointCloudFile) -> io::Result<()> {
 
 /// A pixel without a reading: NaN coordinates, the rest zero.
 fn empty_pixel(fine: bool, stride: usize) -> Vec<u8> {
-    let mut bytes: Vec<u8> = if fine {
-        std::iter::repeat_n(f64::NAN.to_le_bytes(), 3).flatten().collect()
-    } else {
-        std::iter::repeat_n(f32::NAN.to_le_bytes(), 3).flatten().collect()
-    };
+    let mut bytes = if fine { f64::NAN.to_le_bytes().repeat(3) } else { f32::NAN.to_le_bytes().repeat(3) };
     bytes.resize(stride, 0);
     bytes
 }

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::body::Body;
 use super::header::{self, Element, Header};
-use crate::IoError;
 use crate::bytes::{Input, Scalar, open};
-use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, channel, is_time, most_bytes, time_unit};
+use crate::points::{CloudBuilder, CloudGrid, PointCloudFile, PointFields, is_time, most_bytes};
+use crate::{IoError, Result};
 
 /// The most pixels of a range grid.
 const MOST_PIXELS: u64 = 1 << 30;
@@ -18,16 +18,16 @@ const MOST_PIXELS: u64 = 1 << 30;
 /// # Errors
 /// [`IoError::Text`] for a wrong header or text, [`IoError::Binary`] for wrong binary data, both for a grid that names
 /// vertices that are not there or names one twice.
-pub fn read_ply_cloud(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+pub fn read_ply_cloud(path: impl AsRef<Path>) -> Result<PointCloudFile> {
     parse(open(path)?)
 }
 
-pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile, IoError> {
+pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile> {
     let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }
 
-pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, IoError> {
+pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile> {
     let header = header::parse(bytes, path)?;
     let mut body = Body::of(&header, bytes, path);
     let mut cloud = None;
@@ -48,7 +48,7 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, I
     }
     cloud.ok_or_else(|| {
         let names: Vec<_> = header.elements.iter().map(|e| e.name.as_str()).collect();
-        let value = crate::error::shown(names.join(" ").as_bytes());
+        let value = crate::error::shown(names.join(" "));
         IoError::text(path, header.body_line - 1, "the elements", value, "give a file with vertices")
     })
 }
@@ -58,32 +58,17 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile, I
 struct Vertices(Vec<Option<u32>>);
 
 /// The places of a vertex's properties.
-struct Fields {
-    position: [(usize, Scalar); 3],
-    intensity: Option<(usize, Scalar)>,
-    normal: Option<[(usize, Scalar); 3]>,
-    color: Option<[(usize, Scalar); 3]>,
-    ring: Option<(usize, Scalar)>,
-    time: Option<(usize, Scalar)>,
-}
-
-impl Fields {
-    fn of(element: &Element) -> Option<Self> {
-        let color = [
-            &["red", "r", "diffuse_red"][..],
-            &["green", "g", "diffuse_green"],
-            &["blue", "b", "diffuse_blue"],
-        ];
-        let names = element.properties.iter().map(|p| p.name.as_str());
-        Some(Self {
-            position: element.three([&["x"], &["y"], &["z"]])?,
-            intensity: element.value(&["intensity", "scalar_intensity", "reflectance", "reflectivity"]),
-            normal: element.three([&["nx"], &["ny"], &["nz"]]),
-            color: element.three(color),
-            ring: element.value(&["ring"]),
-            time: names.into_iter().find(|n| is_time(n)).and_then(|n| element.value(&[n])),
-        })
-    }
+fn fields_of(element: &Element) -> Option<PointFields<(usize, Scalar)>> {
+    let red = &["red", "r", "diffuse_red"][..];
+    let mut names = element.properties.iter().map(|p| p.name.as_str());
+    Some(PointFields {
+        position: element.three([&["x"], &["y"], &["z"]])?,
+        intensity: element.value(&["intensity", "scalar_intensity", "reflectance", "reflectivity"]),
+        normal: element.three([&["nx"], &["ny"], &["nz"]]),
+        color: element.three([red, &["green", "g", "diffuse_green"], &["blue", "b", "diffuse_blue"]]),
+        ring: element.value(&["ring"]),
+        time: names.find(|n| is_time(n)).and_then(|n| element.value(&[n])),
+    })
 }
 
 fn read_vertices(
@@ -92,15 +77,10 @@ fn read_vertices(
     with_grid: bool,
     vertices: &mut Vertices,
     path: &Path,
-) -> Result<PointCloudFile, IoError> {
-    let Some(fields) = Fields::of(element) else {
-        return Err(IoError::text(
-            path,
-            1,
-            "the properties of vertices",
-            "without x, y, z",
-            "give a file with points",
-        ));
+) -> Result<PointCloudFile> {
+    let Some(fields) = fields_of(element) else {
+        let (field, value) = ("the properties of vertices", "without x, y, z");
+        return Err(IoError::text(path, 1, field, value, "give a file with points"));
     };
     // Text may hold more digits than the type that the header speaks of.
     let fine = fields.position[0].1 == Scalar::F64 || body.is_text();
@@ -108,27 +88,9 @@ fn read_vertices(
     for i in 0..element.count {
         body.row(element, None)?;
         let values = &body.values;
-        let kept = builder.push(i as usize, fields.position.map(|(k, _)| values[k]));
+        let kept = builder.push_fields(i as usize, &fields, |(k, scalar)| (values[k], scalar));
         if with_grid {
             vertices.0.push(kept.then(|| builder.cloud.points.len() as u32 - 1));
-        }
-        if !kept {
-            continue;
-        }
-        if let Some((k, _)) = fields.intensity {
-            builder.cloud.intensity.push(values[k] as f32);
-        }
-        if let Some(n) = fields.normal {
-            builder.cloud.normals.push(n.map(|(k, _)| values[k] as f32));
-        }
-        if let Some(c) = fields.color {
-            builder.cloud.colors.push(c.map(|(k, scalar)| channel(values[k], scalar)));
-        }
-        if let Some((k, _)) = fields.ring {
-            builder.cloud.rings.push(values[k] as u16);
-        }
-        if let Some((k, scalar)) = fields.time {
-            builder.times.push(values[k] * time_unit(scalar));
         }
     }
     Ok(builder.finish())
@@ -141,15 +103,12 @@ fn read_grid(
     element: &Element,
     vertices: &Vertices,
     cloud: &mut PointCloudFile,
-) -> Result<(), IoError> {
+) -> Result<()> {
     let size = header.columns.zip(header.rows).map(|(c, r)| (c, r, c.saturating_mul(r)));
     let Some((columns, rows, _)) = size.filter(|s| s.2 == element.count && s.2 <= MOST_PIXELS) else {
         let value = format!("{:?} x {:?} for {} pixels", header.columns, header.rows, element.count);
-        return Err(body.error(
-            "obj_info num_cols, num_rows",
-            value,
-            "write the columns and rows of range_grid",
-        ));
+        let advice = "write the columns and rows of range_grid";
+        return Err(body.error("obj_info num_cols, num_rows", value, advice));
     };
     let wanted = element.indices();
     let (mut order, mut pixels) = (Vec::new(), Vec::new());
@@ -163,7 +122,7 @@ fn read_grid(
         let vertex = (index >= 0.0 && body.list.len() == 1).then(|| vertices.0.get(index as usize)).flatten();
         let Some(vertex) = vertex else {
             let advice = format!("a pixel has no vertex, or one of {}", vertices.0.len());
-            return Err(body.error("range_grid", format!("{:?}", body.list), &advice));
+            return Err(body.error("range_grid", format!("{:?}", body.list), advice));
         };
         // A refused vertex was counted where it was read.
         let Some(point) = *vertex else { continue };

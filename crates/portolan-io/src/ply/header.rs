@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::IoError;
-use crate::bytes::{Endian, Scalar, fields};
+use crate::bytes::{Endian, Scalar, fields, header_line, whole};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 /// The most elements, and the most properties of one.
 const MOST: usize = 256;
@@ -70,7 +70,7 @@ pub(super) struct Header {
     pub(super) body_line: u64,
 }
 
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header> {
     let mut format = None;
     let mut elements: Vec<Element> = Vec::new();
     let (mut columns, mut rows) = (None, None);
@@ -80,13 +80,10 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
         let error = |field: &str, value: &[u8], advice: &str| {
             IoError::text(path, number, field, shown(value), advice)
         };
-        let end = bytes[at..].iter().take(1 << 16).position(|b| *b == b'\n');
-        let Some(length) = end else {
+        let Some(line) = header_line(bytes, &mut at) else {
             let value = &bytes[at..bytes.len().min(at + 48)];
             return Err(error("the header", value, "give a PLY file, whose header ends with end_header"));
         };
-        let line = &bytes[at..at + length];
-        at += length + 1;
         let words: Vec<&[u8]> = fields(line).take(8).collect();
         match words[..] {
             [b"ply"] if number == 1 => {}
@@ -124,7 +121,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Header, IoError> {
         return Err(IoError::text(path, number, "the format", "missing", advice));
     };
     if let Some(empty) = elements.iter().find(|e| e.properties.is_empty() && e.count > 0) {
-        let field = format!("the number of properties of {}", shown(empty.name.as_bytes()));
+        let field = format!("the number of properties of {}", shown(&empty.name));
         return Err(IoError::text(path, number, field, "0", "write its properties below the element"));
     }
     Ok(Header { format, elements, columns, rows, body: at, body_line: number + 1 })
@@ -154,8 +151,4 @@ fn scalar(word: &[u8]) -> Option<Scalar> {
         b"double" | b"float64" => Scalar::F64,
         _ => return None,
     })
-}
-
-fn whole(word: &[u8]) -> Option<u64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
 }

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::body::Body;
 use super::header::{self, Element};
-use crate::IoError;
 use crate::bytes::{Input, open};
 use crate::points::{channel, most_bytes};
+use crate::{IoError, Result};
 
 /// A mesh of triangles. `normals` and `colors` have one entry per vertex, or are empty.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,7 +29,7 @@ pub struct PlyMesh {
 /// # Errors
 /// [`IoError::Text`] for a wrong header or text, [`IoError::Binary`] for wrong binary data, both for a face whose corners are
 /// not there.
-pub fn read_ply_mesh(path: impl AsRef<Path>) -> Result<PlyMesh, IoError> {
+pub fn read_ply_mesh(path: impl AsRef<Path>) -> Result<PlyMesh> {
     parse_ply_mesh(open(path)?)
 }
 
@@ -37,12 +37,12 @@ pub fn read_ply_mesh(path: impl AsRef<Path>) -> Result<PlyMesh, IoError> {
 ///
 /// # Errors
 /// As [`read_ply_mesh`].
-pub fn parse_ply_mesh(mut input: Input) -> Result<PlyMesh, IoError> {
+pub fn parse_ply_mesh(mut input: Input) -> Result<PlyMesh> {
     let bytes = input.read_all(most_bytes(&input))?;
     parse_bytes(&bytes, input.path())
 }
 
-pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PlyMesh, IoError> {
+pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PlyMesh> {
     let header = header::parse(bytes, path)?;
     let mut body = Body::of(&header, bytes, path);
     let mut mesh = PlyMesh::default();
@@ -75,24 +75,16 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PlyMesh, IoError>
         }
     }
     if mesh.vertices.is_empty() {
-        return Err(IoError::text(
-            path,
-            1,
-            "the number of vertices",
-            "0",
-            "give a file with vertices x, y, z",
-        ));
+        let advice = "give a file with vertices x, y, z";
+        return Err(IoError::text(path, 1, "the number of vertices", "0", advice));
     }
     Ok(mesh)
 }
 
-fn read_vertices(body: &mut Body, element: &Element, mesh: &mut PlyMesh) -> Result<(), IoError> {
+fn read_vertices(body: &mut Body, element: &Element, mesh: &mut PlyMesh) -> Result<()> {
     let Some(position) = element.three([&["x"], &["y"], &["z"]]) else {
-        return Err(body.error(
-            "the properties of vertices",
-            "without x, y, z".into(),
-            "give a file with points",
-        ));
+        let (field, value) = ("the properties of vertices", "without x, y, z");
+        return Err(body.error(field, value, "give a file with points"));
     };
     let normal = element.three([&["nx"], &["ny"], &["nz"]]);
     let color =
@@ -111,12 +103,12 @@ fn read_vertices(body: &mut Body, element: &Element, mesh: &mut PlyMesh) -> Resu
 }
 
 /// The corners that the last row names.
-fn corners(body: &Body, vertices: usize) -> Result<Vec<u32>, IoError> {
+fn corners(body: &Body, vertices: usize) -> Result<Vec<u32>> {
     let corner = |&v: &f64| {
         let there = v >= 0.0 && v < vertices as f64 && v.fract() == 0.0;
-        there.then_some(v as u32).ok_or_else(|| {
-            body.error("a corner of a face", v.to_string(), &format!("the file has {vertices} vertices"))
-        })
+        there
+            .then_some(v as u32)
+            .ok_or_else(|| body.error("a corner of a face", v, format!("the file has {vertices} vertices")))
     };
     body.list.iter().map(corner).collect()
 }

@@ -4,31 +4,16 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use crate::points::PointCloudFile;
-use crate::{IoError, write_atomic};
+use crate::{Result, write_atomic};
 
 /// Writes a cloud as binary little-endian PLY: `x y z` (doubles where the cloud has an offset, else floats), and
 /// `intensity`, `nx ny nz`, `red green blue` where it has them. Rows and columns are not written.
 ///
 /// # Errors
-/// [`IoError::Unwritable`] where a list is neither empty nor as long as the points, else as [`write_atomic`].
-pub fn write_ply_cloud(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<(), IoError> {
+/// [`crate::IoError::Unwritable`] where a list is neither empty nor as long as the points, else as [`write_atomic`].
+pub fn write_ply_cloud(path: impl AsRef<Path>, cloud: &PointCloudFile) -> Result<()> {
     let path = path.as_ref();
-    let n = cloud.points.len();
-    for (name, length) in [
-        ("intensities", cloud.intensity.len()),
-        ("normals", cloud.normals.len()),
-        ("colors", cloud.colors.len()),
-    ] {
-        if length != 0 && length != n {
-            let advice = format!("give {n}, or an empty list");
-            return Err(IoError::unwritable(
-                path,
-                format!("the number of {name}"),
-                length.to_string(),
-                advice,
-            ));
-        }
-    }
+    cloud.check_lists(path, &[])?;
     write_atomic(path, |w| write_to(w, cloud))
 }
 

@@ -22,7 +22,38 @@ pub(crate) struct CloudBuilder {
     organized: bool,
 }
 
+/// Where the values of a point are, in whatever way a format says it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PointFields<F> {
+    pub(crate) position: [F; 3],
+    pub(crate) intensity: Option<F>,
+    pub(crate) color: Option<[F; 3]>,
+    pub(crate) normal: Option<[F; 3]>,
+    pub(crate) ring: Option<F>,
+    pub(crate) time: Option<F>,
+}
+
 impl CloudBuilder {
+    /// Takes the point of pixel `i` with all its values, each with its type; `false` where it is refused.
+    #[inline(always)]
+    pub(crate) fn push_fields<F: Copy>(
+        &mut self,
+        i: usize,
+        fields: &PointFields<F>,
+        value: impl Fn(F) -> (f64, Scalar),
+    ) -> bool {
+        let kept = self.push(i, fields.position.map(|f| value(f).0));
+        if kept {
+            self.cloud.intensity.extend(fields.intensity.map(|f| value(f).0 as f32));
+            self.cloud.normals.extend(fields.normal.map(|all| all.map(|f| value(f).0 as f32)));
+            self.cloud.rings.extend(fields.ring.map(|f| value(f).0 as u16));
+            let byte = |f: F| channel(value(f).0, value(f).1);
+            self.cloud.colors.extend(fields.color.map(|all| all.map(byte)));
+            self.times.extend(fields.time.map(|f| value(f).0 * time_unit(value(f).1)));
+        }
+        kept
+    }
+
     /// `fine`: coordinates come as doubles or text, so that far ones need an offset.
     pub(crate) fn new(fine: bool) -> Self {
         Self { fine, ..Self::default() }
@@ -85,7 +116,7 @@ pub(crate) fn is_time(name: &str) -> bool {
 }
 
 /// The factor to seconds of a time field: whole numbers are nanoseconds (Ouster, Livox), others seconds (Velodyne, Hesai).
-pub(crate) fn time_unit(scalar: Scalar) -> f64 {
+fn time_unit(scalar: Scalar) -> f64 {
     if scalar.is_integer() { 1e-9 } else { 1.0 }
 }
 

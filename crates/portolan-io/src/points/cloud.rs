@@ -1,7 +1,11 @@
 //! What point-cloud files hold, as plain data.
 
+use std::path::Path;
+
 use portolan::geom::Pose;
 use portolan::scan::{Origin, PointScan, RefusedBeams};
+
+use crate::{IoError, Result};
 
 /// A cloud of points as a file holds it. Lists beside `points` have one entry per point, or are empty where the file
 /// does not have them.
@@ -105,6 +109,20 @@ impl PointCloudFile {
             keep(&mut scan.colors, &away);
         }
         scan
+    }
+
+    /// Refuses lists that are neither empty nor as long as the points: those of all formats, and `more` of them.
+    pub(crate) fn check_lists(&self, path: &Path, more: &[(&str, usize)]) -> Result<()> {
+        let (n, intensities) = (self.points.len(), ("intensities", self.intensity.len()));
+        let all = [intensities, ("colors", self.colors.len()), ("normals", self.normals.len())];
+        match all.iter().chain(more).find(|(_, length)| *length != 0 && *length != n) {
+            Some((name, length)) => {
+                let (field, advice) =
+                    (format!("the number of {name}"), format!("give {n}, or an empty list"));
+                Err(IoError::unwritable(path, field, length, advice))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The transform from the frame of `points` to the file's frame: the offset.

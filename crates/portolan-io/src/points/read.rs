@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::PointCloudFile;
 use crate::bytes::{Compression, Input, open};
-use crate::{IoError, kitti_bin, pcd, ply, xyz};
+use crate::{IoError, Result, kitti_bin, pcd, ply, xyz};
 
 /// The most bytes of a file that is read as a whole: what few bytes unpack to is kept within the memory of a small machine.
 pub(crate) fn most_bytes(input: &Input) -> u64 {
@@ -56,7 +56,7 @@ pub fn point_format(path: impl AsRef<Path>, head: &[u8]) -> Option<PointFormat> 
 ///
 /// # Errors
 /// Those of the format's reader; [`IoError::Binary`] for any other file.
-pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
+pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloudFile> {
     parse_points(open(path)?)
 }
 
@@ -64,16 +64,16 @@ pub fn read_points(path: impl AsRef<Path>) -> Result<PointCloudFile, IoError> {
 ///
 /// # Errors
 /// As [`read_points`].
-pub fn parse_points(input: Input) -> Result<PointCloudFile, IoError> {
+pub fn parse_points(input: Input) -> Result<PointCloudFile> {
     parse_as(input, None)
 }
 
 /// [`read_points`] in a format that is known.
-pub(crate) fn read_points_as(path: &Path, format: Option<PointFormat>) -> Result<PointCloudFile, IoError> {
+pub(crate) fn read_points_as(path: &Path, format: Option<PointFormat>) -> Result<PointCloudFile> {
     parse_as(open(path)?, format)
 }
 
-fn parse_as(mut input: Input, format: Option<PointFormat>) -> Result<PointCloudFile, IoError> {
+fn parse_as(mut input: Input, format: Option<PointFormat>) -> Result<PointCloudFile> {
     let path = input.path().to_owned();
     // A failure to read will come again, with its place.
     let head = input.fill_buf().map(<[u8]>::to_vec).unwrap_or_default();

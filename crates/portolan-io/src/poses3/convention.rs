@@ -94,12 +94,11 @@ fn transposed(m: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::poses3::RawPose;
     use portolan::geom::vector::distance;
 
     fn matrix(pose: &Pose<3>) -> [[f64; 4]; 4] {
-        let [r, t] = [0, 1].map(|_| pose).map(|p| (p.rotation, p.translation));
-        let row = |k: usize| [r.0[k][0], r.0[k][1], r.0[k][2], t.1[k]];
-        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
+        RawPose::new(pose.rotation, pose.translation, 1).matrix
     }
 
     #[test]

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::RawPose;
 use super::convention::CORNER_OFF;
-use crate::IoError;
-use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::bytes::{Input, Lines, columns, open, parse_f64};
 use crate::error::shown;
+use crate::{IoError, Result};
 
 /// The most poses of a file.
 const MOST_POSES: usize = 1 << 20;
@@ -71,7 +71,7 @@ pub struct PoseFile {
 /// # Errors
 /// [`IoError::Text`] for a line that fits no layout, or another than the lines before, for a word that is not a number, a
 /// matrix that ends early, and a file without poses. A pose that is not rigid is read; [`RawPose::resolve`] refuses it.
-pub fn read_poses_3d(path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
+pub fn read_poses_3d(path: impl AsRef<Path>) -> Result<PoseFile> {
     parse_poses_3d(open(path)?)
 }
 
@@ -79,34 +79,36 @@ pub fn read_poses_3d(path: impl AsRef<Path>) -> Result<PoseFile, IoError> {
 ///
 /// # Errors
 /// As [`read_poses_3d`].
-pub fn parse_poses_3d(input: Input) -> Result<PoseFile, IoError> {
+pub fn parse_poses_3d(input: Input) -> Result<PoseFile> {
     let mut lines = Lines::of(input);
     let path = lines.path().to_owned();
     let mut reading: Option<Reading> = None;
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
-        let mut row = [0.0; MOST_COLUMNS];
-        let columns = numbers(line, &mut row, number, &path)?;
-        if columns == 0 {
+    while let Some((number, line)) = lines.next_numbered()? {
+        // NaN and infinity are numbers here.
+        let row = columns::<MOST_COLUMNS>(line, |b| matches!(b, b',' | b';'), parse_f64);
+        let (row, count) = row.map_err(|(word, column)| {
+            let advice = "write a number, or begin a comment with #";
+            IoError::text(&path, number, column, shown(word), advice)
+        })?;
+        if count == 0 {
             continue;
         }
         let state = match &mut reading {
             Some(state) => state,
             None => {
-                let Some(layout) = PoseLayout::of_columns(columns) else {
+                let Some(layout) = PoseLayout::of_columns(count) else {
                     return Err(IoError::text(
                         &path,
                         number,
                         "the number of columns",
-                        columns.to_string(),
+                        count,
                         "write 4 (rows of matrices), 7 or 8 (TUM), 12 (KITTI) or 16",
                     ));
                 };
                 reading.insert(Reading { layout, poses: Vec::new(), open: None })
             }
         };
-        state.take(&row[..columns], number, &path)?;
+        state.take(&row[..count], number, &path)?;
     }
     let Some(state) = reading else {
         let advice = "give a file with poses, one 4x4 matrix or one line of 8, 12 or 16 numbers each";
@@ -118,21 +120,6 @@ pub fn parse_poses_3d(input: Input) -> Result<PoseFile, IoError> {
 /// Of a line with more columns, so many are counted.
 const MOST_COLUMNS: usize = 17;
 
-/// The numbers of a line; NaN and infinity are numbers here.
-fn numbers(line: &[u8], row: &mut [f64; MOST_COLUMNS], number: u64, path: &Path) -> Result<usize, IoError> {
-    let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
-    let words = content.split(|b| b.is_ascii_whitespace() || matches!(b, b',' | b';'));
-    let mut columns = 0;
-    for word in words.filter(|w| !w.is_empty()).take(MOST_COLUMNS) {
-        row[columns] = parse_f64(word).ok_or_else(|| {
-            let field = format!("column {}", columns + 1);
-            IoError::text(path, number, field, shown(word), "write a number, or begin a comment with #")
-        })?;
-        columns += 1;
-    }
-    Ok(columns)
-}
-
 struct Reading {
     layout: PoseLayout,
     poses: Vec<RawPose>,
@@ -141,15 +128,12 @@ struct Reading {
 }
 
 impl Reading {
-    fn take(&mut self, row: &[f64], line: u64, path: &Path) -> Result<(), IoError> {
+    fn take(&mut self, row: &[f64], line: u64, path: &Path) -> Result<()> {
         let wrong = |expected: &str| {
             let advice = format!("give {expected}, as the lines before");
-            Err(IoError::text(path, line, "the number of columns", row.len().to_string(), advice))
+            Err(IoError::text(path, line, "the number of columns", row.len(), advice))
         };
-        if self.poses.len() == MOST_POSES {
-            let value = format!("more than {MOST_POSES}");
-            return Err(IoError::text(path, line, "the number of poses", value, "split the file"));
-        }
+        IoError::unless_full(path, line, self.poses.len(), MOST_POSES, "poses", "file")?;
         match self.layout {
             PoseLayout::Matrices | PoseLayout::RedwoodLog => return self.take_row(row, line, path),
             PoseLayout::Quaternions => {
@@ -159,7 +143,7 @@ impl Reading {
             PoseLayout::Tum => {
                 let &[t, x, y, z, a, b, c, d] = row else { return wrong("8 columns") };
                 if !t.is_finite() {
-                    return Err(IoError::text(path, line, "the time", t.to_string(), "write seconds"));
+                    return Err(IoError::text(path, line, "the time", t, "write seconds"));
                 }
                 let pose = RawPose::from_quaternion([x, y, z], [a, b, c, d], line);
                 self.poses.push(RawPose { time: Some(t), ..pose });
@@ -180,14 +164,14 @@ impl Reading {
     }
 
     /// A row of a matrix, or the line of integers before one.
-    fn take_row(&mut self, row: &[f64], line: u64, path: &Path) -> Result<(), IoError> {
+    fn take_row(&mut self, row: &[f64], line: u64, path: &Path) -> Result<()> {
         let (mut pose, rows) = match (self.open.take(), row.len(), self.layout) {
             (None, 3, PoseLayout::RedwoodLog) => {
                 let whole = |v: &f64| v.fract() == 0.0 && v.abs() < 1e15;
                 if let Some(k) = row.iter().position(|v| !whole(v)) {
                     let field = format!("column {}", k + 1);
                     let advice = "write three integers before each matrix, or four columns in every line";
-                    return Err(IoError::text(path, line, field, row[k].to_string(), advice));
+                    return Err(IoError::text(path, line, field, row[k], advice));
                 }
                 let number = (row[0] >= 0.0).then_some(row[0] as u64);
                 self.open = Some((RawPose { number, ..RawPose::new([[0.0; 3]; 3], [0.0; 3], line) }, 0));
@@ -203,7 +187,7 @@ impl Reading {
                     }
                     None => "give four columns in every line, as before".into(),
                 };
-                return Err(IoError::text(path, line, "the number of columns", columns.to_string(), place));
+                return Err(IoError::text(path, line, "the number of columns", columns, place));
             }
         };
         pose.matrix[rows].copy_from_slice(row);
@@ -214,7 +198,7 @@ impl Reading {
         Ok(())
     }
 
-    fn finish(mut self, path: PathBuf) -> Result<PoseFile, IoError> {
+    fn finish(mut self, path: PathBuf) -> Result<PoseFile> {
         match self.open.take() {
             // One 3x4 matrix: its last row is what it was made with.
             Some((pose, 3)) if self.poses.is_empty() && self.layout == PoseLayout::Matrices => {
@@ -222,13 +206,8 @@ impl Reading {
             }
             Some((pose, rows)) => {
                 let advice = "give all four rows (a file cut off while it was written?)";
-                return Err(IoError::text(
-                    &path,
-                    pose.line,
-                    "the number of rows of the last matrix",
-                    rows.to_string(),
-                    advice,
-                ));
+                let field = "the number of rows of the last matrix";
+                return Err(IoError::text(&path, pose.line, field, rows, advice));
             }
             None => {}
         }
@@ -256,11 +235,11 @@ fn stamps_out_of_corners(poses: &mut [RawPose]) {
 mod tests {
     use super::*;
     use crate::poses3::{PoseConvention, PoseFault};
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{bad_bytes, real_data, says};
     use portolan::geom::Pose;
     use portolan::geom::vector::distance;
 
-    fn parse(text: impl Into<Vec<u8>>) -> Result<PoseFile, IoError> {
+    fn parse(text: impl Into<Vec<u8>>) -> Result<PoseFile> {
         parse_poses_3d(Input::from_reader(std::io::Cursor::new(text.into()), "p.txt".as_ref())?)
     }
 
@@ -367,8 +346,7 @@ mod tests {
             ("0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0\n".into(), "line 2: the number of columns is 7; give 8 columns"),
             ("nan 1 2 3 0 0 0 1\n".into(), "line 1: the time is NaN"),
         ] {
-            let error = parse(text).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(parse(text), part);
         }
     }
 

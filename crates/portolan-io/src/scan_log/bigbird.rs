@@ -9,11 +9,11 @@ use std::path::Path;
 use portolan::scan::Pinhole;
 
 use super::depth_frames::{DepthFrame, DepthFrames};
-use super::files::{has_name, name_of, names_in};
+use super::files::{has_name, names_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{CameraFrom, ScanLogOptions, ScanLogStats};
-use crate::IoError;
+use crate::Result;
 use crate::poses3::{PoseConvention, read_poses_3d};
 
 const FOLDER: &str = "masked_depth";
@@ -41,7 +41,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(&path.join(FOLDER), |name| angle_and_camera(name).is_some())
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let folder = path.join(FOLDER);
     let mut names = names_in(&folder, |name| angle_and_camera(name).is_some())?;
     names.sort_by_key(|name| {
@@ -62,22 +62,17 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
         None if poses.is_file() => LayoutPoses::File(read_poses_3d(poses)?),
         _ => LayoutPoses::Missing(POSES.into()),
     };
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?),
-        scans,
-        poses,
-        convention: PoseConvention::TransposedRotation,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let (camera, convention) = (Some(camera), PoseConvention::TransposedRotation);
+    Ok(Parts { convention, camera, stats, ..Parts::new(path, source, scans, poses) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan_log::testing::{SIZE, camera_pose, gray_png, image, matrix_text, write};
+    use crate::scan_log::testing::{
+        SIZE, camera_pose, gray_png, image, matrix_text, median_distance, with_convention, write,
+    };
     use crate::scan_log::{Intrinsics, ScanLog, ScanLogKind};
     use crate::testing::real_data;
 
@@ -114,13 +109,7 @@ mod tests {
             image(log, i).points().map(|(_, p)| log.pose(i).transform_point(p)).collect()
         };
         let (one, other) = (world(a), world(b));
-        let nearest = |p: &[f64; 3]| {
-            let all = other.iter().map(|q| portolan::geom::vector::distance(*p, *q));
-            all.fold(f64::INFINITY, f64::min)
-        };
-        let mut all: Vec<f64> = one.iter().step_by(one.len() / 300 + 1).map(nearest).collect();
-        all.sort_by(f64::total_cmp);
-        all[all.len() / 2]
+        median_distance(&one, &other, one.len() / 300 + 1)
     }
 
     #[test]
@@ -128,10 +117,7 @@ mod tests {
         let Some(path) = real_data("rgbd_bigbird_detergent") else { return };
         let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
         assert_eq!((log.len(), log.stats().refused_poses.len()), (40, 0));
-        let options = ScanLogOptions {
-            pose_convention: Some(PoseConvention::WorldFromSensor),
-            ..ScanLogOptions::default()
-        };
+        let options = with_convention(PoseConvention::WorldFromSensor);
         let other = ScanLog::open(&path, &options).unwrap();
         // Every view is 9 degrees from the next, the last from the first.
         for (a, b) in [(0, 1), (10, 11), (30, 31), (39, 0)] {

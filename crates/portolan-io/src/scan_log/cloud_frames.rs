@@ -6,8 +6,8 @@ use portolan::geom::Pose;
 use portolan::scan::{Frame, OrganisedPoints, Origin, PointScan, orthographic_image};
 
 use super::parts::FrameSource;
-use crate::IoError;
 use crate::points::{CloudGrid, PointCloudFile, PointFormat, read_points_as};
+use crate::{IoError, Result};
 
 /// Where the rays of a log's clouds begin.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub(super) struct CloudFrames {
 impl CloudFrames {
     /// `format`: of all files; `None`: each file's own. The first file with points is looked at where files may hold points
     /// far from their zero: all frames are about its offset, which is [`CloudFrames::files_from_frames`].
-    pub(super) fn new(files: Vec<PathBuf>, format: Option<PointFormat>, rays: Rays) -> Result<Self, IoError> {
+    pub(super) fn new(files: Vec<PathBuf>, format: Option<PointFormat>, rays: Rays) -> Result<Self> {
         // These are never far: they hold nothing but floats.
         let looked_at = if format == Some(PointFormat::KittiBin) { &[][..] } else { &files };
         let mut base = [0.0; 3];
@@ -56,7 +56,7 @@ pub(super) fn file_from_frames(base: [f64; 3]) -> Option<Pose<3>> {
 }
 
 impl FrameSource for CloudFrames {
-    fn frame(&self, i: usize) -> Result<Frame, IoError> {
+    fn frame(&self, i: usize) -> Result<Frame> {
         let cloud = about(read_points_as(&self.files[i], self.format)?, self.base, &self.files[i])?;
         Ok(Frame::Points(match &self.rays {
             Rays::From(origins) => scan_from(cloud, origins[i]),
@@ -79,11 +79,7 @@ const FARTHEST_APART: f64 = 65_536.0;
 ///
 /// # Errors
 /// [`IoError::Layout`] for a cloud so far from there that its shape would be lost.
-pub(super) fn about(
-    mut cloud: PointCloudFile,
-    base: [f64; 3],
-    path: &Path,
-) -> Result<PointCloudFile, IoError> {
+pub(super) fn about(mut cloud: PointCloudFile, base: [f64; 3], path: &Path) -> Result<PointCloudFile> {
     if cloud.offset != base {
         let apart = (0..3).any(|k| (cloud.offset[k] - base[k]).abs() > FARTHEST_APART);
         if apart && !cloud.points.is_empty() {
@@ -116,7 +112,7 @@ fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
 }
 
 /// A range scan of parallel rays: the points as they are, each with its own origin, and the image of them.
-fn range_scan(cloud: PointCloudFile, path: &Path) -> Result<PointScan, IoError> {
+fn range_scan(cloud: PointCloudFile, path: &Path) -> Result<PointScan> {
     let grid = cloud.grid.clone();
     let highest = cloud.points.iter().map(|p| p[2]).fold(f32::NEG_INFINITY, f32::max);
     let image = grid.and_then(|g| orthographic_image(&cloud.points, &g.pixels, g.columns, g.rows));

@@ -11,15 +11,15 @@ use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 
+use super::ScanLogOptions;
 use super::agreement::{Placed, disagreement};
 use super::cloud_frames::{CloudFrames, Rays};
-use super::files::{has_extension, has_name, name_of, names_in, number_in};
+use super::files::{has_extension, has_name, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
 use crate::pcd::read_viewpoint;
 use crate::points::{PointFormat, Viewpoint, read_points_as};
-use crate::poses3::{PoseConvention, RawPose, read_poses_3d};
+use crate::poses3::{RawPose, read_poses_3d};
+use crate::{IoError, Result};
 
 /// The endings of clouds, in the order in which they are tried where a folder has as many of one as of another.
 const ENDINGS: [(&str, PointFormat); 9] = [
@@ -86,7 +86,7 @@ fn folder_of(path: &Path, endings: &[(&'static str, PointFormat)]) -> Option<Pat
     FOLDERS.iter().map(|name| path.join(name)).find(|folder| has_clouds(folder))
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     if path.is_file() {
         return open_file(path, options);
     }
@@ -117,20 +117,12 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
 }
 
 fn parts(path: &Path, source: CloudFrames, scans: Vec<ScanId>, poses: LayoutPoses) -> Parts {
-    Parts {
-        name: name_of(path),
-        scans,
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: source.files_from_frames(),
-        source: Box::new(source),
-        camera: None,
-        stats: ScanLogStats::default(),
-    }
+    let posed_from_sensor = source.files_from_frames();
+    Parts { posed_from_sensor, ..Parts::new(path, source, scans, poses) }
 }
 
 /// A single cloud: at the pose of `--poses`, else where it is, seen from `--origin`, the viewpoint or zero.
-fn open_file(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+fn open_file(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let format = path.file_name().and_then(|n| ending_of(n.to_str()?)).map(|(_, format)| format);
     let files = vec![path.to_owned()];
     let (poses, rays) = match format {
@@ -150,10 +142,7 @@ fn is_one_of(endings: &[(&'static str, PointFormat)], name: &str) -> bool {
 }
 
 /// The clouds of the most frequent ending, in natural order.
-fn clouds_in(
-    folder: &Path,
-    endings: &[(&'static str, PointFormat)],
-) -> Result<(Vec<String>, PointFormat), IoError> {
+fn clouds_in(folder: &Path, endings: &[(&'static str, PointFormat)]) -> Result<(Vec<String>, PointFormat)> {
     let names = names_in(folder, |name| is_one_of(endings, name))?;
     let ending = |name: &String| ending_among(endings, name).map(|(ending, _)| ending);
     let count = |wanted: &str| names.iter().filter(|n| ending(n) == Some(wanted)).count();
@@ -191,7 +180,7 @@ fn time_in(name: &str) -> Option<f64> {
 }
 
 /// The only file that is called like poses, in the log's folder or that of its scans.
-fn pose_file(path: &Path, folder: &Path) -> Result<Option<PathBuf>, IoError> {
+fn pose_file(path: &Path, folder: &Path) -> Result<Option<PathBuf>> {
     for place in [path, folder] {
         let names = names_in(place, is_poses)?;
         match &names[..] {
@@ -222,7 +211,7 @@ fn viewpoints(
     files: &[PathBuf],
     format: PointFormat,
     options: &ScanLogOptions,
-) -> Result<(LayoutPoses, Rays), IoError> {
+) -> Result<(LayoutPoses, Rays)> {
     let missing = || {
         let endings = POSE_ENDINGS.join(", ");
         let looked =
@@ -252,7 +241,7 @@ fn viewpoints(
 }
 
 /// Fails where scans agree much better when viewpoints are applied as poses.
-fn check_viewpoints(files: &[PathBuf], viewpoints: &[Viewpoint]) -> Result<(), IoError> {
+fn check_viewpoints(files: &[PathBuf], viewpoints: &[Viewpoint]) -> Result<()> {
     let (mut in_place, mut moved) = (Vec::new(), Vec::new());
     for i in (0..files.len()).step_by(files.len().div_ceil(LOOKED_AT).max(1)) {
         let cloud = read_points_as(&files[i], None)?;

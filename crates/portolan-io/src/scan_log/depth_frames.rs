@@ -13,7 +13,7 @@ use super::color::{color_size, read_color};
 use super::depth_png::{depth_image_size, read_depth};
 use super::parts::FrameSource;
 use super::{Camera, ScanLogOptions, ScanLogStats, UnreadColors};
-use crate::IoError;
+use crate::{IoError, Result};
 
 /// A depth image that was found.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,7 @@ impl DepthFrames {
         units_per_metre: f64,
         options: &ScanLogOptions,
         stats: &mut ScanLogStats,
-    ) -> Result<Self, IoError> {
+    ) -> Result<Self> {
         let units_per_metre = options.depth_scale.unwrap_or(units_per_metre);
         if let Some(first) = frames.first() {
             if !(units_per_metre > 1e-6 && units_per_metre < 1e9) {
@@ -68,7 +68,7 @@ impl DepthFrames {
 }
 
 /// Why existing color pictures are not used, by the first that can be read.
-fn why_no_colors(frames: &[DepthFrame]) -> Result<Option<String>, IoError> {
+fn why_no_colors(frames: &[DepthFrame]) -> Result<Option<String>> {
     let mut why = None;
     let pictures = frames.iter().filter_map(|f| Some((&f.depth, f.color.as_ref()?)));
     for (depth, color) in pictures.take(COLORS_LOOKED_AT) {
@@ -93,7 +93,7 @@ pub(super) fn color_beside(folder: &Path, stem: &str) -> Option<PathBuf> {
 }
 
 impl FrameSource for DepthFrames {
-    fn frame(&self, i: usize) -> Result<Frame, IoError> {
+    fn frame(&self, i: usize) -> Result<Frame> {
         let frame = &self.frames[i];
         let depth = read_depth(&frame.depth, self.units_per_metre)?;
         let colors = match &frame.color {

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use crate::IoError;
+use crate::{IoError, Result};
 
 /// The most files of a folder that are looked at.
 const MOST_FILES: usize = 1 << 21;
@@ -13,7 +13,7 @@ const MOST_FILES: usize = 1 << 21;
 ///
 /// # Errors
 /// [`IoError::Os`] where the folder cannot be read, [`IoError::Layout`] for one with millions of files.
-pub(crate) fn names_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>, IoError> {
+pub(crate) fn names_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<Vec<String>> {
     let mut names = Vec::new();
     let entries = std::fs::read_dir(folder).map_err(|e| IoError::os(folder, "list it", e))?;
     for (i, entry) in entries.enumerate() {

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use portolan::geom::Pose;
 use portolan::scan::Frame;
 
+use super::ScanLogOptions;
 use super::cloud_frames::{about, file_from_frames};
-use super::files::{has_extension, name_of};
+use super::files::has_extension;
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
-use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
-use crate::poses3::{PoseConvention, RawPose};
+use crate::Result;
+use crate::poses3::RawPose;
 use crate::scan_graph::{ScanGraphNode, read_scan_graph};
 
 pub(super) fn is_it(path: &Path) -> bool {
@@ -28,7 +28,7 @@ struct GraphFrames {
 }
 
 impl FrameSource for GraphFrames {
-    fn frame(&self, i: usize) -> Result<Frame, IoError> {
+    fn frame(&self, i: usize) -> Result<Frame> {
         let cloud = about(self.nodes[i].cloud.clone(), self.base, &self.path)?;
         Ok(Frame::Points(cloud.into_scan([0.0; 3])))
     }
@@ -38,7 +38,7 @@ impl FrameSource for GraphFrames {
     }
 }
 
-pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts> {
     let nodes = read_scan_graph(path)?;
     let scan = |node: &ScanGraphNode| ScanId { path: path.into(), number: Some(node.id.into()), time: None };
     let pose = |node: &ScanGraphNode| {
@@ -46,14 +46,8 @@ pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoEr
         Some((path.to_owned(), RawPose::new(rotation, translation, 1)))
     };
     let base = nodes.iter().find(|node| !node.cloud.points.is_empty()).map_or([0.0; 3], |n| n.cloud.offset);
-    Ok(Parts {
-        name: name_of(path),
-        scans: nodes.iter().map(scan).collect(),
-        poses: LayoutPoses::PerScan(nodes.iter().map(pose).collect()),
-        source: Box::new(GraphFrames { path: path.into(), nodes, base }),
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: file_from_frames(base),
-        camera: None,
-        stats: ScanLogStats::default(),
-    })
+    let scans = nodes.iter().map(scan).collect();
+    let poses = LayoutPoses::PerScan(nodes.iter().map(pose).collect());
+    let source = GraphFrames { path: path.into(), nodes, base };
+    Ok(Parts { posed_from_sensor: file_from_frames(base), ..Parts::new(path, source, scans, poses) })
 }

@@ -7,8 +7,8 @@ use portolan::scan::Pinhole;
 use serde_json::Value;
 
 use super::ScanLogOptions;
-use crate::IoError;
 use crate::bytes::{open, parse_f64};
+use crate::{IoError, Result};
 
 /// The camera that a caller gives.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,7 +29,7 @@ impl Intrinsics {
         }
     }
 
-    fn camera(&self) -> Result<Camera, IoError> {
+    fn camera(&self) -> Result<Camera> {
         match self {
             Self::File(path) => read_intrinsics(path),
             Self::Pinhole(pinhole) => {
@@ -75,7 +75,7 @@ pub struct Camera {
 impl Camera {
     /// # Errors
     /// [`IoError::Layout`] where the camera is not one of pictures of this size: a common mix-up.
-    pub(super) fn check_size(&self, picture: &Path, size: [usize; 2]) -> Result<(), IoError> {
+    pub(super) fn check_size(&self, picture: &Path, size: [usize; 2]) -> Result<()> {
         let Pinhole { cx, cy, .. } = self.pinhole;
         let inside = |c: f64, n: usize| c > 0.0 && c < n as f64;
         let fits = match self.size {
@@ -107,7 +107,7 @@ pub(super) fn find_camera(
     files: &[&str],
     published: Option<(&'static str, [f64; 4])>,
     options: &ScanLogOptions,
-) -> Result<Camera, IoError> {
+) -> Result<Camera> {
     if let Some(given) = &options.intrinsics {
         return given.camera();
     }
@@ -123,7 +123,7 @@ pub(super) fn find_camera(
 
 /// Reads the numbers of a camera: nine numbers of a 3x3 matrix, sixteen of a 4x4 one, four (`fx fy cx cy`), or json
 /// (`intrinsic_matrix` of Open3D, which is column by column, or `fx`, `fy`, `cx`, `cy`).
-fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
+fn read_intrinsics(path: &Path) -> Result<Camera> {
     const LIMIT: u64 = 1 << 20;
     let bytes = open(path)?.read_all(LIMIT)?;
     let text = String::from_utf8_lossy(&bytes);
@@ -156,7 +156,7 @@ fn read_intrinsics(path: &Path) -> Result<Camera, IoError> {
         }
     };
     if skew.abs() > 1e-3 * fx.abs() {
-        return Err(IoError::layout(path, "the skew", skew.to_string(), "give a camera without skew"));
+        return Err(IoError::layout(path, "the skew", skew, "give a camera without skew"));
     }
     let pinhole = Pinhole { fx, fy, cx, cy };
     check(&pinhole, path)?;
@@ -179,13 +179,13 @@ fn of_json(json: &Value) -> Option<(Vec<f64>, Option<[usize; 2]>)> {
     Some((vec![number("fx")?, number("fy")?, number("cx")?, number("cy")?], size))
 }
 
-fn check(p: &Pinhole, path: &Path) -> Result<(), IoError> {
+fn check(p: &Pinhole, path: &Path) -> Result<()> {
     for (name, value, low) in
         [("fx", p.fx, 1e-3), ("fy", p.fy, 1e-3), ("cx", p.cx, -MOST), ("cy", p.cy, -MOST)]
     {
         if !(value >= low && value <= MOST) {
             let advice = "give pixels; focal lengths are positive, y points down";
-            return Err(IoError::layout(path, name, value.to_string(), advice));
+            return Err(IoError::layout(path, name, value, advice));
         }
     }
     Ok(())
@@ -197,9 +197,9 @@ const MOST: f64 = 1e6;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::bad_bytes;
+    use crate::testing::{no_panic, says};
 
-    fn read(text: &[u8]) -> Result<Camera, IoError> {
+    fn read(text: &[u8]) -> Result<Camera> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         read_intrinsics(file.path())
@@ -226,8 +226,7 @@ mod tests {
         assert_eq!(Intrinsics::from_word("a,b.json"), Intrinsics::File("a,b.json".into()));
         let camera = read(OPEN3D.as_bytes()).unwrap();
         assert!(camera.check_size("x".as_ref(), [640, 480]).is_ok());
-        let error = camera.check_size("x".as_ref(), [320, 240]).unwrap_err().to_string();
-        assert!(error.contains("the camera is for 640 x 480"), "{error}");
+        says(camera.check_size("x".as_ref(), [320, 240]), "the camera is for 640 x 480");
     }
 
     #[test]
@@ -242,11 +241,8 @@ mod tests {
             ("nan 480 319.5 239.5", "fx is NaN"),
             ("500 9 320 0 500 240 0 0 1", "the skew is 9"),
         ] {
-            let error = read(text.as_bytes()).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(read(text.as_bytes()), part);
         }
-        for bytes in bad_bytes(OPEN3D.as_bytes(), 8, 300) {
-            let _ = read(&bytes);
-        }
+        no_panic(OPEN3D.as_bytes(), 8, 300, |bytes| read(&bytes));
     }
 }

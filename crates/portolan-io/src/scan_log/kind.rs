@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::parts::Parts;
 use super::{ScanLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
-use crate::IoError;
+use crate::Result;
 
 /// A kind of log of 3-D scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,14 +28,8 @@ pub enum ScanLogKind {
     Clouds,
 }
 
-/// The names and functions of a kind.
-struct Format {
-    word: &'static str,
-    label: &'static str,
-    /// Whether a file or folder is of this kind. Reads no more than a few names and bytes.
-    is_it: fn(&Path) -> bool,
-    open: fn(&Path, &ScanLogOptions) -> Result<Parts, IoError>,
-}
+/// Whether a file or folder is of a kind, by a few names and bytes; and what opens it.
+type Functions = (fn(&Path) -> bool, fn(&Path, &ScanLogOptions) -> Result<Parts>);
 
 impl ScanLogKind {
     /// All kinds, in the order in which they are tried.
@@ -50,59 +44,36 @@ impl ScanLogKind {
         Self::Clouds,
     ];
 
-    fn format(self) -> Format {
+    fn functions(self) -> Functions {
         match self {
-            Self::SevenScenes => Format {
-                word: "seven-scenes",
-                label: "depth images with poses (7-Scenes)",
-                is_it: seven_scenes::is_it,
-                open: seven_scenes::open,
-            },
-            Self::TumRgbd => Format {
-                word: "tum",
-                label: "depth images with times (TUM RGB-D)",
-                is_it: tum_rgbd::is_it,
-                open: tum_rgbd::open,
-            },
-            Self::BigBird => Format {
-                word: "bigbird",
-                label: "masked depth images of an object (BigBIRD)",
-                is_it: bigbird::is_it,
-                open: bigbird::open,
-            },
-            Self::Redwood => Format {
-                word: "redwood",
-                label: "depth images with a trajectory (Redwood)",
-                is_it: redwood::is_it,
-                open: redwood::open,
-            },
-            Self::Kitti => Format {
-                word: "kitti",
-                label: "lidar scans with poses (KITTI)",
-                is_it: kitti::is_it,
-                open: kitti::open,
-            },
-            Self::Stanford => Format {
-                word: "stanford",
-                label: "range scans with a .conf file (Stanford)",
-                is_it: stanford::is_it,
-                open: stanford::open,
-            },
-            Self::ScanGraph => Format {
-                word: "scan-graph",
-                label: "scan graph (OctoMap)",
-                is_it: graph::is_it,
-                open: graph::open,
-            },
-            Self::Clouds => {
-                Format { word: "clouds", label: "clouds of points", is_it: clouds::is_it, open: clouds::open }
-            }
+            Self::SevenScenes => (seven_scenes::is_it, seven_scenes::open),
+            Self::TumRgbd => (tum_rgbd::is_it, tum_rgbd::open),
+            Self::BigBird => (bigbird::is_it, bigbird::open),
+            Self::Redwood => (redwood::is_it, redwood::open),
+            Self::Kitti => (kitti::is_it, kitti::open),
+            Self::Stanford => (stanford::is_it, stanford::open),
+            Self::ScanGraph => (graph::is_it, graph::open),
+            Self::Clouds => (clouds::is_it, clouds::open),
+        }
+    }
+
+    /// The word of `--format`, and the kind in words.
+    fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::SevenScenes => ("seven-scenes", "depth images with poses (7-Scenes)"),
+            Self::TumRgbd => ("tum", "depth images with times (TUM RGB-D)"),
+            Self::BigBird => ("bigbird", "masked depth images of an object (BigBIRD)"),
+            Self::Redwood => ("redwood", "depth images with a trajectory (Redwood)"),
+            Self::Kitti => ("kitti", "lidar scans with poses (KITTI)"),
+            Self::Stanford => ("stanford", "range scans with a .conf file (Stanford)"),
+            Self::ScanGraph => ("scan-graph", "scan graph (OctoMap)"),
+            Self::Clouds => ("clouds", "clouds of points"),
         }
     }
 
     /// The word of `--format`.
     pub fn word(self) -> &'static str {
-        self.format().word
+        self.names().0
     }
 
     /// The kind of a word; `None` where no kind has it.
@@ -112,16 +83,16 @@ impl ScanLogKind {
 
     /// The kind in words.
     pub fn label(self) -> &'static str {
-        self.format().label
+        self.names().1
     }
 
     /// The kind of a file or folder by its layout, names and first bytes; `None` for anything else.
     pub fn recognize(path: &Path) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| (kind.format().is_it)(path))
+        Self::ALL.into_iter().find(|kind| kind.functions().0(path))
     }
 
-    pub(super) fn parts(self, path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
-        (self.format().open)(path, options)
+    pub(super) fn parts(self, path: &Path, options: &ScanLogOptions) -> Result<Parts> {
+        self.functions().1(path, options)
     }
 }
 

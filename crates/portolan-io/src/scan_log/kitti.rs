@@ -12,15 +12,15 @@ use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 
+use super::ScanLogOptions;
 use super::cloud_frames::{CloudFrames, Rays};
-use super::files::{has_extension, has_name, name_of, names_in, number_in};
+use super::files::{has_extension, has_name, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
 use crate::error::shown;
 use crate::points::PointFormat;
 use crate::poses3::{PoseConvention, RawPose, read_poses_3d};
+use crate::{IoError, Result};
 
 /// The most scans of a log.
 const MOST_TIMES: usize = 1 << 21;
@@ -33,7 +33,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(&path.join("velodyne"), is_scan)
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let folder = path.join("velodyne");
     let names = names_in(&folder, is_scan)?;
     let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
@@ -57,16 +57,8 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
     };
     let origins = vec![options.origin.unwrap_or([0.0; 3]); files.len()];
     let source = CloudFrames::new(files, Some(PointFormat::KittiBin), Rays::From(origins))?;
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(source),
-        scans,
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: camera_from_lidar(path, options)?,
-        camera: None,
-        stats: ScanLogStats::default(),
-    })
+    let posed_from_sensor = camera_from_lidar(path, options)?;
+    Ok(Parts { posed_from_sensor, ..Parts::new(path, source, scans, poses) })
 }
 
 fn pose_file(path: &Path) -> Option<PathBuf> {
@@ -80,7 +72,7 @@ fn pose_file(path: &Path) -> Option<PathBuf> {
 }
 
 /// `Tr`; `None` where poses are the lidar's own.
-fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pose<3>>, IoError> {
+fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pose<3>>> {
     if options.pose_convention.is_some() || options.poses.is_some() {
         return Ok(None);
     }
@@ -93,17 +85,15 @@ fn camera_from_lidar(path: &Path, options: &ScanLogOptions) -> Result<Option<Pos
     read_transform(&file).map(Some)
 }
 
+/// How the line of the transform begins.
+const TRANSFORM_WORDS: [&[u8]; 5] = [b"Tr:", b"Tr", b"Tr_velo_to_cam:", b"Tr_velo_cam", b"Tr_velo_cam:"];
+
 /// The twelve numbers of the line `Tr` (`Tr_velo_to_cam` in KITTI's other benchmarks).
-fn read_transform(path: &Path) -> Result<Pose<3>, IoError> {
+fn read_transform(path: &Path) -> Result<Pose<3>> {
     let mut lines = Lines::of(open_input(path)?);
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let mut words = fields(line);
-        if !matches!(
-            words.next(),
-            Some(b"Tr:" | b"Tr" | b"Tr_velo_to_cam:" | b"Tr_velo_cam" | b"Tr_velo_cam:")
-        ) {
+        if !words.next().is_some_and(|word| TRANSFORM_WORDS.contains(&word)) {
             continue;
         }
         let bad = |advice: &str| IoError::text(path, number, "Tr", shown(line), advice);
@@ -120,26 +110,16 @@ fn read_transform(path: &Path) -> Result<Pose<3>, IoError> {
 }
 
 /// One time a line (seconds).
-fn read_times(path: &Path) -> Result<Vec<f64>, IoError> {
+fn read_times(path: &Path) -> Result<Vec<f64>> {
     let mut lines = Lines::of(open_input(path)?);
     let mut times = Vec::new();
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let Some(word) = fields(line).next() else { continue };
         let Some(time) = parse_f64(word).filter(|t| t.is_finite()) else {
-            return Err(IoError::text(
-                path,
-                number,
-                "a time",
-                shown(word),
-                "write seconds, one line per scan",
-            ));
+            let advice = "write seconds, one line per scan";
+            return Err(IoError::text(path, number, "a time", shown(word), advice));
         };
-        if times.len() == MOST_TIMES {
-            let value = format!("more than {MOST_TIMES}");
-            return Err(IoError::text(path, number, "the number of times", value, "split the log"));
-        }
+        IoError::unless_full(path, number, times.len(), MOST_TIMES, "times", "log")?;
         times.push(time);
     }
     Ok(times)

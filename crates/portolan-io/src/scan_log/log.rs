@@ -10,8 +10,8 @@ use portolan::scan::Frame;
 use super::matching::{Match, match_poses};
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
 use super::{Camera, RefusedPose, ScanLogKind, ScanLogOptions, ScanLogStats, UnreadColors};
-use crate::IoError;
 use crate::poses3::{MENDED_FROM, PoseConvention, RawPose, TrackPose, read_poses_3d};
+use crate::{IoError, Result};
 
 /// A scan that has a pose.
 struct Entry {
@@ -39,7 +39,7 @@ impl ScanLog {
     /// # Errors
     /// [`IoError::Layout`] where the kind is not recognized, files are missing or do not fit together, or no scan has a
     /// usable pose; the errors of reading what holds the poses and the camera.
-    pub fn open(path: &Path, options: &ScanLogOptions) -> Result<Self, IoError> {
+    pub fn open(path: &Path, options: &ScanLogOptions) -> Result<Self> {
         // A missing path gets the system's own error.
         std::fs::metadata(path).map_err(|e| IoError::os(path, "open it", e))?;
         let kind = options.format.or_else(|| ScanLogKind::recognize(path)).ok_or_else(|| {
@@ -53,12 +53,7 @@ impl ScanLog {
         Self::assemble(path, kind, parts, options)
     }
 
-    fn assemble(
-        path: &Path,
-        kind: ScanLogKind,
-        parts: Parts,
-        options: &ScanLogOptions,
-    ) -> Result<Self, IoError> {
+    fn assemble(path: &Path, kind: ScanLogKind, parts: Parts, options: &ScanLogOptions) -> Result<Self> {
         let Parts { name, source, scans, poses, convention, posed_from_sensor, camera, mut stats } = parts;
         if scans.is_empty() {
             return Err(IoError::layout(path, "the number of scans", "0", "give a log with scans"));
@@ -145,7 +140,7 @@ impl ScanLog {
     /// # Errors
     /// [`IoError`] where its file cannot be read or is damaged. A damaged color picture beside a depth image is not an error: the frame
     /// is without colors then, and [`ScanLog::unread_colors`] counts it.
-    pub fn frame(&self, i: usize) -> Result<Frame, IoError> {
+    pub fn frame(&self, i: usize) -> Result<Frame> {
         self.source.frame(self.entries[i].place)
     }
 

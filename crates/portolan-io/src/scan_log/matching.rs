@@ -6,8 +6,8 @@ use portolan::geom::Pose;
 
 use super::parts::ScanId;
 use super::stats::ScanLogStats;
-use crate::IoError;
 use crate::poses3::{TimedPoses, TrackPose};
+use crate::{IoError, Result};
 
 /// The result of matching a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub(super) fn match_poses(
     tolerance: f64,
     path: &Path,
     stats: &mut ScanLogStats,
-) -> Result<Vec<Match>, IoError> {
+) -> Result<Vec<Match>> {
     if let (Some(times), Some(timed)) = (times_of(scans), TimedPoses::new(track)) {
         return by_time(&times, &timed, tolerance, path, stats);
     }
@@ -49,7 +49,7 @@ pub(super) fn match_poses(
             "give one pose for each of the {} scans, or stamps for both, or scans whose file names are numbered like the poses",
             scans.len()
         );
-        return Err(IoError::layout(path, "the number of poses", track.len().to_string(), advice));
+        return Err(IoError::layout(path, "the number of poses", track.len(), advice));
     };
     let mut used = vec![false; track.len()];
     let matches = places.iter().map(|place| match place.and_then(|i| Some((i, track.get(i)?))) {
@@ -89,7 +89,7 @@ fn by_time(
     tolerance: f64,
     path: &Path,
     stats: &mut ScanLogStats,
-) -> Result<Vec<Match>, IoError> {
+) -> Result<Vec<Match>> {
     let matches: Vec<Match> = times
         .iter()
         .map(|t| poses.at(*t, tolerance).map_or(Match::LeftOut, |pose| Match::Posed(pose, None)))
@@ -154,7 +154,7 @@ mod tests {
     }
 
     /// The x of each scan's pose, and the counts.
-    fn found(scans: &[ScanId], track: &[TrackPose]) -> Result<(Vec<Option<f64>>, ScanLogStats), IoError> {
+    fn found(scans: &[ScanId], track: &[TrackPose]) -> Result<(Vec<Option<f64>>, ScanLogStats)> {
         let mut stats = ScanLogStats::default();
         let matches = match_poses(scans, track, 0.02, "p".as_ref(), &mut stats)?;
         let x = |m: &Match| match m {

@@ -17,7 +17,7 @@
 //! [`ScanLog::open`] finds the files, reads the poses and counts in [`ScanLogStats`] what does not fit together; the scans
 //! themselves are read on request, by index and from any thread.
 //!
-//! To add a format: a file here with a function `fn(&Path, &ScanLogOptions) -> Result<Parts, IoError>`, which finds the
+//! To add a format: a file here with a function `fn(&Path, &ScanLogOptions) -> Result<Parts>`, which finds the
 //! scans and where their poses are, and a kind in `kind.rs`. Matching poses with scans, conventions, mending and refusing
 //! happen once, in `log.rs`.
 

@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use portolan::geom::Pose;
 use portolan::scan::Frame;
 
-use super::files::names_in;
+use super::files::{name_of, names_in};
 use super::{Camera, ScanLogStats, UnreadColors};
-use crate::IoError;
 use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
+use crate::{IoError, Result};
 
 /// Reads scans by index, in any order, from any thread.
 pub(crate) trait FrameSource: Send + Sync {
     /// Scan `i` of those that the format found.
-    fn frame(&self, i: usize) -> Result<Frame, IoError>;
+    fn frame(&self, i: usize) -> Result<Frame>;
 
     /// Where the sensor stood in the frame of scan `i` (metres): not in its zero where clouds are in the world's frame.
     fn origin(&self, _i: usize) -> [f64; 3] {
@@ -68,8 +68,31 @@ pub(crate) struct Parts {
     pub(crate) stats: ScanLogStats,
 }
 
+impl Parts {
+    /// Scans of sensors whose poses are their own, `world_from_sensor`.
+    pub(super) fn new(
+        path: &Path,
+        source: impl FrameSource + 'static,
+        scans: Vec<ScanId>,
+        poses: LayoutPoses,
+    ) -> Self {
+        let (source, convention, stats) =
+            (Box::new(source), PoseConvention::default(), ScanLogStats::default());
+        Self {
+            name: name_of(path),
+            source,
+            scans,
+            poses,
+            convention,
+            posed_from_sensor: None,
+            camera: None,
+            stats,
+        }
+    }
+}
+
 /// The pose in a file of its own; `None` where the file is missing.
-pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>, IoError> {
+pub(super) fn pose_beside(path: &Path) -> Result<Option<(PathBuf, RawPose)>> {
     if !path.exists() {
         return Ok(None);
     }
@@ -87,7 +110,7 @@ pub(super) fn poses_beside_nothing(
     folder: &Path,
     scans: &[String],
     name_of_scan: impl Fn(&str) -> Option<String>,
-) -> Result<u64, IoError> {
+) -> Result<u64> {
     let scans: HashSet<&str> = scans.iter().map(String::as_str).collect();
     let alone = |name: &str| name_of_scan(name).is_some_and(|scan| !scans.contains(&*scan));
     Ok(names_in(folder, alone)?.len() as u64)

@@ -10,13 +10,13 @@
 use std::path::{Path, PathBuf};
 
 use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
-use super::files::{has_extension, has_name, name_of, names_in, number_in};
+use super::files::{has_extension, has_name, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
-use crate::poses3::{PoseConvention, read_poses_3d};
+use crate::Result;
+use crate::poses3::read_poses_3d;
 
 const DEPTH: &str = "depth";
 const POSES: &str = "trajectory.log";
@@ -43,7 +43,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     path.join(DEPTH).is_dir() && has_name(&path.join(DEPTH), is_png) && has_poses()
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let folder = path.join(DEPTH);
     let names = names_in(&folder, is_png)?;
     let camera = find_camera(path, &CAMERA_FILES, Some(("Open3D's PrimeSense", CAMERA)), options)?;
@@ -64,16 +64,9 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
         let (number, time) = number_and_time(name);
         ScanId { path: folder.join(name), number, time }
     };
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?),
-        scans: names.iter().map(scan).collect(),
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let scans = names.iter().map(scan).collect();
+    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }
 
 /// Number and time (seconds) of a picture's name.
@@ -87,7 +80,7 @@ fn number_and_time(name: &str) -> (Option<u64>, Option<f64>) {
     }
 }
 
-fn poses_of(path: &Path, names: &[String], options: &ScanLogOptions) -> Result<LayoutPoses, IoError> {
+fn poses_of(path: &Path, names: &[String], options: &ScanLogOptions) -> Result<LayoutPoses> {
     let missing = || Ok(LayoutPoses::Missing(format!("{POSES}, one other .log, or a folder {POSE_FOLDER}")));
     if options.poses.is_some() {
         return missing();
@@ -111,11 +104,7 @@ fn poses_of(path: &Path, names: &[String], options: &ScanLogOptions) -> Result<L
 }
 
 /// The color pictures: of the same name, else of the nearest time, else in order where there are as many.
-fn colors_of(
-    path: &Path,
-    depths: &[String],
-    options: &ScanLogOptions,
-) -> Result<Vec<Option<PathBuf>>, IoError> {
+fn colors_of(path: &Path, depths: &[String], options: &ScanLogOptions) -> Result<Vec<Option<PathBuf>>> {
     let without_colors = vec![None; depths.len()];
     let folder = COLOR_FOLDERS.iter().map(|name| path.join(name)).find(|folder| folder.is_dir());
     let Some(folder) = folder.filter(|_| options.color) else { return Ok(without_colors) };
@@ -142,6 +131,7 @@ mod tests {
     use super::*;
     use crate::scan_log::testing::*;
     use crate::scan_log::{CameraFrom, ScanLog, ScanLogKind};
+    use crate::testing::says;
 
     fn trajectory(poses: impl Iterator<Item = usize>) -> String {
         poses.map(|i| format!("{i} {i} {}\n{}", i + 1, matrix_text(&camera_pose(i)))).collect()
@@ -225,10 +215,9 @@ mod tests {
         write(&folder.path().join("camera.json"), json());
         write(&folder.path().join("a.log"), trajectory(0..1));
         write(&folder.path().join("b.log"), trajectory(0..1));
-        let error = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap_err().to_string();
-        assert!(
-            error.contains("the pose file is missing; looked for trajectory.log, one other .log"),
-            "{error}"
+        says(
+            ScanLog::open(folder.path(), &ScanLogOptions::default()),
+            "the pose file is missing; looked for trajectory.log, one other .log",
         );
     }
 }

@@ -7,12 +7,11 @@
 use std::path::Path;
 
 use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
-use super::files::{has_name, name_of, names_in, number_in};
+use super::files::{has_name, names_in, number_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
-use crate::poses3::PoseConvention;
+use crate::Result;
 
 const DEPTH: &str = ".depth.png";
 const POSE: &str = ".pose.txt";
@@ -27,7 +26,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     has_name(path, is_depth)
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let names = names_in(path, is_depth)?;
     let files = ["camera-intrinsics.txt", "../camera-intrinsics.txt"];
     let camera = find_camera(path, &files, Some(("7-Scenes", CAMERA)), options)?;
@@ -51,24 +50,17 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
         stats.poses_without_scan = poses_beside_nothing(path, &names, name_of_scan)?;
     }
     let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
-    Ok(Parts {
-        name: name_of(path),
-        source: Box::new(source),
-        scans,
-        poses: LayoutPoses::PerScan(poses),
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let poses = LayoutPoses::PerScan(poses);
+    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::poses3::PoseConvention;
     use crate::scan_log::testing::*;
     use crate::scan_log::{ScanLog, ScanLogKind};
-    use crate::testing::{bad_bytes, real_data};
+    use crate::testing::{bad_bytes, real_data, says};
     use portolan::geom::vector::distance;
 
     /// Median distance (metres) along the ray between two frames at the same points: pixels of one, moved into the
@@ -235,11 +227,7 @@ mod tests {
         (0..4).for_each(|i| assert_is_picture(&log, i, i));
         assert_eq!(log.stats().poses_without_scan, 8);
         let few = quaternion_text(0) + "\n" + &quaternion_text(1);
-        let error = open(few, None).unwrap_err().to_string();
-        assert!(
-            error.contains("other.txt: the number of poses is 2; give one pose for each of the 4"),
-            "{error}"
-        );
+        says(open(few, None), "other.txt: the number of poses is 2; give one pose for each of the 4");
     }
 
     #[test]
@@ -290,10 +278,9 @@ mod tests {
     fn a_camera_of_other_pictures_is_refused() {
         let folder = folder_of(1);
         std::fs::remove_file(folder.path().join("camera-intrinsics.txt")).unwrap();
-        let error = ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap_err().to_string();
-        assert!(
-            error.contains("the size of the picture is 8 x 6; the camera has its center at 320"),
-            "{error}"
+        says(
+            ScanLog::open(folder.path(), &ScanLogOptions::default()),
+            "the size of the picture is 8 x 6; the camera has its center at 320",
         );
     }
 
@@ -331,10 +318,7 @@ mod tests {
         // Half a pixel at 2 m is 1.7 mm, the depth's own step there 3 mm.
         let right = disagreement(&log, 10, 11);
         assert!(right < 0.006, "{right}");
-        let options = ScanLogOptions {
-            pose_convention: Some(PoseConvention::SensorFromWorld),
-            ..ScanLogOptions::default()
-        };
+        let options = with_convention(PoseConvention::SensorFromWorld);
         let wrong = disagreement(&ScanLog::open(&path, &options).unwrap(), 10, 11);
         assert!(wrong > 2.0 * right, "{wrong} against {right}");
     }

@@ -11,14 +11,14 @@
 use std::path::{Path, PathBuf};
 
 use super::cloud_frames::{CloudFrames, Rays};
-use super::files::{has_extension, name_of, names_in, number_in};
+use super::files::{has_extension, names_in, number_in};
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
 use crate::bytes::{Lines, fields, open as open_input, parse_f64};
 use crate::error::shown;
 use crate::points::PointFormat;
 use crate::poses3::{PoseConvention, RawPose};
+use crate::{IoError, Result};
 
 /// The most scans of a log.
 const MOST_SCANS: usize = 1 << 16;
@@ -46,7 +46,7 @@ fn conf_of(path: &Path) -> Option<PathBuf> {
     })
 }
 
-pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts> {
     let Some(conf) = conf_of(path) else {
         return Err(IoError::layout(path, "the .conf file", "missing or not the only one", "name it"));
     };
@@ -66,24 +66,15 @@ pub(super) fn open(path: &Path, _options: &ScanLogOptions) -> Result<Parts, IoEr
         files.push(file);
     }
     let source = CloudFrames::new(files, Some(PointFormat::Ply), Rays::Parallel)?;
-    Ok(Parts {
-        name: name_of(path),
-        scans,
-        poses: LayoutPoses::PerScan(poses),
-        convention: PoseConvention::TransposedRotation,
-        posed_from_sensor: source.files_from_frames(),
-        source: Box::new(source),
-        camera: None,
-        stats,
-    })
+    let (convention, posed_from_sensor) = (PoseConvention::TransposedRotation, source.files_from_frames());
+    let parts = Parts::new(path, source, scans, LayoutPoses::PerScan(poses));
+    Ok(Parts { convention, posed_from_sensor, stats, ..parts })
 }
 
-fn read(path: &Path) -> Result<Vec<Line>, IoError> {
+fn read(path: &Path) -> Result<Vec<Line>> {
     let mut lines = Lines::of(open_input(path)?);
     let mut all = Vec::new();
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let mut words = fields(line);
         if !matches!(words.next(), Some(b"bmesh" | b"mesh")) {
             continue;
@@ -95,10 +86,7 @@ fn read(path: &Path) -> Result<Vec<Line>, IoError> {
         let file = words.next().and_then(|w| std::str::from_utf8(w).ok()).ok_or_else(bad)?;
         let values: Option<Vec<f64>> = words.map(parse_f64).collect();
         let [x, y, z, qx, qy, qz, qw] = *values.unwrap_or_default() else { return Err(bad()) };
-        if all.len() == MOST_SCANS {
-            let value = format!("more than {MOST_SCANS}");
-            return Err(IoError::text(path, number, "the number of scans", value, "split the file"));
-        }
+        IoError::unless_full(path, number, all.len(), MOST_SCANS, "scans", "file")?;
         all.push(Line {
             file: file.into(),
             pose: RawPose::from_quaternion([x, y, z], [qx, qy, qz, qw], number),

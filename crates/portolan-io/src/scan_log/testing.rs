@@ -7,7 +7,8 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, RangeImage};
 
-use super::ScanLog;
+use super::{ScanLog, ScanLogOptions};
+use crate::poses3::PoseConvention;
 
 /// z of the wall (metres).
 pub(super) const WALL: f64 = 3.0;
@@ -97,6 +98,20 @@ pub(super) fn write_color(path: &Path, rgb: [u8; 3]) {
 pub(super) fn write(path: &Path, bytes: impl AsRef<[u8]>) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     fs::write(path, bytes).unwrap();
+}
+
+/// Median distance from every `step`-th point to the nearest of the others, by looking at all of them.
+pub(super) fn median_distance(from: &[[f64; 3]], to: &[[f64; 3]], step: usize) -> f64 {
+    let square = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum::<f64>();
+    let nearest = |p: &[f64; 3]| to.iter().map(|q| square(*p, *q)).fold(f64::INFINITY, f64::min);
+    let mut all: Vec<f64> = from.iter().step_by(step).map(|p| nearest(p).sqrt()).collect();
+    all.sort_by(f64::total_cmp);
+    all[all.len() / 2]
+}
+
+/// Options with a convention of poses.
+pub(super) fn with_convention(convention: PoseConvention) -> ScanLogOptions {
+    ScanLogOptions { pose_convention: Some(convention), ..ScanLogOptions::default() }
 }
 
 /// The depth image of scan `i`.

@@ -15,10 +15,10 @@ use super::intrinsics::find_camera;
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
-use crate::IoError;
 use crate::bytes::{Lines, open as open_input, parse_f64};
 use crate::error::shown;
-use crate::poses3::{PoseConvention, read_poses_3d};
+use crate::poses3::read_poses_3d;
+use crate::{IoError, Result};
 
 const DEPTH: &str = "depth.txt";
 const COLOR: &str = "rgb.txt";
@@ -33,7 +33,7 @@ pub(super) fn is_it(path: &Path) -> bool {
     path.join(DEPTH).is_file() && (path.join(POSES).is_file() || path.join("depth").is_dir())
 }
 
-pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoError> {
+pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let mut stats = ScanLogStats::default();
     let mut depths = read_list(&path.join(DEPTH))?;
     let listed = depths.len();
@@ -42,17 +42,12 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
     if depths.is_empty() {
         let value = format!("0 of {listed}");
         let advice = "name the folder that holds the pictures beside depth.txt";
-        return Err(IoError::layout(
-            &path.join(DEPTH),
-            "the number of pictures that are there",
-            value,
-            advice,
-        ));
+        let field = "the number of pictures that are there";
+        return Err(IoError::layout(&path.join(DEPTH), field, value, advice));
     }
     let colors = path.join(COLOR);
     let colors = if options.color && colors.is_file() { read_list(&colors)? } else { Vec::new() };
-    let name = name_of(path);
-    let camera = find_camera(path, &CAMERA_FILES, published_camera(&name), options)?;
+    let camera = find_camera(path, &CAMERA_FILES, published_camera(&name_of(path)), options)?;
     let color = |time| nearest_in_time(&colors, time, options.time_tolerance).filter(|file| file.is_file());
     let frames = depths.iter().map(|(time, file)| DepthFrame {
         depth: file.clone(),
@@ -65,16 +60,9 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts, IoErr
         None if poses.is_file() => LayoutPoses::File(read_poses_3d(poses)?),
         _ => LayoutPoses::Missing(POSES.into()),
     };
-    Ok(Parts {
-        name,
-        source: Box::new(DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?),
-        scans: depths.into_iter().map(|(t, path)| ScanId { path, number: None, time: Some(t) }).collect(),
-        poses,
-        convention: PoseConvention::WorldFromSensor,
-        posed_from_sensor: None,
-        camera: Some(camera),
-        stats,
-    })
+    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let scans = depths.into_iter().map(|(t, path)| ScanId { path, number: None, time: Some(t) }).collect();
+    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }
 
 /// What TUM publishes for the color cameras, to which its depth images are registered.
@@ -93,13 +81,11 @@ fn published_camera(name: &str) -> Option<(&'static str, [f64; 4])> {
 }
 
 /// The pictures of a list, in order of time.
-fn read_list(path: &Path) -> Result<Vec<(f64, PathBuf)>, IoError> {
+fn read_list(path: &Path) -> Result<Vec<(f64, PathBuf)>> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut lines = Lines::of(open_input(path)?);
     let mut pictures = Vec::new();
-    loop {
-        let number = lines.number() + 1;
-        let Some(line) = lines.next_line()? else { break };
+    while let Some((number, line)) = lines.next_numbered()? {
         let line = line.trim_ascii();
         if line.is_empty() || line.starts_with(b"#") {
             continue;
@@ -114,10 +100,7 @@ fn read_list(path: &Path) -> Result<Vec<(f64, PathBuf)>, IoError> {
         if file.is_empty() || file.contains('\0') {
             return Err(IoError::text(path, number, "the file", shown(line), "write seconds, then a file"));
         }
-        if pictures.len() == MOST_PICTURES {
-            let value = format!("more than {MOST_PICTURES}");
-            return Err(IoError::text(path, number, "the number of pictures", value, "split the list"));
-        }
+        IoError::unless_full(path, number, pictures.len(), MOST_PICTURES, "pictures", "list")?;
         pictures.push((time, folder.join(file)));
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -129,7 +112,7 @@ mod tests {
     use super::*;
     use crate::scan_log::testing::*;
     use crate::scan_log::{CameraFrom, ScanLog, ScanLogKind};
-    use crate::testing::bad_bytes;
+    use crate::testing::{bad_bytes, says, temporary};
 
     const START: f64 = 1_305_031_453.25;
 
@@ -216,22 +199,13 @@ mod tests {
         let truth = folder.path().join("groundtruth.txt");
         let text = std::fs::read_to_string(&truth).unwrap();
         std::fs::write(&truth, text.replace("130503", "140503")).unwrap();
-        let error = open(folder.path()).unwrap_err().to_string();
-        assert!(error.contains("groundtruth.txt: the time of the poses is 1405031453.242 to"), "{error}");
+        says(open(folder.path()), "groundtruth.txt: the time of the poses is 1405031453.242 to");
         std::fs::write(&truth, text).unwrap();
         std::fs::remove_file(folder.path().join("calibration.txt")).unwrap();
-        let error = open(folder.path()).unwrap_err().to_string();
-        assert!(
-            error.contains("the camera is unknown; give fx,fy,cx,cy or a file with --intrinsics"),
-            "{error}"
-        );
+        says(open(folder.path()), "the camera is unknown; give fx,fy,cx,cy or a file with --intrinsics");
         std::fs::remove_file(&truth).unwrap();
         write(&folder.path().join("calibration.txt"), "10 12 3.5 2.5");
-        let error = open(folder.path()).unwrap_err().to_string();
-        assert!(
-            error.contains("the pose file is missing; looked for groundtruth.txt; name a file"),
-            "{error}"
-        );
+        says(open(folder.path()), "the pose file is missing; looked for groundtruth.txt; name a file");
         assert_eq!(published_camera("rgbd_dataset_freiburg2_desk").unwrap().1[0], 520.9);
         assert_eq!(published_camera("fr3_office").unwrap().0, "TUM freiburg3");
         assert_eq!(published_camera("kitchen"), None);
@@ -239,8 +213,7 @@ mod tests {
 
     #[test]
     fn lists_are_read_whatever_they_are() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("depth.txt");
+        let (folder, path) = temporary("depth.txt");
         let good = "# c\n2.5 depth/b c.png\n1.5,depth/a.png\n\n";
         write(&path, good);
         let list = read_list(&path).unwrap();
@@ -248,8 +221,7 @@ mod tests {
         assert_eq!(list[1], (2.5, folder.path().join("depth/b c.png")));
         for (text, part) in [("x y", "line 1: the time is \"x\""), ("\n1.5", "line 2: the file is \"1.5\"")] {
             write(&path, text);
-            let error = read_list(&path).unwrap_err().to_string();
-            assert!(error.contains(part), "{error}");
+            says(read_list(&path), part);
         }
         for bytes in bad_bytes(good.as_bytes(), 9, 100) {
             write(&path, bytes);
