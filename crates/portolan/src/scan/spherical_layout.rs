@@ -51,10 +51,8 @@ impl SphericalLayout {
     pub fn from_parts(elevations: Vec<f32>, columns: usize, first_azimuth: f64) -> Option<Self> {
         let descending = elevations.windows(2).all(|w| w[0] > w[1]);
         let sane = elevations.iter().all(|e| e.abs() < 1.6) && first_azimuth.is_finite();
-        if !descending || !sane || elevations.len() < 2 || elevations.len() > 16_384 {
-            return None;
-        }
-        if !(4..=32_768).contains(&columns) {
+        let fits = (2..=16_384).contains(&elevations.len()) && (4..=32_768).contains(&columns);
+        if !(descending && sane && fits) {
             return None;
         }
         // A point belongs to the nearest row, to an end row only within half of the distance to the row beside it.
@@ -218,11 +216,8 @@ mod tests {
 
     /// A room with a pillar, seen by `rings` rings of `columns` beams; some beams without an echo.
     fn scan(rings: usize, columns: usize, scatter: f64, origin: [f64; 3]) -> Vec<[f32; 3]> {
-        let mut seed = 1u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
+        let mut random = crate::testing::Random(1);
+        let mut random = || random.unit() - 0.5;
         let mut points = Vec::new();
         for row in 0..rings {
             for column in 0..columns {
