@@ -155,11 +155,8 @@ fn some_bricks() -> impl Strategy<Value = Vec<[i32; 3]>> {
 
 proptest! {
     #[test]
-    fn matches_brute_force_2d(c in crossings(), b in some_bricks(), limit in prop_oneof![0.5f32..30.0, 30.0..2000.0f32]) {
+    fn matches_brute_force_2d_and_3d(c in crossings(), b in some_bricks(), limit in prop_oneof![0.5f32..30.0, 30.0..2000.0f32]) {
         matches_brute_force::<2>(&c, &b, limit);
-    }
-    #[test]
-    fn matches_brute_force_3d(c in crossings(), b in some_bricks(), limit in prop_oneof![0.5f32..30.0, 30.0..2000.0f32]) {
         matches_brute_force::<3>(&c, &b, limit);
     }
 }
@@ -206,11 +203,8 @@ fn plain_scenes_match_brute_force() {
 /// One axis taken for another: the same values, up to the order in which three squares are summed up.
 #[test]
 fn axes_are_alike() {
-    let mut random = 7u64;
-    let mut next = |n: u64| {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (random >> 33) % n
-    };
+    let mut random = crate::testing::Random(7);
+    let mut next = |n: u64| random.next() % n;
     let scene: Vec<Crossing> = (0..200)
         .map(|_| {
             let cell = [next(30) as i32 - 3, next(30) as i32 - 3, next(30) as i32 - 3];
