@@ -190,8 +190,8 @@ impl Cell for SignedDistance {
     }
 }
 
-/// The filter over slices of the same length, states against observations, in the widest vectors that the processor
-/// has: every width gives the same bits.
+/// The filter over slices of the same length, states against observations. In the widest vectors that the
+/// processor has: every width gives the same bits.
 #[multiversion(targets = "simd")]
 fn fuse_widest(distance: &mut [f32], weight: &mut [f32], observed: &[f32], gained: &[f32], rule: &TsdfRule) {
     if distance.len().is_multiple_of(LAYER) {

@@ -68,7 +68,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn gradient_is_the_derivative_2d_and_3d(v in prop::collection::vec(-1.0f32..1.0, 8), f in prop::array::uniform3(0.01..0.99f64)) {
+        fn gradient_is_the_derivative_2d_and_3d(
+            v in prop::collection::vec(-1.0f32..1.0, 8), f in prop::array::uniform3(0.01..0.99f64),
+        ) {
             gradient_is_the_derivative::<2>(&v, f);
             gradient_is_the_derivative::<3>(&v, f);
         }

@@ -134,7 +134,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn covers_the_ray_2d_and_3d(o in prop::array::uniform3(-3.0..3.0f64), t in prop::array::uniform3(-3.0..3.0f64)) {
+        fn covers_the_ray_2d_and_3d(
+            o in prop::array::uniform3(-3.0..3.0f64), t in prop::array::uniform3(-3.0..3.0f64),
+        ) {
             covers_the_ray::<2>(o, t);
             covers_the_ray::<3>(o, t);
         }

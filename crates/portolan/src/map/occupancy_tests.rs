@@ -158,8 +158,7 @@ fn bounds_and_limits_hold() {
 fn what_contradicts_itself_is_refused() {
     for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
         for (image, why) in crate::scan::broken_images() {
-            let mut map =
-                Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default()).unwrap().with_sweep(sweep);
+            let mut map = map([0.0; 3]).with_sweep(sweep);
             let mut scan = PointScan::new([[0.0, 0.0, 1.0]], [0.0; 3]);
             scan.image = Some(image.clone());
             let got = map.integrate(&Pose::IDENTITY, &Frame::Image(image));
@@ -179,8 +178,7 @@ fn what_contradicts_itself_is_refused() {
 #[test]
 fn readings_that_are_too_far_cost_nothing_and_are_counted() {
     for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
-        let mut map =
-            Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default()).unwrap().with_sweep(sweep);
+        let mut map = map([0.0; 3]).with_sweep(sweep);
         let mut points = shell(3000);
         points.extend([[1e6, 0.0, 0.0], [1e7, 1e7, 1e7], [1e20, 0.0, 0.0]]);
         let mut scan = PointScan::new(points, [0.0; 3]);

@@ -283,7 +283,8 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_certified_is_free_2d_and_3d(
-            flat in scenes::<2>(), scene in scenes::<3>(), p in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 1..5),
+            flat in scenes::<2>(), scene in scenes::<3>(),
+            p in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 1..5),
             clearance in prop_oneof![Just(0.0), 0.0..0.6f64], optimistic in any::<bool>(),
         ) {
             legs_and_splines(&flat, &p, &demand(clearance, optimistic));

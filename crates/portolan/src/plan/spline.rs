@@ -179,7 +179,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn keeps_its_promise_2d_and_3d(p in prop::collection::vec(prop::array::uniform3(-3.0..3.0f64), 2..7), t in 0.0..1.0f64, l in 1e-3..9.0f64) {
+        fn keeps_its_promise_2d_and_3d(
+            p in prop::collection::vec(prop::array::uniform3(-3.0..3.0f64), 2..7),
+            t in 0.0..1.0f64, l in 1e-3..9.0f64,
+        ) {
             keeps_its_promise::<2>(&p, t, l);
             keeps_its_promise::<3>(&p, t, l);
         }

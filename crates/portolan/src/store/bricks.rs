@@ -321,7 +321,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn holds_what_an_array_holds_2d_and_3d(scans in prop::collection::vec((prop::collection::vec(0..64i32, 1..40), any::<u64>()), 1..6)) {
+        fn holds_what_an_array_holds_2d_and_3d(
+            scans in prop::collection::vec((prop::collection::vec(0..64i32, 1..40), any::<u64>()), 1..6),
+        ) {
             holds_what_an_array_holds::<2>(&scans);
             holds_what_an_array_holds::<3>(&scans);
         }

@@ -43,7 +43,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         Some(tree)
     }
 
-    /// Holds the cells of bricks, taken along the tree, so that one brick's records lie beside the next one's.
+    /// Holds the cells of bricks. Along the tree, so that one brick's records lie beside the next one's.
     fn take(&mut self, mut bricks: Vec<(BlockKey<D>, &LogOddsBrick<V>)>) {
         bricks.sort_unstable_by_key(|(key, _)| interleaved(*key));
         for (key, brick) in bricks {

@@ -25,7 +25,8 @@ impl<const D: usize> Rays<D> {
         Self { wall_depth, touched: Touched::new() }
     }
 
-    /// Marks the cells of one beam that frees or hits something, in the world's frame; `false` where it is too long to be walked, and nothing is marked.
+    /// Marks the cells of one beam (in the world's frame) that frees or hits something; `false` where it is too long to
+    /// be walked, and nothing is marked.
     fn walk(
         &mut self,
         lattice: &Lattice<D>,

@@ -180,11 +180,10 @@ fn is_the_nearest_crossing<const D: usize>(steps: &[Vec<Change>], settings: &Esd
 
 proptest! {
     #[test]
-    fn is_the_nearest_crossing_2d(steps in changes(), max_distance in 0.05..1.8f64) {
-        is_the_nearest_crossing::<2>(&steps, &EsdfSettings { max_distance, ..Default::default() });
-    }
-    #[test]
-    fn is_the_nearest_crossing_3d(steps in changes(), max_distance in 0.05..1.0f64) {
+    fn is_the_nearest_crossing_2d_and_3d(
+        steps in changes(), far in 0.05..1.8f64, max_distance in 0.05..1.0f64,
+    ) {
+        is_the_nearest_crossing::<2>(&steps, &EsdfSettings { max_distance: far, ..Default::default() });
         is_the_nearest_crossing::<3>(&steps, &EsdfSettings { max_distance, ..Default::default() });
     }
 }
