@@ -216,8 +216,11 @@ mod tests {
 
     /// A room with a pillar, seen by `rings` rings of `columns` beams; some beams without an echo.
     fn scan(rings: usize, columns: usize, scatter: f64, origin: [f64; 3]) -> Vec<[f32; 3]> {
-        let mut random = crate::testing::Random(1);
-        let mut random = || random.unit() - 0.5;
+        let mut seed = 1u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
         let mut points = Vec::new();
         for row in 0..rings {
             for column in 0..columns {

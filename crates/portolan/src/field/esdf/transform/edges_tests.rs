@@ -205,8 +205,11 @@ fn plain_scenes_match_brute_force() {
 /// One axis taken for another: the same values, up to the order in which three squares are summed up.
 #[test]
 fn axes_are_alike() {
-    let mut random = crate::testing::Random(7);
-    let mut next = |n: u64| random.next() % n;
+    let mut random = 7u64;
+    let mut next = |n: u64| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 33) % n
+    };
     let scene: Vec<Crossing> = (0..200)
         .map(|_| {
             let cell = [next(30) as i32 - 3, next(30) as i32 - 3, next(30) as i32 - 3];
