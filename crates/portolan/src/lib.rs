@@ -48,9 +48,12 @@ pub mod mapper;
 mod parallel;
 pub mod plan;
 pub mod scan;
+mod sets;
 pub mod store;
 pub mod surface;
 pub mod sweep;
+#[cfg(test)]
+mod testing;
 
 pub use answer::{Answer, Status};
 pub use mapper::{Mapper, MapperSettings};

@@ -72,6 +72,11 @@ pub(crate) fn for_each<T: Send, S>(
     });
 }
 
+/// [`for_each`] without scratch.
+pub(crate) fn each<T: Send>(tasks: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
+    for_each(tasks, || (), |task, ()| work(task));
+}
+
 /// Calls `change(item, scratch)` for every item, `together` items in one task.
 pub(crate) fn change_each<T: Send, S>(
     items: &mut [T],
@@ -123,15 +128,7 @@ mod tests {
     use super::*;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    #[cfg(feature = "parallel")]
-    fn with_threads<R: Send>(count: usize, work: impl FnOnce() -> R + Send) -> R {
-        rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap().install(work)
-    }
-
-    #[cfg(not(feature = "parallel"))]
-    fn with_threads<R>(_: usize, work: impl FnOnce() -> R) -> R {
-        work()
-    }
+    use crate::testing::with_threads;
 
     #[test]
     fn everything_is_done_once_and_comes_back_in_order() {
@@ -168,6 +165,6 @@ mod tests {
     #[test]
     #[should_panic = "a task fails"]
     fn a_panic_in_a_task_reaches_the_caller() {
-        with_threads(2, || for_each(0..100, || (), |i, ()| assert!(i != 50, "a task fails")));
+        with_threads(2, || each(0..100, |i| assert!(i != 50, "a task fails")));
     }
 }

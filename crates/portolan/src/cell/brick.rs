@@ -1,7 +1,7 @@
 //! The planes of one brick, shared between snapshots until one of them changes it.
 
 use super::packed::Packed;
-use super::{DistanceObservation, LogOddsValue, Planes, SignedDistance};
+use super::{LogOddsValue, Planes, SignedDistance};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -141,10 +141,7 @@ impl Planes<SignedDistance> for DistanceBrick {
     }
 
     fn set(&mut self, i: usize, cell: Option<SignedDistance>) {
-        let cell = cell.map_or(DistanceObservation { distance: 0.0, weight: 0.0 }, |c| DistanceObservation {
-            distance: c.distance,
-            weight: c.weight,
-        });
+        let cell = cell.unwrap_or(SignedDistance { distance: 0.0, weight: 0.0 });
         let (distance, weight) = self.planes_mut();
         distance[i] = cell.distance;
         weight[i] = cell.weight;

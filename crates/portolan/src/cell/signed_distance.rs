@@ -176,26 +176,22 @@ impl Cell for SignedDistance {
         len: usize,
         rule: &TsdfRule,
     ) {
-        fuse_slices(
-            (&mut planes.distance[start..start + len], &mut planes.weight[start..start + len]),
-            (&evidence.distances()[from..from + len], &evidence.weights()[from..from + len]),
-            rule,
-        );
+        let (distance, weight) =
+            (&mut planes.distance[start..start + len], &mut planes.weight[start..start + len]);
+        let (observed, gained) =
+            (&evidence.distances()[from..from + len], &evidence.weights()[from..from + len]);
+        fuse_widest(distance, weight, observed, gained, rule);
     }
 
     #[inline]
     fn fuse_brick(brick: &mut DistanceBrick, evidence: &Distances, rule: &TsdfRule) {
-        fuse_slices(brick.planes_mut(), (evidence.distances(), evidence.weights()), rule);
+        let (distance, weight) = brick.planes_mut();
+        fuse_widest(distance, weight, evidence.distances(), evidence.weights(), rule);
     }
 }
 
-/// The filter over slices of the same length: states against observations.
-#[inline(always)]
-fn fuse_slices(state: (&mut [f32], &mut [f32]), observation: (&[f32], &[f32]), rule: &TsdfRule) {
-    fuse_widest(state.0, state.1, observation.0, observation.1, rule);
-}
-
-/// In the widest vectors that the processor has: every width gives the same bits.
+/// The filter over slices of the same length, states against observations. In the widest vectors that the
+/// processor has: every width gives the same bits.
 #[multiversion(targets = "simd")]
 fn fuse_widest(distance: &mut [f32], weight: &mut [f32], observed: &[f32], gained: &[f32], rule: &TsdfRule) {
     if distance.len().is_multiple_of(LAYER) {

@@ -3,6 +3,7 @@
 use super::cells::{Known, known};
 use crate::cell::{DistanceBrick, SignedDistance};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
+use crate::sets::bits_of;
 use crate::store::Bricks;
 
 /// A free cell with an unknown neighbor.
@@ -54,7 +55,7 @@ impl BrickFrontier {
         }
         let open: Cells = std::array::from_fn(|w| free[w] & faces.iter().fold(0, |any, face| any | face[w]));
         let mut cells = Vec::with_capacity(open.iter().map(|w| w.count_ones() as usize).sum());
-        for i in each(&open) {
+        for i in bits_of(&open) {
             let of = |face: &Cells| (face[i >> 6] >> (i & 63) & 1) as u8;
             let faces = faces.iter().rev().fold(0, |bits, face| bits << 1 | of(face));
             cells.push(FrontierCell { offset: i as u16, faces, group: NONE });
@@ -147,18 +148,6 @@ fn shifted<const D: usize>(set: &Cells, beyond: &Cells, axis: usize, step: i32) 
         };
     }
     out
-}
-
-/// The cells of a set, ascending.
-fn each(set: &Cells) -> impl Iterator<Item = usize> {
-    set.iter().enumerate().flat_map(|(w, &word)| {
-        let mut left = word;
-        std::iter::from_fn(move || {
-            let i = (left != 0).then(|| left.trailing_zeros() as usize)?;
-            left &= left - 1;
-            Some(64 * w + i)
-        })
-    })
 }
 
 /// No group yet.

@@ -3,6 +3,7 @@
 use super::faces::{BrickFrontier, neighbor};
 use crate::geom::vector::unit;
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
+use crate::sets::Sets;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
 
@@ -41,7 +42,7 @@ pub(super) fn join<const D: usize>(
         first.insert(*key, groups);
         groups += u32::from(pieces[key].groups);
     }
-    let mut sets = Sets((0..groups).collect());
+    let mut sets = Sets::new(groups);
     for key in &keys {
         join_with_neighbors(pieces, &first, *key, &mut sets);
     }
@@ -97,25 +98,6 @@ fn join_with_neighbors<const D: usize>(
                 sets.join(first_here + u32::from(cell.group), first_there + u32::from(group));
             }
         }
-    }
-}
-
-/// Disjoint sets; the representative of a set is its lowest member.
-struct Sets(Vec<u32>);
-
-impl Sets {
-    fn find(&mut self, mut i: u32) -> u32 {
-        while self.0[i as usize] != i {
-            // Halves the way for the next one.
-            self.0[i as usize] = self.0[self.0[i as usize] as usize];
-            i = self.0[i as usize];
-        }
-        i
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.find(a), self.find(b));
-        self.0[a.max(b) as usize] = a.min(b);
     }
 }
 

@@ -283,11 +283,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 64, ..Default::default() })]
         #[test]
-        fn follows_changes_2d(edits in edits()) {
+        fn follows_changes_2d_and_3d(edits in edits()) {
             follows_changes::<2>(&edits);
-        }
-        #[test]
-        fn follows_changes_3d(edits in edits()) {
             follows_changes::<3>(&edits);
         }
     }

@@ -314,9 +314,8 @@ mod tests {
     fn strip() -> Bricks<SignedDistance, 2> {
         let mut store = Bricks::new(Lattice::new([0.0; 2], 0.1));
         for x in 0..2 {
-            let d: Vec<f32> = (0..64).map(|i| if x == 1 && i % 8 == 7 { -0.1 } else { 0.3 }).collect();
-            let brick = crate::cell::DistanceBrick::from_parts(&d, &[1.0; 64]).unwrap();
-            store.insert(BlockKey([x, 0]), brick).unwrap();
+            let distance = |i| if x == 1 && i % 8 == 7 { -0.1 } else { 0.3 };
+            store.insert(BlockKey([x, 0]), crate::testing::brick::<2>(|i| Some((distance(i), 1.0)))).unwrap();
         }
         store
     }
@@ -366,10 +365,8 @@ mod tests {
     fn many_views_are_the_same_on_any_number_of_threads() {
         let store = strip();
         let poses: Vec<_> = (0..40).map(|i| Pose::<2>::new(0.04 * f64::from(i), 0.4, 0.1)).collect();
-        let of = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| expected_gains(&store, &poses, &fan(-3.0, 3.0, 90), &GainSettings::default()))
-        };
+        let gains = || expected_gains(&store, &poses, &fan(-3.0, 3.0, 90), &GainSettings::default());
+        let of = |threads| crate::testing::with_threads(threads, gains);
         assert_eq!(of(1), of(3));
     }
 }

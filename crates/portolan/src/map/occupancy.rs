@@ -6,7 +6,7 @@ use super::{MapError, ScanKind};
 use crate::answer::Answer;
 use crate::cell::{HitMiss, LogOdds8, LogOddsValue, OccupancyModel, Planes};
 use crate::geom::{Aabb, CellBox, Grid, Lattice, Pose, block_cells};
-use crate::scan::{PointScan, RangeImage, Scan, ScanStats};
+use crate::scan::{PointScan, RangeImage, ScanStats};
 use crate::store::{Bricks, Dense, Store};
 use crate::sweep::{HitMissSweep, Inside, OccupancySweep, Rays, Sweep};
 
@@ -42,7 +42,7 @@ pub struct Occupancy<const D: usize, V: LogOddsValue = LogOdds8, S = Bricks<V, D
 /// The sweeps with their memory, which is kept from scan to scan.
 #[derive(Clone, Debug)]
 pub(super) struct Sweeps<const D: usize> {
-    beams: Rays<D>,
+    pub(super) beams: Rays<D>,
     pub(super) images: HitMissSweep<RangeImage>,
     pub(super) points: HitMissSweep<PointScan>,
     /// Of points in the world's frame, seen from the pose's translation.
@@ -146,14 +146,6 @@ impl<const D: usize, V: LogOddsValue, S: Store<V, D>> Occupancy<D, V, S> {
         scan: &impl ScanKind<D>,
     ) -> Result<ScanStats, MapError> {
         scan.fuse_occupancy(self, world_from_sensor)
-    }
-
-    pub(super) fn integrate_beams(
-        &mut self,
-        world_from_sensor: &Pose<D>,
-        scan: &Scan<D>,
-    ) -> Result<ScanStats, MapError> {
-        self.sweep(|sweeps| &mut sweeps.beams, world_from_sensor, scan)
     }
 
     /// Fuses a scan by one of the sweeps.

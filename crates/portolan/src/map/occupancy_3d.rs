@@ -3,26 +3,10 @@
 use super::{MapError, Occupancy};
 use crate::cell::LogOddsValue;
 use crate::geom::Pose;
-use crate::scan::{PointScan, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{ScanStats, SphericalLayout};
 use crate::store::Store;
 
 impl<V: LogOddsValue, S: Store<V, 3>> Occupancy<3, V, S> {
-    pub(super) fn integrate_image(
-        &mut self,
-        world_from_sensor: &Pose<3>,
-        image: &RangeImage,
-    ) -> Result<ScanStats, MapError> {
-        self.sweep(|sweeps| &mut sweeps.images, world_from_sensor, image)
-    }
-
-    pub(super) fn integrate_point_scan(
-        &mut self,
-        world_from_sensor: &Pose<3>,
-        scan: &PointScan,
-    ) -> Result<ScanStats, MapError> {
-        self.sweep(|sweeps| &mut sweeps.points, world_from_sensor, scan)
-    }
-
     /// Fuses surfaces seen from `origin_world` (both world, metres), in one call, with exact rays. Points that are not
     /// finite are refused and counted.
     ///

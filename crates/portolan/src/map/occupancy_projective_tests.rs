@@ -7,6 +7,7 @@ use crate::geom::{BlockKey, Lattice, Pose};
 use crate::scan::{Frame, Orthographic, Pinhole, PointScan, Projection, RangeImage, Spherical};
 use crate::store::Store;
 use crate::sweep::OccupancySweep;
+use crate::testing::with_threads;
 use std::f64::consts::TAU;
 
 type Map = Occupancy<3>;
@@ -150,23 +151,11 @@ fn frees_only_what_beams_saw() {
         let mut depth = look(image(camera(), 160, 120), &pose);
         frees_only_what_was_seen(&depth, &pose);
         // Holes, and pixels without a surface.
-        for (i, v) in lidar.values.iter_mut().enumerate() {
-            *v *= if i % 700 > 400 || i % 7 == 0 {
-                0.0
-            } else if i % 5 == 0 {
-                -1.0
-            } else {
-                1.0
-            };
-        }
-        for (i, v) in depth.values.iter_mut().enumerate() {
-            *v *= if i % 160 > 100 || i % 7 == 0 {
-                0.0
-            } else if i % 5 == 0 {
-                -1.0
-            } else {
-                1.0
-            };
+        for (image, last) in [(&mut lidar, 400), (&mut depth, 100)] {
+            for (i, v) in image.values.iter_mut().enumerate() {
+                let kept = [-1.0, 1.0, 1.0, 1.0, 1.0][i % 5];
+                *v *= if i % image.columns > last || i % 7 == 0 { 0.0 } else { kept };
+            }
         }
         frees_only_what_was_seen(&lidar, &pose);
         frees_only_what_was_seen(&depth, &pose);
@@ -267,8 +256,7 @@ fn truth() {
 fn any_number_of_threads_gives_the_same_bytes() {
     for sweep in [OccupancySweep::Exact, OccupancySweep::Auto] {
         let run = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
+            with_threads(threads, || {
                 let mut map = map(sweep);
                 for pose in poses() {
                     let seen = look(image(Projection::Spherical(spherical()), 700, 48), &pose);

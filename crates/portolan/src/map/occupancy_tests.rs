@@ -3,9 +3,7 @@
 use super::*;
 use crate::cell::{LogOdds32, LogOddsValue, OccupancyModel, Planes};
 use crate::geom::{Aabb, BlockKey, CellBox, Lattice, Pose};
-use crate::scan::{
-    Beam, BeamKind, Frame, Origin, Pinhole, PointScan, Projection, RangeImage, RefusedBeams, Scan,
-};
+use crate::scan::{Beam, BeamKind, Frame, Origin, Pinhole, PointScan, RangeImage, Scan};
 use crate::store::Store;
 use crate::sweep::OccupancySweep;
 
@@ -160,8 +158,7 @@ fn bounds_and_limits_hold() {
 fn what_contradicts_itself_is_refused() {
     for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
         for (image, why) in crate::scan::broken_images() {
-            let mut map =
-                Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default()).unwrap().with_sweep(sweep);
+            let mut map = map([0.0; 3]).with_sweep(sweep);
             let mut scan = PointScan::new([[0.0, 0.0, 1.0]], [0.0; 3]);
             scan.image = Some(image.clone());
             let got = map.integrate(&Pose::IDENTITY, &Frame::Image(image));
@@ -181,8 +178,7 @@ fn what_contradicts_itself_is_refused() {
 #[test]
 fn readings_that_are_too_far_cost_nothing_and_are_counted() {
     for sweep in [OccupancySweep::Auto, OccupancySweep::Exact] {
-        let mut map =
-            Map::new(Lattice::new([0.0; 3], 0.1), OccupancyModel::default()).unwrap().with_sweep(sweep);
+        let mut map = map([0.0; 3]).with_sweep(sweep);
         let mut points = shell(3000);
         points.extend([[1e6, 0.0, 0.0], [1e7, 1e7, 1e7], [1e20, 0.0, 0.0]]);
         let mut scan = PointScan::new(points, [0.0; 3]);
@@ -191,15 +187,8 @@ fn readings_that_are_too_far_cost_nothing_and_are_counted() {
         assert_eq!((stats.refused.too_far, stats.refused.total()), (4, 4));
         assert_eq!((stats.beams.hit, stats.beams.max_range, stats.beams.dropped), (3000, 1, 4));
         assert!(map.store().len() < 1000, "{}", map.store().len());
-        let values = vec![2.0, -1e6, 1e6, 2.0];
-        let image = RangeImage {
-            projection: Projection::Pinhole(Pinhole { fx: 2.0, fy: 2.0, cx: 0.5, cy: 0.5 }),
-            columns: 2,
-            rows: 2,
-            values,
-            colors: Vec::new(),
-            refused: RefusedBeams::default(),
-        };
+        let camera = Pinhole { fx: 2.0, fy: 2.0, cx: 0.5, cy: 0.5 };
+        let image = RangeImage::from_depth(camera, 2, 2, [2.0, -1e6, 1e6, 2.0]);
         let stats = map.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap();
         assert_eq!((stats.refused.too_far, stats.beams.hit, stats.beams.dropped), (2, 2, 2));
     }
@@ -222,25 +211,9 @@ fn rays_that_pass_more_than_the_limit_holds_end_early() {
 #[test]
 fn images_and_beams_without_a_surface() {
     let camera = Pinhole { fx: 20.0, fy: 20.0, cx: 15.5, cy: 11.5 };
-    let values = (0..768)
-        .map(|i| {
-            if i % 32 < 16 {
-                2.0
-            } else if i % 32 < 24 {
-                -1.0
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    let image = RangeImage {
-        projection: Projection::Pinhole(camera),
-        columns: 32,
-        rows: 24,
-        values,
-        colors: Vec::new(),
-        refused: RefusedBeams { too_near: 3, ..Default::default() },
-    };
+    let values: Vec<f32> = (0..768).map(|i| [2.0, 2.0, -1.0, 0.0][i % 32 / 8]).collect();
+    let mut image = RangeImage::from_depth(camera, 32, 24, values);
+    image.refused.too_near = 3;
     let mut by_image = map([0.0; 3]);
     let stats = by_image.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap();
     assert_eq!((stats.beams.hit, stats.beams.max_range, stats.refused.too_near), (384, 192, 3));

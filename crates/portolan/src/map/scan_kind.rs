@@ -1,8 +1,9 @@
 //! What a map can fuse: beams in any dimension, range images and points in 3-D.
 
-use super::{MapError, Occupancy, Tsdf};
+use super::tsdf::BEAM_CELL_BYTES;
+use super::{BeamSweep, MapError, Occupancy, Tsdf};
 use crate::cell::{LogOddsValue, SignedDistance};
-use crate::geom::Pose;
+use crate::geom::{Pose, block_cells};
 use crate::scan::{Frame, PointScan, RangeImage, Scan, ScanStats};
 use crate::store::Store;
 
@@ -36,7 +37,11 @@ impl<const D: usize> ScanKind<D> for Scan<D> {
         map: &mut Tsdf<D, S>,
         world_from_sensor: &Pose<D>,
     ) -> Result<ScanStats, MapError> {
-        map.integrate_beams(world_from_sensor, self)
+        let bytes = BEAM_CELL_BYTES * block_cells::<D>();
+        match map.config.beams {
+            BeamSweep::CellCentre => map.sweep(|s| &mut s.centers, bytes, world_from_sensor, self),
+            BeamSweep::March => map.sweep(|s| &mut s.march, bytes, world_from_sensor, self),
+        }
     }
 
     fn fuse_occupancy<V: LogOddsValue, S: Store<V, D>>(
@@ -44,7 +49,7 @@ impl<const D: usize> ScanKind<D> for Scan<D> {
         map: &mut Occupancy<D, V, S>,
         world_from_sensor: &Pose<D>,
     ) -> Result<ScanStats, MapError> {
-        map.integrate_beams(world_from_sensor, self)
+        map.sweep(|sweeps| &mut sweeps.beams, world_from_sensor, self)
     }
 }
 
@@ -62,7 +67,7 @@ impl ScanKind<3> for RangeImage {
         map: &mut Occupancy<3, V, S>,
         world_from_sensor: &Pose<3>,
     ) -> Result<ScanStats, MapError> {
-        map.integrate_image(world_from_sensor, self)
+        map.sweep(|sweeps| &mut sweeps.images, world_from_sensor, self)
     }
 }
 
@@ -80,7 +85,7 @@ impl ScanKind<3> for PointScan {
         map: &mut Occupancy<3, V, S>,
         world_from_sensor: &Pose<3>,
     ) -> Result<ScanStats, MapError> {
-        map.integrate_point_scan(world_from_sensor, self)
+        map.sweep(|sweeps| &mut sweeps.points, world_from_sensor, self)
     }
 }
 

@@ -3,13 +3,13 @@
 use super::error::{check_grid, check_lattice};
 use super::integrate::{limits, plan};
 use super::watch::Watch;
-use super::{BeamSweep, MapError, ScanKind, TsdfConfig};
+use super::{MapError, ScanKind, TsdfConfig};
 use crate::answer::Answer;
 use crate::cell::{
     Color, ColorRule, Colors, Distances, Evidence, FusionEvent, Planes, SignedDistance, TsdfRule,
 };
 use crate::geom::{Aabb, BlockKey, CellBox, Grid, Lattice, Pose, block_cells};
-use crate::scan::{LayoutFinder, Scan, ScanStats};
+use crate::scan::{LayoutFinder, ScanStats};
 use crate::store::{Bricks, Dense, Store};
 use crate::sweep::{CellCentre, Inside, March, PointRays, Projective, Sweep, Swept, SweptColors};
 
@@ -32,18 +32,18 @@ pub struct Tsdf<const D: usize, S = Bricks<SignedDistance, D>> {
     limit: usize,
     pub(super) layout: LayoutFinder,
     pub(super) sweeps: Box<Sweeps<D>>,
-    watch: Watch<FusionEvent, D>,
+    pub(super) watch: Watch<FusionEvent, D>,
 }
 
 /// What sweeps of beams keep of a touched cell: distance, weight, how far aside, which beam.
-const BEAM_CELL_BYTES: usize = 16;
+pub(super) const BEAM_CELL_BYTES: usize = 16;
 
 /// The sweeps with their memory, which is kept from scan to scan.
 #[derive(Debug)]
 pub(super) struct Sweeps<const D: usize> {
     config: TsdfConfig<D>,
-    centers: CellCentre<D>,
-    march: March<D>,
+    pub(super) centers: CellCentre<D>,
+    pub(super) march: March<D>,
     pub(super) image: Projective,
     pub(super) points: PointRays,
 }
@@ -171,18 +171,6 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
         scan.fuse_distances(self, world_from_sensor)
     }
 
-    pub(super) fn integrate_beams(
-        &mut self,
-        world_from_sensor: &Pose<D>,
-        scan: &Scan<D>,
-    ) -> Result<ScanStats, MapError> {
-        let bytes = BEAM_CELL_BYTES * block_cells::<D>();
-        match self.config.beams {
-            BeamSweep::CellCentre => self.sweep(|s| &mut s.centers, bytes, world_from_sensor, scan),
-            BeamSweep::March => self.sweep(|s| &mut s.march, bytes, world_from_sensor, scan),
-        }
-    }
-
     /// Fuses a scan by one of the sweeps, whose touched blocks cost `bytes` each.
     pub(super) fn sweep<W>(
         &mut self,
@@ -218,10 +206,6 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
     /// outside of the map have no events. What is not watched pays nothing.
     pub fn watch(&mut self, cells: impl IntoIterator<Item = [i32; D]>) {
         self.watch.watch(cells.into_iter().filter(|&c| self.distances.contains(c)));
-    }
-
-    pub(super) fn clear_events(&mut self) {
-        self.watch.clear();
     }
 
     /// What the last scan did to the watched cells that it observed, by [`Cell::fuse`](crate::cell::Cell::fuse) from the

@@ -90,7 +90,7 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
         let offset = |p: &[f64; 3]| std::array::from_fn(|k| (p[k] - origin_world[k]) as f32);
         let scan = PointScan::new(points_world.iter().map(offset), [0.0; 3]);
         let at = Pose { translation: origin_world, ..Pose::IDENTITY };
-        self.clear_events();
+        self.watch.clear();
         // Ray by ray: which way the sensor's axis points is not known.
         self.integrate_rays(&at, &scan)
     }

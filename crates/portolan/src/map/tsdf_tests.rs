@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geom::{Aabb, Grid, Pose};
-use crate::scan::{Frame, Pinhole, PointScan, Projection, RangeImage, RangeLimits, RefusedBeams, Scan};
+use crate::scan::{Frame, Pinhole, PointScan, RangeImage, RangeLimits, Scan};
 use crate::store::Store;
 
 fn fan(k: u32) -> (Pose<2>, Scan<2>) {
@@ -103,14 +103,8 @@ fn a_scan_that_reaches_too_far_is_refused_with_a_clear_error() {
     assert!(grid.integrate(&Pose::<2>::IDENTITY, &far).unwrap().cells > 1000);
 
     // Pixels that look almost aside: what they see is a metre deep and a hundred thousand kilometres wide.
-    let image = RangeImage {
-        projection: Projection::Pinhole(Pinhole { fx: 1e-8, fy: 1e-8, cx: 0.5, cy: 0.5 }),
-        columns: 2,
-        rows: 2,
-        values: vec![1.0; 4],
-        colors: Vec::new(),
-        refused: RefusedBeams::default(),
-    };
+    let camera = Pinhole { fx: 1e-8, fy: 1e-8, cx: 0.5, cy: 0.5 };
+    let image = RangeImage::from_depth(camera, 2, 2, [1.0; 4]);
     let mut map = Tsdf3::new(TsdfConfig::default()).unwrap();
     let error = map.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap_err();
     assert!(matches!(error, MapError::TooFar { .. }), "{error}");

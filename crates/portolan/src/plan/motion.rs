@@ -193,7 +193,8 @@ pub fn check_motion<const D: usize>(
         let path = Carried { motion, p_body: s.center, length: motion.length_of(s.center) };
         let demand = demand.beyond(s.radius);
         // For the other spheres only the part before the first refusal matters.
-        let mut walk = Walk { field, path: &path, demand: &demand, end, queries: demand.max_queries };
+        let mut walk =
+            Walk::<_, _, D> { field, path: &path, demand: &demand, end, queries: demand.max_queries };
         match walk.free() {
             Ok(found) => free.include(sphere, found.lower - s.radius, found.upper - s.radius),
             // Of two spheres refused at the same place the first one is reported.
@@ -218,6 +219,8 @@ mod tests {
     use super::*;
     use crate::plan::testing::{Scene, point, scenes};
     use crate::plan::{Demand, check_motions, check_pose, check_poses};
+    #[cfg(feature = "parallel")]
+    use crate::testing::with_threads;
     use proptest::prelude::*;
 
     /// 2-D poses turn by the first number, 3-D poses by a quaternion.
@@ -305,14 +308,15 @@ mod tests {
             is_straight::<3>(pose(a.0, a.1), pose(b.0, b.1), p);
         }
         #[test]
-        fn what_is_certified_is_free_2d(scene in scenes::<2>(), b in bodies(), from in poses(), to in poses(), clearance in 0.0..0.2f64) {
+        fn what_is_certified_is_free_2d_and_3d(
+            flat in scenes::<2>(), scene in scenes::<3>(), b in bodies(), from in poses(), to in poses(),
+            clearance in 0.0..0.2f64,
+        ) {
+            let demand = Demand::new(clearance);
             let motion = Motion::new(pose(from.0, from.1), pose(to.0, to.1));
-            is_true(&scene, &body(&b), &motion, &Demand::new(clearance));
-        }
-        #[test]
-        fn what_is_certified_is_free_3d(scene in scenes::<3>(), b in bodies(), from in poses(), to in poses(), clearance in 0.0..0.2f64) {
+            is_true(&flat, &body(&b), &motion, &demand);
             let motion = Motion::new(pose(from.0, from.1), pose(to.0, to.1));
-            is_true(&scene, &body(&b), &motion, &Demand::new(clearance));
+            is_true(&scene, &body(&b), &motion, &demand);
         }
     }
 
@@ -381,9 +385,8 @@ mod tests {
             (0..700).map(|i| Pose::<2>::new(at(i, 0.618), at(i, 0.755), at(i, 0.57))).collect();
         let motions: Vec<_> = poses.windows(2).map(|p| Motion::new(p[0], p[1])).collect();
         let of = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let demand = Demand::new(0.05);
-            pool.install(|| {
+            with_threads(threads, || {
                 (check_poses(&scene, &body, &poses, &demand), check_motions(&scene, &body, &motions, &demand))
             })
         };

@@ -257,12 +257,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn is_the_nearest_2d(scene in scenes::<2>(), p in prop::array::uniform3(-5.0..5.0f64), clearance in 0.0..0.6f64, radius in 0.0..1.5f64) {
-            is_the_nearest(&scene, point(p), &Demand::new(clearance), radius);
-        }
-        #[test]
-        fn is_the_nearest_3d(scene in scenes::<3>(), p in prop::array::uniform3(-5.0..5.0f64), clearance in 0.0..0.4f64, radius in 0.0..0.6f64) {
-            is_the_nearest(&scene, p, &Demand::new(clearance), radius);
+        fn is_the_nearest_2d_and_3d(
+            flat in scenes::<2>(), scene in scenes::<3>(), p in prop::array::uniform3(-5.0..5.0f64),
+            clearance in 0.0..0.6f64, radius in 0.0..1.5f64,
+        ) {
+            is_the_nearest(&flat, point(p), &Demand::new(clearance), radius);
+            is_the_nearest(&scene, p, &Demand::new(0.66 * clearance), 0.4 * radius);
         }
     }
 

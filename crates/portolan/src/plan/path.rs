@@ -92,7 +92,7 @@ pub fn check_path<const D: usize>(
     path: &(impl Curve<D> + ?Sized),
     demand: &Demand,
 ) -> PathCheck {
-    let mut walk = Walk { field, path, demand, end: path.end(), queries: demand.max_queries };
+    let mut walk = Walk::<_, _, D> { field, path, demand, end: path.end(), queries: demand.max_queries };
     match walk.free() {
         Ok(least) => PathCheck::Certified(least),
         Err(stop) => PathCheck::Violated(walk.violation(stop)),
@@ -100,7 +100,7 @@ pub fn check_path<const D: usize>(
 }
 
 /// A check in progress.
-pub(super) struct Walk<'a, F: ?Sized, C: ?Sized> {
+pub(super) struct Walk<'a, F: ?Sized, C: ?Sized, const D: usize> {
     pub(super) field: &'a F,
     pub(super) path: &'a C,
     pub(super) demand: &'a Demand,
@@ -118,13 +118,9 @@ pub(super) struct Stop {
     reach: f64,
 }
 
-impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
+impl<F: ClearanceField<D> + ?Sized, C: Curve<D> + ?Sized, const D: usize> Walk<'_, F, C, D> {
     /// Advances in certified steps to the end.
-    pub(super) fn free<const D: usize>(&mut self) -> Result<PathClearance, Stop>
-    where
-        F: ClearanceField<D>,
-        C: Curve<D>,
-    {
+    pub(super) fn free(&mut self) -> Result<PathClearance, Stop> {
         let tolerance = self.demand.tolerance_in(self.field);
         let mut least = PathClearance { lower: f64::INFINITY, upper: f64::INFINITY, at: 0.0 };
         let mut t = 0.0;
@@ -156,11 +152,7 @@ impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
     }
 
     /// Where what is not certified ends, and why it is not.
-    pub(super) fn violation<const D: usize>(&mut self, stop: Stop) -> PathViolation
-    where
-        F: ClearanceField<D>,
-        C: Curve<D>,
-    {
+    pub(super) fn violation(&mut self, stop: Stop) -> PathViolation {
         let tolerance = self.demand.tolerance_in(self.field);
         let mut found = PathViolation { from: stop.at, to: self.end, cause: stop.cause };
         let Stop { at: mut t, mut cause, mut reach } = stop;
@@ -187,11 +179,7 @@ impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
         found
     }
 
-    fn look<const D: usize>(&mut self, t: f64) -> Verdict
-    where
-        F: ClearanceField<D>,
-        C: Curve<D>,
-    {
+    fn look(&mut self, t: f64) -> Verdict {
         match self.queries.checked_sub(1) {
             Some(left) => {
                 self.queries = left;
@@ -202,19 +190,13 @@ impl<F: ?Sized, C: ?Sized> Walk<'_, F, C> {
     }
 
     /// Length of the certified step from a free point, less the rounding errors of points and parameters.
-    fn room<const D: usize>(&self, t: f64, found: Clearance) -> f64
-    where
-        C: Curve<D>,
-    {
+    fn room(&self, t: f64, found: Clearance) -> f64 {
         let scale = self.path.point(t).iter().fold(t.abs(), |m, v| m.max(v.abs()));
         (found.lower - self.demand.clearance) * (1.0 - 1e-9) - 16.0 * f64::EPSILON * scale
     }
 
     /// `None` where the parameter does not move.
-    fn ahead<const D: usize>(&self, t: f64, length: f64) -> Option<f64>
-    where
-        C: Curve<D>,
-    {
+    fn ahead(&self, t: f64, length: f64) -> Option<f64> {
         let next = self.path.advance(t, length).min(self.end);
         (next > t).then_some(next)
     }
@@ -302,17 +284,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_certified_is_free_2d(
-            scene in scenes::<2>(), p in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 1..5),
+        fn what_is_certified_is_free_2d_and_3d(
+            flat in scenes::<2>(), scene in scenes::<3>(),
+            p in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 1..5),
             clearance in prop_oneof![Just(0.0), 0.0..0.6f64], optimistic in any::<bool>(),
         ) {
-            legs_and_splines(&scene, &p, &demand(clearance, optimistic));
-        }
-        #[test]
-        fn what_is_certified_is_free_3d(
-            scene in scenes::<3>(), p in prop::collection::vec(prop::array::uniform3(-5.0..5.0f64), 1..5),
-            clearance in prop_oneof![Just(0.0), 0.0..0.6f64], optimistic in any::<bool>(),
-        ) {
+            legs_and_splines(&flat, &p, &demand(clearance, optimistic));
             legs_and_splines(&scene, &p, &demand(clearance, optimistic));
         }
     }

@@ -4,6 +4,7 @@ use crate::answer::Answer;
 use crate::field::{Clearance, ClearanceField, UnknownSpace};
 use crate::geom::Aabb;
 use crate::geom::vector::{distance, norm};
+pub(super) use crate::testing::point;
 use proptest::prelude::*;
 
 /// Balls in a box. Beyond the box is outside; a smaller box was never observed, nor was anything outside.
@@ -89,9 +90,4 @@ pub(super) fn scenes<const D: usize>() -> impl Strategy<Value = Scene<D>> {
             ..Scene::empty()
         },
     )
-}
-
-/// The first `D` coordinates.
-pub(super) fn point<const D: usize>(p: [f64; 3]) -> [f64; D] {
-    std::array::from_fn(|k| p[k])
 }

@@ -92,13 +92,9 @@ fn fan_order(bearings: &[f64]) -> BeamOrder {
     let ascending = bearings.windows(2).all(|w| w[0] < w[1]);
     let [first, .., last] = bearings else { return BeamOrder::Unordered };
     let span = last - first;
-    // A full turn may name its seam twice.
-    if !ascending || span > std::f64::consts::TAU + 1e-6 {
-        return BeamOrder::Unordered;
-    }
     let widest = bearings.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-    // Neighbors half a turn apart have no wedge between them.
-    if widest >= std::f64::consts::PI {
+    // A full turn may name its seam twice. Neighbors half a turn apart have no wedge between them.
+    if !ascending || span > std::f64::consts::TAU + 1e-6 || widest >= std::f64::consts::PI {
         return BeamOrder::Unordered;
     }
     BeamOrder::Fan { closed: std::f64::consts::TAU - span <= 1.5 * widest }

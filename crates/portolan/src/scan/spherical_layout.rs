@@ -51,10 +51,8 @@ impl SphericalLayout {
     pub fn from_parts(elevations: Vec<f32>, columns: usize, first_azimuth: f64) -> Option<Self> {
         let descending = elevations.windows(2).all(|w| w[0] > w[1]);
         let sane = elevations.iter().all(|e| e.abs() < 1.6) && first_azimuth.is_finite();
-        if !descending || !sane || elevations.len() < 2 || elevations.len() > 16_384 {
-            return None;
-        }
-        if !(4..=32_768).contains(&columns) {
+        let fits = (2..=16_384).contains(&elevations.len()) && (4..=32_768).contains(&columns);
+        if !(descending && sane && fits) {
             return None;
         }
         // A point belongs to the nearest row, to an end row only within half of the distance to the row beside it.

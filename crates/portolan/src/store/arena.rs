@@ -62,10 +62,7 @@ impl<V: LogOddsValue, const D: usize> Arena<V, D> {
         assert!(first + n < NONE as usize, "a tree holds fewer than 2^32 inner nodes");
         // Growing by an eighth instead of doubling keeps what is measured near to what is needed.
         if self.mask.capacity() < first + n {
-            let more = n.max(first / 8);
-            self.values.reserve_exact(more * children::<D>());
-            self.first_child.reserve_exact(more);
-            self.mask.reserve_exact(more);
+            self.reserve(n.max(first / 8));
         }
         self.values.resize((first + n) * children::<D>(), V::UNOBSERVED);
         self.first_child.resize(first + n, NONE);

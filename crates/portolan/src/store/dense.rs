@@ -1,5 +1,6 @@
 //! A dense array of cells.
 
+use super::dense_bricks::cells_between;
 use super::{Store, StoreFull};
 use crate::cell::{Cell, Planes};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Grid, Lattice};
@@ -46,15 +47,7 @@ impl<C: Cell, const D: usize> Dense<C, D> {
     /// The same cells in another box of the same lattice, for maps that grow. `None` where the lattices do
     /// not coincide or an observed cell would be lost.
     pub fn regridded(&self, grid: Grid<D>) -> Option<Self> {
-        let r = self.grid.lattice.resolution;
-        let mut shift = [0i32; D];
-        for k in 0..D {
-            let cells = (self.grid.lattice.origin[k] - grid.lattice.origin[k]) / r;
-            if grid.lattice.resolution != r || (cells - cells.round()).abs() > 1e-6 || cells.abs() > 1e9 {
-                return None;
-            }
-            shift[k] = cells.round() as i32;
-        }
+        let shift = cells_between(&self.grid.lattice, &grid.lattice)?;
         let mut moved = Self::new(grid);
         for i in 0..self.grid.len() {
             if let Some(cell) = self.planes.get(i) {
@@ -136,12 +129,8 @@ mod tests {
     }
 
     #[test]
-    fn applies_only_inside_2d() {
+    fn applies_only_inside_2d_and_3d() {
         applies_only_inside::<2>();
-    }
-
-    #[test]
-    fn applies_only_inside_3d() {
         applies_only_inside::<3>();
     }
 }

@@ -93,7 +93,7 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
 }
 
 /// What to add to a cell of one lattice to get the same cell of another; `None` where their cells do not coincide.
-fn cells_between<const D: usize>(from: &Lattice<D>, to: &Lattice<D>) -> Option<[i32; D]> {
+pub(super) fn cells_between<const D: usize>(from: &Lattice<D>, to: &Lattice<D>) -> Option<[i32; D]> {
     let mut shift = [0; D];
     for k in 0..D {
         let cells = (from.origin[k] - to.origin[k]) / from.resolution;

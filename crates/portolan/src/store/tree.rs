@@ -270,11 +270,7 @@ impl<V: LogOddsValue, const D: usize> Store<V, D> for Tree<V, D> {
             height -= 1;
             let child = child_index(cell, height);
             value = self.arena.values(record)[child];
-            record = if self.arena.mask(record) >> child & 1 != 0 {
-                self.arena.child(record, child)
-            } else {
-                NONE
-            };
+            record = self.record_of(record, child);
         }
         (!value.is_unobserved()).then_some(value)
     }

@@ -34,17 +34,22 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         let first = -1i32 << (depth - 1);
         let lattice = bricks.lattice();
         let mut tree = Self::new(lattice.corner([first; D]), lattice.resolution, depth)?;
-        // Along the tree, so that one brick's records lie beside the next one's.
-        let mut in_order: Vec<_> = bricks
-            .bricks_by_age()
-            .map(|(key, brick)| (BlockKey(key.0.map(|v| v - (first >> BLOCK_HEIGHT))), brick))
-            .collect();
-        in_order.sort_unstable_by_key(|(key, _)| interleaved(*key));
-        for (key, brick) in in_order {
-            tree.set_block(key, &brick.cells());
-        }
-        tree.compact();
+        let blocks = bricks.bricks_by_age();
+        tree.take(
+            blocks
+                .map(|(key, brick)| (BlockKey(key.0.map(|v| v - (first >> BLOCK_HEIGHT))), brick))
+                .collect(),
+        );
         Some(tree)
+    }
+
+    /// Holds the cells of bricks. Along the tree, so that one brick's records lie beside the next one's.
+    fn take(&mut self, mut bricks: Vec<(BlockKey<D>, &LogOddsBrick<V>)>) {
+        bricks.sort_unstable_by_key(|(key, _)| interleaved(*key));
+        for (key, brick) in bricks {
+            self.set_block(key, &brick.cells());
+        }
+        self.compact();
     }
 
     /// The cells of bricks in this tree, brick by brick; those outside of its root are left out. `None` where the lattices
@@ -53,13 +58,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         if *bricks.lattice() != self.lattice {
             return None;
         }
-        let mut in_order: Vec<_> =
-            bricks.bricks_by_age().filter(|(key, _)| self.inside(key.first_cell())).collect();
-        in_order.sort_unstable_by_key(|(key, _)| interleaved(*key));
-        for (key, brick) in in_order {
-            self.set_block(key, &brick.cells());
-        }
-        self.compact();
+        self.take(bricks.bricks_by_age().filter(|(key, _)| self.inside(key.first_cell())).collect());
         Some(self)
     }
 

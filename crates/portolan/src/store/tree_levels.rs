@@ -19,7 +19,7 @@ pub struct Summary<V> {
 }
 
 /// A node that was found: a record of its own, or a value that holds for all of it.
-enum Node<V> {
+pub(super) enum Node<V> {
     Inner(u32),
     Uniform(V),
 }
@@ -97,7 +97,7 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         }
     }
 
-    fn node(&self, cell: [i32; D], height: u32) -> Node<V> {
+    pub(super) fn node(&self, cell: [i32; D], height: u32) -> Node<V> {
         if self.root == NONE {
             return Node::Uniform(self.root_value);
         }

@@ -307,9 +307,6 @@ mod tests {
         #[test]
         fn tree_grid_and_naive_agree_2d(s in scans()) {
             agrees::<LogOdds8, 2>(&s, &LogOddsRule::<i8>::new(&OccupancyModel::default()).unwrap());
-        }
-        #[test]
-        fn tree_grid_and_naive_agree_2d_f32(s in scans()) {
             agrees::<LogOdds32, 2>(&s, &LogOddsRule::<f32>::new(&OccupancyModel::default()).unwrap());
         }
         #[test]

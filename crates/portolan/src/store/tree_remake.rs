@@ -1,7 +1,8 @@
 //! The cells of a tree in another tree: other values, another place.
 
 use super::arena::{NONE, children};
-use super::tree::{Tree, child_index};
+use super::tree::Tree;
+use super::tree_levels::Node;
 use super::tree_records::{Slot, TreeRecords};
 use crate::cell::LogOddsValue;
 
@@ -84,20 +85,10 @@ impl<V: LogOddsValue, const D: usize> Tree<V, D> {
         if !aligned || height > self.depth {
             return None;
         }
-        if self.root == NONE {
-            return Some(Slot::Leaf(self.root_value));
-        }
-        let cell = low.map(|v| v as i32);
-        let (mut record, mut at) = (self.root, self.depth);
-        while at > height {
-            at -= 1;
-            let child = child_index(cell, at);
-            match self.record_of(record, child) {
-                NONE => return Some(Slot::Leaf(self.arena.values(record)[child])),
-                below => record = below,
-            }
-        }
-        Some(self.copy_below(record, &|v| v, records))
+        Some(match self.node(low.map(|v| v as i32), height) {
+            Node::Uniform(value) => Slot::Leaf(value),
+            Node::Inner(record) => self.copy_below(record, &|v| v, records),
+        })
     }
 
     /// Whether all cells from `low` up to `high` hold the same; `value` is what.

@@ -1,6 +1,8 @@
 //! Triangle meshes and their measures.
 
 use crate::geom::Aabb;
+use crate::geom::vector::{cross3, norm, sub};
+use crate::sets::Sets;
 
 /// Triangles with shared vertices; the normal of every triangle (counter-clockwise) points to free space.
 ///
@@ -58,11 +60,7 @@ impl Mesh {
 
     /// Area of all triangles (square meters). O(triangles).
     pub fn area(&self) -> f64 {
-        let doubled = |t: &[u32; 3]| {
-            let n = self.area_normal(*t);
-            (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt()
-        };
-        0.5 * self.triangles.iter().map(doubled).sum::<f64>()
+        0.5 * self.triangles.iter().map(|t| norm(self.area_normal(*t))).sum::<f64>()
     }
 
     /// Enclosed volume, on the side away from free space (cubic meters), of a closed mesh. O(triangles).
@@ -80,9 +78,7 @@ impl Mesh {
     /// Normal of a triangle, of a length twice its area.
     pub fn area_normal(&self, triangle: [u32; 3]) -> [f64; 3] {
         let [a, b, c] = triangle.map(|v| self.vertices[v as usize].map(f64::from));
-        let (u, v): ([f64; 3], [f64; 3]) =
-            (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+        cross3(sub(b, a), sub(c, a))
     }
 
     /// Counts the edges by their number of triangles. O(triangles log triangles).
@@ -114,25 +110,16 @@ impl Mesh {
     /// The connected component of every vertex, numbered in the order of their first vertices, and the number of
     /// components. A vertex without triangles is a component of its own. Nearly O(triangles).
     pub fn components(&self) -> (Vec<u32>, usize) {
-        let mut parent: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        fn root(parent: &mut [u32], mut v: u32) -> u32 {
-            while parent[v as usize] != v {
-                parent[v as usize] = parent[parent[v as usize] as usize];
-                v = parent[v as usize];
-            }
-            v
-        }
+        // The lowest vertex of a component stands for it.
+        let mut sets = Sets::new(self.vertices.len() as u32);
         for t in &self.triangles {
-            for (a, b) in [(t[0], t[1]), (t[1], t[2])] {
-                let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-                // The lowest vertex of a component is its root.
-                parent[a.max(b) as usize] = a.min(b);
-            }
+            sets.join(t[0], t[1]);
+            sets.join(t[1], t[2]);
         }
-        let mut number = vec![u32::MAX; parent.len()];
+        let mut number = vec![u32::MAX; self.vertices.len()];
         let mut count = 0;
-        for v in 0..parent.len() as u32 {
-            let r = root(&mut parent, v);
+        for v in 0..self.vertices.len() as u32 {
+            let r = sets.find(v);
             if r == v {
                 number[v as usize] = count;
                 count += 1;

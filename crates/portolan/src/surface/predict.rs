@@ -150,7 +150,7 @@ fn hit_rays(frame: &Frame) -> Vec<([f64; 3], [f64; 3])> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::{DistanceBrick, SignedDistance};
+    use crate::cell::SignedDistance;
     use crate::geom::{BlockKey, Lattice};
     use crate::scan::PointScan;
     use crate::store::Bricks;
@@ -161,9 +161,8 @@ mod tests {
         let lattice = Lattice::new([0.0; 3], 0.1);
         let mut store = Bricks::new(lattice);
         for key in [[0, 0, 0], [1, 0, 0]].map(BlockKey) {
-            let distances: Vec<f32> =
-                (0..512).map(|i| (1.03 - lattice.center(key.cell(i))[0]).clamp(-0.3, 0.3) as f32).collect();
-            store.insert(key, DistanceBrick::from_parts(&distances, &[1.0; 512]).unwrap()).unwrap();
+            let distance = |i| (1.03 - lattice.center(key.cell(i))[0]).clamp(-0.3, 0.3) as f32;
+            store.insert(key, crate::testing::brick::<3>(|i| Some((distance(i), 1.0)))).unwrap();
         }
         store
     }

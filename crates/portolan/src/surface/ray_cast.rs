@@ -225,22 +225,11 @@ pub(super) fn march<const D: usize>(
 pub(super) mod tests {
     use super::*;
     use crate::geom::Grid;
-    use crate::map::TsdfConfig;
 
     pub(crate) fn wall<const D: usize>() -> DenseTsdf<D> {
-        let mut tsdf = DenseTsdf::covering(
-            &Grid::new([0.0; D], 0.1, [20; D]),
-            TsdfConfig { truncation: 0.3, ..Default::default() },
-        )
-        .unwrap();
-        for i in 0..tsdf.grid().len() {
-            let cell = tsdf.grid().cell(i);
-            let x = tsdf.grid().lattice.center(cell)[0];
-            if x < 1.5 {
-                tsdf.fuse(cell, 1.234 - x, 1.0);
-            }
-        }
-        tsdf
+        crate::testing::tsdf(Grid::new([0.0; D], 0.1, [20; D]), 0.3, |p| {
+            if p[0] < 1.5 { 1.234 - p[0] } else { f64::NAN }
+        })
     }
 
     fn hits_where_the_wall_is<const D: usize>() {

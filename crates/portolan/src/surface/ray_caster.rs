@@ -110,21 +110,6 @@ mod tests {
     use crate::surface::ray_cast::tests::wall;
     use crate::surface::{cast_ray, trace_ray};
 
-    /// The same cells in bricks.
-    fn in_bricks<const D: usize>(tsdf: &DenseTsdf<D>) -> Bricks<SignedDistance, D> {
-        let mut bricks = Bricks::new(tsdf.grid().lattice);
-        for i in 0..tsdf.grid().len() {
-            let cell = tsdf.grid().cell(i);
-            let Some(value) = tsdf.store().cell(cell) else { continue };
-            let key = BlockKey::of_cell(cell);
-            let mut brick: crate::cell::DistanceBrick =
-                bricks.brick(key).cloned().unwrap_or_else(|| Planes::unobserved(BLOCK_EDGE.pow(D as u32)));
-            brick.set(BlockKey::offset(cell), Some(value));
-            bricks.insert(key, brick).unwrap();
-        }
-        bricks
-    }
-
     fn bricks_say_what_an_array_says<const D: usize>() {
         // Whole bricks, so that both end at the same place; with a hole in what was observed.
         let whole = wall::<D>();
@@ -136,7 +121,7 @@ mod tests {
                 tsdf.fuse(cell, f64::from(v.distance), 1.0);
             }
         }
-        let bricks = in_bricks(&tsdf);
+        let bricks: Bricks<_, _> = tsdf.store().into();
         let (mut counts, mut normals, mut passed) = ([0; 4], 0, 0);
         for i in 0..2000 {
             let at = |a: f64| (f64::from(i) * a).fract();
@@ -189,7 +174,7 @@ mod tests {
     #[test]
     fn what_is_not_there_is_passed_over() {
         // A wall in one brick, seen from 50 m away: with patience it is hit, without it is unknown.
-        let mut bricks = in_bricks(&wall::<3>());
+        let mut bricks: Bricks<_, 3> = wall().store().into();
         let rays = RayCaster::new(
             &bricks,
             RayCastSettings { unknown_tolerance: f64::INFINITY, ..Default::default() },
@@ -212,7 +197,7 @@ mod tests {
     #[test]
     fn what_is_no_ray_is_outside_and_ends() {
         let tsdf = wall::<2>();
-        let bricks = in_bricks(&tsdf);
+        let bricks: Bricks<_, _> = tsdf.store().into();
         let settings = RayCastSettings {
             max_range: f64::INFINITY,
             unknown_tolerance: f64::INFINITY,

@@ -222,25 +222,13 @@ pub(crate) fn crossing_place(a: f32, b: f32) -> f64 {
 mod tests {
     use super::*;
     use crate::geom::vector::{distance, sub};
-    use crate::map::{Tsdf2, TsdfConfig};
+    use crate::map::Tsdf2;
     use crate::store::Bricks;
     use proptest::prelude::*;
 
     /// A field with these values at the centres, observed where the value is not NaN.
     pub(crate) fn field(shape: [usize; 2], value: impl Fn([f64; 2]) -> f64) -> Tsdf2 {
-        let mut tsdf = Tsdf2::covering(
-            &Grid::new([0.0; 2], 1.0, shape),
-            TsdfConfig { truncation: 1e6, ..Default::default() },
-        )
-        .unwrap();
-        for i in 0..tsdf.grid().len() {
-            let cell = tsdf.grid().cell(i);
-            let v = value(tsdf.grid().lattice.center(cell));
-            if !v.is_nan() {
-                tsdf.fuse(cell, v, 1.0);
-            }
-        }
-        tsdf
+        crate::testing::tsdf(Grid::new([0.0; 2], 1.0, shape), 1e6, value)
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::fan::{Fan, Spoke};
 use super::fan_plan::{BlockBitmap, Outline, Stretch};
-use super::nearest_ray::NearestRay;
+use super::nearest_ray::{NearestRay, Ray};
 use super::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel, beam_stats};
 use crate::cell::{Distances, Evidence};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
@@ -72,11 +72,7 @@ impl<const D: usize> CellCentre<D> {
         self.first_centre = std::array::from_fn(|k| lattice.origin[k] + 0.5 * lattice.resolution - origin[k]);
 
         let reach = scan.reach() + self.truncation + lattice.resolution;
-        let mut window = *bounds;
-        for k in 0..D {
-            window.min[k] = window.min[k].max(origin[k] - reach);
-            window.max[k] = window.max[k].min(origin[k] + reach);
-        }
+        let window = bounds.intersection(Aabb::new(origin, origin).grown(reach));
         self.keys.clear();
         if !self.bitmap.reset(lattice, &window) {
             return Err(PlanError::TooManyBlocks);
@@ -85,9 +81,7 @@ impl<const D: usize> CellCentre<D> {
         self.bitmap.collect(&mut self.keys);
         Ok(())
     }
-}
 
-impl<const D: usize> CellCentre<D> {
     /// Marks the blocks between neighbouring beams, a few beams at a time.
     fn outline_beams(&mut self, scan: &Scan<D>, lattice: &Lattice<D>, origin: [f64; D]) {
         /// Beams in one outline: more are cheaper to mark, but cover more blocks that no beam sees.
@@ -157,9 +151,15 @@ impl<const D: usize> Sweep<D> for CellCentre<D> {
         if self.ordered {
             self.plan_fan(scan, world_from_sensor, lattice, &bounds)?;
         } else {
+            let rays = scan.beams().zip(&self.weights).map(|(beam, &weight)| Ray {
+                origin: world_from_sensor.translation,
+                direction: world_from_sensor.rotate(beam.direction),
+                range: beam.free_range(),
+                hit: beam.is_hit(),
+                weight,
+            });
             let how = (self.truncation, self.carve_weight);
-            let most = limits.most_blocks;
-            if !self.rays.plan(scan, world_from_sensor, (lattice, &bounds), &self.weights, how, most) {
+            if !self.rays.plan(rays, (lattice, &bounds), how, limits.most_blocks) {
                 return Err(PlanError::TooManyBlocks);
             }
         }
@@ -181,12 +181,12 @@ impl<const D: usize> Swept<D> for CellCentre<D> {
     }
 
     fn blocks(&self) -> &[BlockKey<D>] {
-        if self.ordered { &self.keys } else { self.rays.blocks() }
+        if self.ordered { &self.keys } else { self.rays.keys() }
     }
 
     fn evidence<'a>(&'a self, i: usize, scratch: &'a mut Distances) -> &'a Distances {
         if !self.ordered {
-            return self.rays.evidence(i);
+            return &self.rays.evidence(i).distances;
         }
         let cell = self.keys[i].first_cell();
         // From the lattice to the sensor in f64, then f32: near a UTM origin nothing is lost.
@@ -205,22 +205,10 @@ impl<const D: usize> Swept<D> for CellCentre<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::{DistanceObservation, Evidence};
-    use crate::geom::block_cells;
     use crate::scan::{Beam, BeamKind, RangeLimits};
+    use crate::testing::said;
     use proptest::prelude::*;
     use std::collections::HashMap;
-
-    /// Everything the sweep says, by cell.
-    fn said<const D: usize>(sweep: &CellCentre<D>) -> HashMap<[i32; D], DistanceObservation> {
-        let mut scratch = Distances::silent(block_cells::<D>());
-        let mut said = HashMap::new();
-        for (i, key) in sweep.blocks().iter().enumerate() {
-            let e = sweep.evidence(i, &mut scratch);
-            said.extend((0..block_cells::<D>()).filter_map(|k| Some((key.cell(k), e.one(k)?))));
-        }
-        said
-    }
 
     fn laser(readings: &[f64], no_return: f64) -> Scan<2> {
         let n = readings.len();
@@ -346,14 +334,8 @@ mod tests {
             let scan = Scan::from_fan(&bearings, beams);
             let mut sweep = CellCentre::new(0.15, carve_weight, WeightModel::Constant);
             let pose = Pose::<2>::new(0.0, 0.0, 0.0);
-            sweep
-                .plan(
-                    &scan,
-                    &pose,
-                    &Lattice::new([0.0; 2], 0.05),
-                    &PlanLimits::inside(Aabb::new([-4.0; 2], [4.0; 2])),
-                )
-                .unwrap();
+            let limits = PlanLimits::inside(Aabb::new([-4.0; 2], [4.0; 2]));
+            sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.05), &limits).unwrap();
             said(&sweep)
         };
         let cells = |area: f64| (area / 0.05f64.powi(2)) as usize;
@@ -380,14 +362,8 @@ mod tests {
         let scan = Scan::from_points(&[ahead]);
         let pose = Pose { translation: [0.05; D], ..Pose::IDENTITY };
         let mut sweep = CellCentre::<D>::new(0.25, 1.0, WeightModel::Constant);
-        sweep
-            .plan(
-                &scan,
-                &pose,
-                &Lattice::new([0.0; D], 0.1),
-                &PlanLimits::inside(Aabb::new([-3.0; D], [3.0; D])),
-            )
-            .unwrap();
+        let limits = PlanLimits::inside(Aabb::new([-3.0; D], [3.0; D]));
+        sweep.plan(&scan, &pose, &Lattice::new([0.0; D], 0.1), &limits).unwrap();
         let said = said(&sweep);
         let mut cell = [0; D];
         cell[0] = 9;

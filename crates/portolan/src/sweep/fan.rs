@@ -4,6 +4,7 @@ use crate::cell::DistanceObservation;
 use crate::geom::vector::{cross, distance};
 use crate::geom::{BLOCK_EDGE, Pose};
 use crate::scan::{BeamKind, MAX_OPENING, Scan, connected};
+use crate::sets::bits;
 
 /// Cells of a block of the plane.
 pub(super) const CELLS: usize = BLOCK_EDGE * BLOCK_EDGE;
@@ -236,9 +237,7 @@ impl Fan {
             weight[i] = trust[i] * before * behind;
             distance[i] = d.min(tau);
         }
-        while torn != 0 {
-            let i = torn.trailing_zeros() as usize;
-            torn &= torn - 1;
+        for i in bits(torn) {
             let said = self.observe_torn(&self.wedges[usize::from(found[i])], x[i], y[i]);
             (distance[i], weight[i]) = said.map_or((0.0, 0.0), |o| (o.distance, o.weight));
         }

@@ -2,6 +2,7 @@
 
 use super::fan::Spoke;
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice};
+use crate::sets::bits_of;
 
 /// Blocks in the box around a scan: 32 MiB of bits, 6.5 km across at cells of 5 cm.
 const MOST_BLOCKS: i64 = 1 << 28;
@@ -59,16 +60,13 @@ impl BlockBitmap {
     /// The marked blocks, ascending.
     pub(super) fn collect<const D: usize>(&self, keys: &mut Vec<BlockKey<D>>) {
         keys.clear();
-        for (w, &word) in self.bits.iter().enumerate() {
-            let mut word = word;
-            while word != 0 {
-                let x = self.first[0] + ((w % self.words) * 64) as i64 + i64::from(word.trailing_zeros());
-                let y = self.first[1] + (w / self.words) as i64;
-                let mut key = [0; D];
-                (key[0], key[1]) = (x as i32, y as i32);
-                keys.push(BlockKey(key));
-                word &= word - 1;
-            }
+        for bit in bits_of(&self.bits) {
+            let (w, bit) = (bit / 64, (bit % 64) as i64);
+            let x = self.first[0] + ((w % self.words) * 64) as i64 + bit;
+            let y = self.first[1] + (w / self.words) as i64;
+            let mut key = [0; D];
+            (key[0], key[1]) = (x as i32, y as i32);
+            keys.push(BlockKey(key));
         }
     }
 }

@@ -121,10 +121,10 @@ impl<const D: usize> Sweep<D> for March<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::Evidence;
+    use crate::geom::Aabb;
     use crate::geom::vector::unit;
-    use crate::geom::{Aabb, block_cells};
     use crate::scan::{Beam, BeamKind};
+    use crate::testing::said;
     use proptest::prelude::*;
     use std::collections::HashMap;
 
@@ -154,14 +154,8 @@ mod tests {
         }
         let mut sweep = March::new(tau, if carve { 1.0 } else { 0.0 }, WeightModel::Constant);
         sweep.plan(&scan, &pose, &lattice, &PlanLimits::inside(Aabb::new([-100.0; D], [100.0; D]))).unwrap();
-        let mut said = HashMap::new();
-        for (i, key) in sweep.blocks().iter().enumerate() {
-            for k in 0..block_cells::<D>() {
-                if let Some(o) = sweep.evidence(i, &mut ()).one(k) {
-                    said.insert(key.cell(k), (o.distance, o.weight));
-                }
-            }
-        }
+        let said: HashMap<_, _> =
+            said(&sweep).into_iter().map(|(c, o)| (c, (o.distance, o.weight))).collect();
         assert_eq!(said, want);
     }
 

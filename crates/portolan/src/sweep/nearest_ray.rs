@@ -4,8 +4,7 @@ use super::clip;
 use super::touched::Touched;
 use crate::cell::{DistanceObservation, Distances, Evidence};
 use crate::geom::vector::{along, dot, sub};
-use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
-use crate::scan::Scan;
+use crate::geom::{Aabb, BlockKey, Lattice, RayWalk};
 
 /// A ray in the world: a beam where it is.
 #[derive(Clone, Copy, Debug)]
@@ -60,44 +59,18 @@ impl Evidence for NearestBeam {
 
 /// Walks every beam through the cells exactly; a cell listens to the beam that passes nearest to its centre,
 /// and gets that beam's distance at the centre. Ties go to the earlier beam.
-#[derive(Clone, Debug)]
-pub(super) struct NearestRay<const D: usize> {
-    touched: Touched<NearestBeam, D>,
-}
+pub(super) type NearestRay<const D: usize> = Touched<NearestBeam, D>;
 
 impl<const D: usize> NearestRay<D> {
-    pub(super) fn new() -> Self {
-        Self { touched: Touched::new() }
-    }
-
-    pub(super) fn plan(
-        &mut self,
-        scan: &Scan<D>,
-        world_from_sensor: &Pose<D>,
-        (lattice, bounds): (&Lattice<D>, &Aabb<D>),
-        weights: &[f32],
-        how: (f64, f32),
-        most: usize,
-    ) -> bool {
-        let rays = scan.beams().zip(weights).map(|(beam, &weight)| Ray {
-            origin: world_from_sensor.translation,
-            direction: world_from_sensor.rotate(beam.direction),
-            range: beam.free_range(),
-            hit: beam.is_hit(),
-            weight,
-        });
-        self.plan_rays(rays, (lattice, bounds), how, most)
-    }
-
     /// Stops where more than `most` blocks are touched, and says so with `false`.
-    pub(super) fn plan_rays(
+    pub(super) fn plan(
         &mut self,
         rays: impl Iterator<Item = Ray<D>>,
         (lattice, bounds): (&Lattice<D>, &Aabb<D>),
         (tau, carve_weight): (f64, f32),
         most: usize,
     ) -> bool {
-        self.touched.clear();
+        self.clear();
         let carve = carve_weight > 0.0;
         for (number, ray) in rays.enumerate() {
             let (origin, direction, z) = (ray.origin, ray.direction, ray.range);
@@ -126,7 +99,7 @@ impl<const D: usize> NearestRay<D> {
                 if w > 0.0 && (carve || d <= tau) {
                     let aside_sq = (dot(offset, offset) - s * s) as f32;
                     let i = BlockKey::offset(cell);
-                    let evidence = self.touched.of_cell(cell);
+                    let evidence = self.of_cell(cell);
                     if !evidence.distances.is_set(i) || aside_sq < evidence.aside_sq[i] {
                         evidence
                             .distances
@@ -135,7 +108,7 @@ impl<const D: usize> NearestRay<D> {
                         evidence.ray[i] = number as u32;
                     }
                     // Here, since one ray alone may be long enough.
-                    if self.touched.keys().len() > most {
+                    if self.keys().len() > most {
                         return false;
                     }
                 }
@@ -145,21 +118,8 @@ impl<const D: usize> NearestRay<D> {
                 walk.advance();
             }
         }
-        self.touched.sort();
+        self.sort();
         true
-    }
-
-    pub(super) fn blocks(&self) -> &[BlockKey<D>] {
-        self.touched.keys()
-    }
-
-    pub(super) fn evidence(&self, i: usize) -> &Distances {
-        &self.touched.evidence(i).distances
-    }
-
-    /// Evidence with the number of the ray that each cell's comes from.
-    pub(super) fn nearest(&self, i: usize) -> &NearestBeam {
-        self.touched.evidence(i)
     }
 }
 
@@ -172,10 +132,10 @@ mod tests {
         let ray = Ray { origin: [0.05; 3], direction: [1.0, 0.0, 0.0], range: 1e4, hit: true, weight: 1.0 };
         let (lattice, all) = (Lattice::new([0.0; 3], 0.1), Aabb::new([-1e9; 3], [1e9; 3]));
         let mut rays = NearestRay::<3>::new();
-        assert!(!rays.plan_rays([ray].into_iter(), (&lattice, &all), (0.3, 1.0), 10));
-        assert_eq!(rays.blocks().len(), 11);
+        assert!(!rays.plan([ray].into_iter(), (&lattice, &all), (0.3, 1.0), 10));
+        assert_eq!(rays.keys().len(), 11);
         let short = Ray { range: 7.0, ..ray };
-        assert!(rays.plan_rays([short].into_iter(), (&lattice, &all), (0.3, 1.0), 10));
-        assert_eq!(rays.blocks().len(), 10);
+        assert!(rays.plan([short].into_iter(), (&lattice, &all), (0.3, 1.0), 10));
+        assert_eq!(rays.keys().len(), 10);
     }
 }

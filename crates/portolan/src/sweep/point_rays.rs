@@ -82,7 +82,7 @@ impl Sweep<3> for PointRays {
         let silent =
             Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0], range: 0.0, hit: false, weight: 0.0 };
         let bounds = limits.bounds_or_everywhere();
-        let fits = self.rays.plan_rays(
+        let fits = self.rays.plan(
             (0..count).map(|i| ray(i).unwrap_or(silent)),
             (lattice, &bounds),
             (how.truncation, how.carve_weight),
@@ -117,11 +117,11 @@ impl Swept<3> for PointRays {
     fn scratch(&self) {}
 
     fn blocks(&self) -> &[BlockKey<3>] {
-        self.rays.blocks()
+        self.rays.keys()
     }
 
     fn evidence<'a>(&'a self, i: usize, (): &'a mut ()) -> &'a Distances {
-        self.rays.evidence(i)
+        &self.rays.evidence(i).distances
     }
 }
 
@@ -129,7 +129,7 @@ impl SweptColors<3> for PointRays {
     /// Those of the rays that the distances come from.
     fn colors(&self, i: usize, distances: &Distances, band: f32, colors: &mut Colors) {
         colors.clear();
-        let rays = &self.rays.nearest(i).ray;
+        let rays = &self.rays.evidence(i).ray;
         for (cell, &ray) in rays.iter().enumerate() {
             let one = distances.one(cell).filter(|d| d.distance.abs() <= band);
             if let (Some(seen), Some(&rgb)) = (one, self.colors.get(ray as usize)) {

@@ -5,7 +5,7 @@ use super::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept, beam_stats, 
 use crate::cell::HitMiss;
 use crate::geom::vector::{along, distance};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, RayWalk};
-use crate::scan::{Scan, ScanStats};
+use crate::scan::{Beam, Scan, ScanStats};
 
 /// Walks every beam through the cells (Amanatides & Woo 1987) and marks hits and misses.
 ///
@@ -25,15 +25,17 @@ impl<const D: usize> Rays<D> {
         Self { wall_depth, touched: Touched::new() }
     }
 
-    /// Marks the cells of one beam; `false` where it is too long to be walked, and nothing is marked.
+    /// Marks the cells of one beam (in the world's frame) that frees or hits something; `false` where it is too long to
+    /// be walked, and nothing is marked.
     fn walk(
         &mut self,
         lattice: &Lattice<D>,
         bounds: &Aabb<D>,
-        ray: &Ray<D>,
+        origin: [f64; D],
+        beam: &Beam<D>,
         most: usize,
     ) -> Result<bool, PlanError> {
-        let Ray { origin, direction, range: z, hit } = *ray;
+        let (direction, z, hit) = (beam.direction, beam.range, beam.is_hit());
         let half = 0.5 * self.wall_depth;
         let length = if hit { z + half } else { z };
         let Some((near, far)) = clip(bounds, origin, direction, length) else { return Ok(true) };
@@ -68,16 +70,6 @@ impl<const D: usize> Rays<D> {
     }
 }
 
-/// A beam in the world's frame (metres).
-struct Ray<const D: usize> {
-    origin: [f64; D],
-    /// Unit vector.
-    direction: [f64; D],
-    range: f64,
-    /// Whether there is a surface at the end.
-    hit: bool,
-}
-
 impl<const D: usize> Swept<D> for Rays<D> {
     type Evidence = HitMiss;
     type Scratch = ();
@@ -107,13 +99,9 @@ impl<const D: usize> Sweep<D> for Rays<D> {
         let bounds = limits.bounds_or_everywhere();
         let mut stats = beam_stats(scan, world_from_sensor, limits);
         for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
-            let ray = Ray {
-                origin: world_from_sensor.translation,
-                direction: world_from_sensor.rotate(beam.direction),
-                range: beam.free_range(),
-                hit: beam.is_hit(),
-            };
-            if !self.walk(lattice, &bounds, &ray, limits.most_blocks)? {
+            let beam = Beam { direction: world_from_sensor.rotate(beam.direction), ..beam };
+            let origin = world_from_sensor.translation;
+            if !self.walk(lattice, &bounds, origin, &beam, limits.most_blocks)? {
                 stats.refuse_far(beam.is_hit());
             }
         }
@@ -125,10 +113,10 @@ impl<const D: usize> Sweep<D> for Rays<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::{Endpoint, Evidence};
-    use crate::geom::block_cells;
+    use crate::cell::Endpoint;
     use crate::geom::vector::unit;
-    use crate::scan::{Beam, BeamKind};
+    use crate::scan::BeamKind;
+    use crate::testing::{point, said};
     use proptest::prelude::*;
     use std::collections::HashMap;
 
@@ -162,78 +150,46 @@ mod tests {
         said
     }
 
-    fn equals_the_oracle<const D: usize>(beams: &[([f64; D], f64, u8)], origin: [f64; D], depth: f64) {
+    fn equals_the_oracle<const D: usize>(beams: &[([f64; 3], f64, u8)], origin: [f64; 3], depth: f64) {
         let kinds = [BeamKind::Hit, BeamKind::Hit, BeamKind::MaxRange, BeamKind::NoReturn, BeamKind::Dropped];
         let scan = Scan::from_beams(
-            beams.iter().filter(|b| unit(b.0).is_some()).map(|&(direction, range, kind)| Beam {
-                direction,
-                range,
-                kind: kinds[usize::from(kind)],
-            }),
+            beams.iter().map(|&(d, range, kind)| (point(d), range, kinds[usize::from(kind)])).filter_map(
+                |(direction, range, kind)| unit(direction).map(|_| Beam { direction, range, kind }),
+            ),
         );
-        let pose = Pose { translation: origin, ..Pose::IDENTITY };
+        let pose = Pose { translation: point(origin), ..Pose::IDENTITY };
         let lattice = Lattice::new([-0.3; D], 0.1);
-        let mut sweep = Rays::new(depth);
+        let mut sweep = Rays::<D>::new(depth);
         let everywhere = Aabb::new([-100.0; D], [100.0; D]);
         for _ in 0..2 {
             sweep.plan(&scan, &pose, &lattice, &PlanLimits::inside(everywhere)).unwrap();
         }
         assert!(sweep.blocks().is_sorted());
-        let mut said = HashMap::new();
-        for (i, key) in sweep.blocks().iter().enumerate() {
-            let mut scratch = ();
-            let e = sweep.evidence(i, &mut scratch);
-            for k in 0..block_cells::<D>() {
-                if let Some(o) = e.one(k) {
-                    said.insert(key.cell(k), o);
-                }
-            }
-        }
-        assert_eq!(said, oracle(&scan, &pose, &lattice, depth));
+        assert_eq!(said(&sweep), oracle(&scan, &pose, &lattice, depth));
     }
 
     proptest! {
         #[test]
-        fn equals_a_hash_map_2d(
-            beams in prop::collection::vec((prop::array::uniform2(-1.0..1.0f64), 0.0..3.0f64, 0u8..5), 1..40),
-            o in prop::array::uniform2(-1.0..1.0f64), depth in 0.0..0.3f64,
-        ) {
-            equals_the_oracle(&beams, o, depth);
-        }
-        #[test]
-        fn equals_a_hash_map_3d(
+        fn equals_a_hash_map_2d_and_3d(
             beams in prop::collection::vec((prop::array::uniform3(-1.0..1.0f64), 0.0..3.0f64, 0u8..5), 1..40),
             o in prop::array::uniform3(-1.0..1.0f64), depth in 0.0..0.3f64,
         ) {
-            equals_the_oracle(&beams, o, depth);
+            equals_the_oracle::<2>(&beams, o, depth);
+            equals_the_oracle::<3>(&beams, o, depth);
         }
     }
 
     #[test]
     fn what_each_kind_of_beam_marks() {
+        let limits = PlanLimits::inside(Aabb::new([0.0; 2], [5.0; 2]));
         let marks = |kind| {
             let mut sweep = Rays::<2>::new(0.1);
             let scan = Scan::from_beams([Beam { direction: [1.0, 0.0], range: 1.0, kind }]);
             let pose = Pose::<2>::new(0.05, 0.05, 0.0);
-            sweep
-                .plan(
-                    &scan,
-                    &pose,
-                    &Lattice::new([0.0; 2], 0.1),
-                    &PlanLimits::inside(Aabb::new([0.0; 2], [5.0; 2])),
-                )
-                .unwrap();
-            let mut counts = (0, 0);
-            for i in 0..sweep.blocks().len() {
-                for k in 0..64 {
-                    match sweep.evidence(i, &mut ()).one(k) {
-                        Some(Endpoint::Hit) => counts.0 += 1,
-                        Some(Endpoint::Miss) => counts.1 += 1,
-                        None => {}
-                    }
-                }
-            }
-            counts
+            sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.1), &limits).unwrap();
+            let said = said(&sweep);
+            let hits = said.values().filter(|o| **o == Endpoint::Hit).count();
+            (hits, said.len() - hits)
         };
         assert_eq!(marks(BeamKind::Hit), (1, 10));
         assert_eq!(marks(BeamKind::MaxRange), (0, 10));
@@ -247,14 +203,8 @@ mod tests {
         let mut sweep = Rays::<2>::new(0.1);
         let scan = Scan::from_beams([Beam { direction: [1.0, 0.0], range: 1e7, kind: BeamKind::Hit }]);
         let pose = Pose::<2>::new(-5e6, 0.5, 0.0);
-        sweep
-            .plan(
-                &scan,
-                &pose,
-                &Lattice::new([0.0; 2], 0.1),
-                &PlanLimits::inside(Aabb::new([0.0; 2], [5.0; 2])),
-            )
-            .unwrap();
+        let limits = PlanLimits::inside(Aabb::new([0.0; 2], [5.0; 2]));
+        sweep.plan(&scan, &pose, &Lattice::new([0.0; 2], 0.1), &limits).unwrap();
         assert_eq!(sweep.blocks().len(), 7);
     }
 }

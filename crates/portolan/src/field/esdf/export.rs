@@ -117,9 +117,9 @@ impl<const D: usize> Esdf<D> {
 mod tests {
     use super::*;
     use crate::answer::Answer;
-    use crate::cell::{DistanceBrick, SignedDistance};
+    use crate::cell::SignedDistance;
     use crate::field::EsdfSettings;
-    use crate::geom::{Lattice, block_cells};
+    use crate::geom::Lattice;
     use crate::store::Bricks;
 
     /// A wall at x = 1.23 through bricks at these keys; every seventh cell was not observed.
@@ -128,11 +128,9 @@ mod tests {
         let mut store = Bricks::<SignedDistance, D>::new(lattice);
         for key in keys {
             let key = BlockKey(std::array::from_fn(|k| key[k]));
-            let cells = 0..block_cells::<D>();
             let distance = |i| (1.23 - (lattice.center(key.cell(i))[0] - 500_000.0)).clamp(-0.3, 0.3) as f32;
-            let distances: Vec<f32> = cells.clone().map(distance).collect();
-            let weights: Vec<f32> = cells.map(|i| f32::from(u8::from(i % 7 != 0))).collect();
-            store.insert(key, DistanceBrick::from_parts(&distances, &weights).unwrap()).unwrap();
+            let brick = crate::testing::brick::<D>(|i| (i % 7 != 0).then(|| (distance(i), 1.0)));
+            store.insert(key, brick).unwrap();
         }
         Esdf::of(&store, &EsdfSettings { max_distance: 0.5, ..Default::default() })
     }

@@ -5,7 +5,8 @@ use crate::answer::Answer;
 use crate::cell::{DistanceBrick, Planes};
 use crate::field::esdf_from_tsdf;
 use crate::geom::{block_cells, vector};
-use crate::map::{DenseTsdf, TsdfConfig};
+use crate::map::DenseTsdf;
+use crate::testing::with_threads;
 use proptest::prelude::*;
 
 const R: f64 = 0.1;
@@ -77,30 +78,20 @@ fn matches_brute_force<const D: usize>(bricks: &[RandomBrick], settings: &EsdfSe
 
 proptest! {
     #[test]
-    fn matches_brute_force_2d(bricks in bricks(), max_distance in prop_oneof![Just(0.05), 0.2..4.0f64], band_cells in 0.1..2.0f32) {
-        matches_brute_force::<2>(&bricks, &EsdfSettings { min_weight: Some(0.5), max_distance, ..Default::default() }, band_cells);
-    }
-    #[test]
-    fn matches_brute_force_3d(bricks in bricks(), max_distance in prop_oneof![Just(0.05), 0.2..4.0f64], band_cells in 0.1..2.0f32) {
-        matches_brute_force::<3>(&bricks, &EsdfSettings { min_weight: Some(0.5), max_distance, ..Default::default() }, band_cells);
+    fn matches_brute_force_2d_and_3d(
+        bricks in bricks(), max_distance in prop_oneof![Just(0.05), 0.2..4.0f64], band_cells in 0.1..2.0f32,
+    ) {
+        let settings = EsdfSettings { min_weight: Some(0.5), max_distance, ..Default::default() };
+        matches_brute_force::<2>(&bricks, &settings, band_cells);
+        matches_brute_force::<3>(&bricks, &settings, band_cells);
     }
 }
 
 /// A ball in a box of observed cells, dense and in bricks.
 fn ball<const D: usize>(n: usize) -> (DenseTsdf<D>, Bricks<SignedDistance, D>) {
-    let config = TsdfConfig { truncation: 0.3, ..Default::default() };
-    let mut tsdf = DenseTsdf::covering(&crate::geom::Grid::new([0.0; D], R, [n; D]), config).unwrap();
-    let mut bricks = Bricks::new(tsdf.grid().lattice);
-    for i in 0..tsdf.grid().len() {
-        let cell = tsdf.grid().cell(i);
-        let d = vector::distance(tsdf.grid().lattice.center(cell), [0.5 * n as f64 * R; D]) - 0.8;
-        tsdf.fuse(cell, d, 1.0);
-        let key = BlockKey::of_cell(cell);
-        let mut brick: DistanceBrick =
-            bricks.brick(key).cloned().unwrap_or_else(|| Planes::unobserved(block_cells::<D>()));
-        brick.set(BlockKey::offset(cell), tsdf.store().cell(cell));
-        bricks.insert(key, brick).unwrap();
-    }
+    let (grid, center) = (crate::geom::Grid::new([0.0; D], R, [n; D]), [0.5 * n as f64 * R; D]);
+    let tsdf = crate::testing::tsdf(grid, 0.3, |p| vector::distance(p, center) - 0.8);
+    let bricks = tsdf.store().into();
     (tsdf, bricks)
 }
 
@@ -152,10 +143,7 @@ fn is_the_dense_field_2d_and_3d() {
 #[cfg(feature = "parallel")]
 fn is_the_same_on_any_number_of_threads() {
     let (_, bricks) = ball::<3>(60);
-    let of = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Esdf::of(&bricks, &EsdfSettings::default()))
-    };
+    let of = |threads| with_threads(threads, || Esdf::of(&bricks, &EsdfSettings::default()));
     let (one, three) = (of(1), of(3));
     assert_eq!(one.keys, three.keys);
     let bits = |esdf: &Esdf<3>| {

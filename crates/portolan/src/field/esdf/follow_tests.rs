@@ -5,7 +5,7 @@ use crate::cell::{DistanceBrick, Planes, SignedDistance};
 use crate::field::esdf::transform::Feature;
 use crate::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings, EsdfUpdate};
 use crate::geom::{BlockKey, Grid, Lattice, block_cells, vector};
-use crate::map::{DenseTsdf, TsdfConfig};
+use crate::map::DenseTsdf;
 use crate::store::{Bricks, Store};
 use proptest::prelude::*;
 use std::sync::{Mutex, mpsc};
@@ -117,11 +117,8 @@ fn settings() -> impl Strategy<Value = EsdfSettings> {
 
 proptest! {
     #[test]
-    fn follows_the_map_2d(steps in changes(), settings in settings()) {
+    fn follows_the_map_2d_and_3d(steps in changes(), settings in settings()) {
         follows_the_map::<2>(&steps, &settings);
-    }
-    #[test]
-    fn follows_the_map_3d(steps in changes(), settings in settings()) {
         follows_the_map::<3>(&steps, &settings);
     }
 }
@@ -183,11 +180,10 @@ fn is_the_nearest_crossing<const D: usize>(steps: &[Vec<Change>], settings: &Esd
 
 proptest! {
     #[test]
-    fn is_the_nearest_crossing_2d(steps in changes(), max_distance in 0.05..1.8f64) {
-        is_the_nearest_crossing::<2>(&steps, &EsdfSettings { max_distance, ..Default::default() });
-    }
-    #[test]
-    fn is_the_nearest_crossing_3d(steps in changes(), max_distance in 0.05..1.0f64) {
+    fn is_the_nearest_crossing_2d_and_3d(
+        steps in changes(), far in 0.05..1.8f64, max_distance in 0.05..1.0f64,
+    ) {
+        is_the_nearest_crossing::<2>(&steps, &EsdfSettings { max_distance: far, ..Default::default() });
         is_the_nearest_crossing::<3>(&steps, &EsdfSettings { max_distance, ..Default::default() });
     }
 }
@@ -224,11 +220,8 @@ fn is_the_nearest_unknown_box<const D: usize>(steps: &[Vec<Change>], settings: &
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn is_the_nearest_unknown_box_2d(steps in changes(), settings in settings()) {
+    fn is_the_nearest_unknown_box_2d_and_3d(steps in changes(), settings in settings()) {
         is_the_nearest_unknown_box::<2>(&steps, &settings);
-    }
-    #[test]
-    fn is_the_nearest_unknown_box_3d(steps in changes(), settings in settings()) {
         let max_distance = settings.max_distance.min(0.9);
         is_the_nearest_unknown_box::<3>(&steps, &EsdfSettings { max_distance, ..settings });
     }
@@ -236,16 +229,10 @@ proptest! {
 
 /// A ball of 0.8 m in an array that is no multiple of a brick, with a corner that was not observed.
 fn ball<const D: usize>() -> DenseTsdf<D> {
-    let config = TsdfConfig { truncation: 0.3, ..Default::default() };
-    let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; D], R, [37; D]), config).unwrap();
-    for i in 0..tsdf.grid().len() {
-        let cell = tsdf.grid().cell(i);
-        let d = vector::distance(tsdf.grid().lattice.center(cell), [1.8; D]) - 0.8;
-        if cell.iter().any(|c| *c > 4) {
-            tsdf.fuse(cell, d, 1.0);
-        }
-    }
-    tsdf
+    let distance = |p| vector::distance(p, [1.8; D]) - 0.8;
+    crate::testing::tsdf(Grid::new([0.0; D], R, [37; D]), 0.3, |p| {
+        if p.iter().any(|v| *v > 5.0 * R) { distance(p) } else { f64::NAN }
+    })
 }
 
 fn a_dense_map_is_its_bricks<const D: usize>() {
@@ -288,9 +275,7 @@ fn readers_keep_their_snapshot() {
         for n in 0..3 * 3 * 2 {
             let key = BlockKey([n % 3, n / 3 % 3, n / 9]);
             let of = |i| (f64::from(key.cell(i)[2]) * R - height(state)).clamp(-0.3, 0.3) as f32;
-            let distances: Vec<f32> = (0..512).map(of).collect();
-            let brick = DistanceBrick::from_parts(&distances, &[1.0; 512]).unwrap();
-            store.insert(key, brick).unwrap();
+            store.insert(key, crate::testing::brick::<3>(|i| Some((of(i), 1.0)))).unwrap();
         }
     };
     set(&mut store, 0);

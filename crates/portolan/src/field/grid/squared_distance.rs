@@ -89,17 +89,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn matches_brute_force_2d(
+        fn matches_brute_force_2d_and_3d(
             seeds in prop::collection::vec((any::<usize>(), prop_oneof![Just(0.0), 0.0..9.0f64, 0.0..900.0f64]), 0..40),
-            shape in prop::array::uniform2(1..33usize),
+            flat in prop::array::uniform2(1..33usize), shape in prop::array::uniform3(1..11usize),
         ) {
-            matches_brute_force(&seeds, shape);
-        }
-        #[test]
-        fn matches_brute_force_3d(
-            seeds in prop::collection::vec((any::<usize>(), prop_oneof![Just(0.0), 0.0..9.0f64, 0.0..900.0f64]), 0..40),
-            shape in prop::array::uniform3(1..11usize),
-        ) {
+            matches_brute_force(&seeds, flat);
             matches_brute_force(&seeds, shape);
         }
     }

@@ -51,17 +51,11 @@ mod tests {
     use crate::geom::Grid;
     use crate::geom::vector;
     use crate::map::TsdfConfig;
+    use crate::testing;
 
     fn sphere<const D: usize>(n: usize, r: f64, radius: f64) -> DenseTsdf<D> {
-        let config = TsdfConfig { truncation: 3.0 * r, ..Default::default() };
-        let mut tsdf = DenseTsdf::covering(&Grid::new([0.0; D], r, [n; D]), config).unwrap();
         let centre = [0.5 * n as f64 * r; D];
-        for i in 0..tsdf.grid().len() {
-            let cell = tsdf.grid().cell(i);
-            let d = vector::distance(tsdf.grid().lattice.center(cell), centre) - radius;
-            tsdf.fuse(cell, d, 1.0);
-        }
-        tsdf
+        testing::tsdf(Grid::new([0.0; D], r, [n; D]), 3.0 * r, |p| vector::distance(p, centre) - radius)
     }
 
     /// The seeding's half of the finding that can be proved: on an exact field the distance is never too large,
@@ -91,12 +85,7 @@ mod tests {
 
     #[test]
     fn a_map_without_a_surface_is_unknown_and_not_far() {
-        let mut tsdf =
-            DenseTsdf::covering(&Grid::new([0.0; 2], 0.05, [10; 2]), TsdfConfig::default()).unwrap();
-        (0..100).for_each(|i| {
-            let cell = tsdf.grid().cell(i);
-            tsdf.fuse(cell, 0.15, 1.0);
-        });
+        let tsdf = testing::tsdf(Grid::new([0.0; 2], 0.05, [10; 2]), 0.15, |_| 0.15);
         let esdf = esdf_from_tsdf(&tsdf, 0.5, 1.5);
         assert_eq!(esdf.distance([0.25, 0.25]), Answer::Unknown);
         assert_eq!(esdf.gradient([0.25, 0.25]), Answer::Unknown);

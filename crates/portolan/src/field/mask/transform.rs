@@ -222,10 +222,8 @@ mod tests {
     fn is_the_same_on_any_number_of_threads() {
         let shape = [70, 90, 40];
         let mask: Vec<bool> = (0..shape.iter().product()).map(|i: usize| i % 10_007 == 5).collect();
-        let on = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| MaskTransform::new(shape).unwrap().nearest(&mask).unwrap())
-        };
+        let nearest = || MaskTransform::new(shape).unwrap().nearest(&mask).unwrap();
+        let on = |threads| crate::testing::with_threads(threads, nearest);
         assert_eq!(on(1), on(3));
     }
 

@@ -179,14 +179,9 @@ fn batch<S: Samples<D>, const D: usize>(
     let slots = [distance.len(), gradient.len(), status.len()];
     assert_eq!(slots, [points.len(); 3], "one slot for each point");
     let slots = distance.chunks_mut(TASK).zip(gradient.chunks_mut(TASK)).zip(status.chunks_mut(TASK));
-    parallel::for_each(
-        points.chunks(TASK).zip(slots),
-        || (),
-        |(points, slots), ()| {
-            let ((distance, gradient), status) = slots;
-            serial(field, points, interpolation, distance, gradient, status);
-        },
-    );
+    parallel::each(points.chunks(TASK).zip(slots), |(points, ((distance, gradient), status))| {
+        serial(field, points, interpolation, distance, gradient, status);
+    });
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]

@@ -1,8 +1,9 @@
 //! Pieces of bricks joined into one mesh.
 
-use super::piece::{Part, Piece, WORDS, bits, place_of};
+use super::piece::{Part, Piece, WORDS, place_of};
 use super::vertex::Attributes;
 use crate::parallel;
+use crate::sets::bits;
 use crate::surface::Mesh;
 
 /// Positions of nodes: node `i` lies at `origin + (i + offset) * resolution`.

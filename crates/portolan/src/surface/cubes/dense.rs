@@ -142,8 +142,9 @@ fn read_row(row: &[f32], level: f32, signs: &mut [Signs], [y, z]: [usize; 2]) {
 mod tests {
     use super::*;
     use crate::surface::EdgeCounts;
-    use crate::surface::cubes::testing::{Random, bricks};
+    use crate::surface::cubes::testing::bricks;
     use crate::surface::{MeshSettings, marching_cubes};
+    use crate::testing::Random;
     use proptest::prelude::*;
 
     fn field(shape: [usize; 3], mut value: impl FnMut([f64; 3]) -> f64) -> Vec<f32> {
@@ -328,8 +329,7 @@ mod tests {
         }
         #[cfg(feature = "parallel")]
         for threads in [1, 2, 5] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            assert!(pool.install(dense) == mesh);
+            assert!(crate::testing::with_threads(threads, dense) == mesh);
         }
     }
 

@@ -163,7 +163,8 @@ mod tests {
     use super::*;
     use crate::cell::ColorBrick;
     use crate::geom::Lattice;
-    use crate::surface::cubes::testing::{Random, bricks};
+    use crate::surface::cubes::testing::bricks;
+    use crate::testing::{Random, with_threads};
 
     fn sphere(center: [f64; 3], radius: f64) -> impl Fn([i32; 3]) -> f32 {
         move |c| {
@@ -246,10 +247,7 @@ mod tests {
         let mut random = Random(9);
         let value = std::cell::RefCell::new(move || random.value());
         let store = bricks(Lattice::new([1e6; 3], 0.1), [-30; 3], [70; 3], |_| value.borrow_mut()());
-        let with = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| marching_cubes(&store, None, &MeshSettings::default()))
-        };
+        let with = |threads| with_threads(threads, || marching_cubes(&store, None, &MeshSettings::default()));
         let one = with(1);
         assert!(one.triangles.len() > 300_000 && one == with(2) && one == with(7));
     }

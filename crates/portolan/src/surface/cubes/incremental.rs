@@ -196,15 +196,16 @@ mod tests {
     use super::*;
     use crate::cell::{ColorBrick, DistanceBrick};
     use crate::geom::Lattice;
-    use crate::surface::cubes::testing::{Random, bricks};
+    use crate::surface::cubes::testing::bricks;
     use crate::surface::marching_cubes;
+    use crate::testing::Random;
     use proptest::prelude::*;
 
     fn noise_brick(random: &mut Random, holes: u64) -> DistanceBrick {
-        let distances: Vec<f32> = (0..512).map(|_| random.value()).collect();
-        let weights: Vec<f32> =
-            (0..512).map(|_| if random.next() % 100 < holes { 0.0 } else { 1.0 }).collect();
-        DistanceBrick::from_parts(&distances, &weights).unwrap()
+        crate::testing::brick::<3>(|_| {
+            let distance = random.value();
+            (random.next() % 100 >= holes).then_some((distance, 1.0))
+        })
     }
 
     fn color_brick(random: &mut Random) -> ColorBrick {

@@ -6,6 +6,7 @@ use super::signs::{LAST_COLUMN, LAST_ROW, Layers, next_column};
 use super::table::{AMBIGUOUS, TABLE, Table, local};
 use super::vertex::{Attributes, Vertex, centre, crossing};
 use crate::geom::BlockKey;
+use crate::sets::bits;
 
 /// Words of edge bits of a brick: axis + 3 z, a bit per node where an edge starts.
 pub(super) const WORDS: usize = 24;
@@ -53,16 +54,6 @@ pub(super) struct Part {
     pub(super) colors: Vec<[u8; 3]>,
     pub(super) foreign: Vec<EdgeCode>,
     pub(super) triangles: Vec<[u16; 3]>,
-}
-
-#[inline(always)]
-pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let bit = word.trailing_zeros() as usize;
-        let some = word != 0;
-        word &= word.wrapping_sub(1);
-        some.then_some(bit)
-    })
 }
 
 impl Part {

@@ -77,9 +77,7 @@ impl Layers {
             observed: std::array::from_fn(|z| layer(z, |s| &s.observed)),
         }
     }
-}
 
-impl Layers {
     /// Whether any edge between two of the nodes has a crossing, observed or not: most bricks have none.
     #[inline]
     pub(super) fn any_crossing(&self) -> bool {

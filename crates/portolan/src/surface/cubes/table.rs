@@ -180,7 +180,8 @@ impl Decided {
 mod tests {
     use super::*;
     use crate::surface::cubes::numbering::share_face;
-    use crate::surface::cubes::testing::{Random, random_cube};
+    use crate::surface::cubes::testing::random_cube;
+    use crate::testing::Random;
     use std::collections::{BTreeMap, BTreeSet};
 
     fn all_patches() -> Vec<(u8, u8, bool, Patch)> {
@@ -250,11 +251,11 @@ mod tests {
         assert!(TABLE.plain.iter().all(|p| p.triangles == AMBIGUOUS || p.triangles <= 5));
     }
 
-    fn decided_of<'a>(all: &'a BTreeMap<(u8, u8), Decided>, d: &[f32; 8]) -> &'a Decided {
+    fn case_and_joined(d: &[f32; 8]) -> (u8, u8) {
         let case = (0..8).fold(0u8, |case, c| case | u8::from(d[c] < 0.0) << c);
         let faces = (0..6).filter(|f| ambiguous_faces(case) >> f & 1 == 1);
         let joined = faces.filter(|&f| inside_joined(face_corners(f).map(|c| d[usize::from(c)])));
-        &all[&(case, joined.fold(0, |j, f| j | 1 << f))]
+        (case, joined.fold(0, |j, f| j | 1 << f))
     }
 
     #[test]
@@ -270,8 +271,8 @@ mod tests {
         let mut found = 0;
         for n in 0..1_000_000 {
             let d = random_cube(&mut random, n);
-            let case = (0..8).fold(0u8, |case, c| case | u8::from(d[c] < 0.0) << c);
-            let decided = decided_of(&all, &d);
+            let (case, joined) = case_and_joined(&d);
+            let decided = &all[&(case, joined)];
             let tunnels: Vec<_> =
                 decided.tunnels.iter().filter(|t| connected(&d, t.ends[0], t.ends[1])).collect();
             assert!(tunnels.len() <= 1, "two tunnels in {d:?}");
@@ -321,13 +322,10 @@ mod tests {
         let (mut compared, mut tubes, mut unsure, mut thin) = (0, 0, 0, 0);
         for n in 0..6000 {
             let d = random_cube(&mut random, n);
-            let case = (0..8).fold(0u8, |case, c| case | u8::from(d[c] < 0.0) << c);
+            let (case, joined) = case_and_joined(&d);
             if TABLE.plain[usize::from(case)].triangles != AMBIGUOUS {
                 continue;
             }
-            let faces = (0..6).filter(|f| ambiguous_faces(case) >> f & 1 == 1);
-            let joined = faces.filter(|&f| inside_joined(face_corners(f).map(|c| d[usize::from(c)])));
-            let joined = joined.fold(0, |j, f| j | 1 << f);
             let (components, euler) = check(case, joined, TABLE.patch(case, &d));
             // A surface of n components cuts the cube into n + 1 parts. Necks may be thinner than a grid shows.
             let agrees = |n: usize| parts(&d, n).iter().sum::<usize>() == components + 1;

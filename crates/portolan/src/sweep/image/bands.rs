@@ -15,13 +15,9 @@ pub(super) fn each_row<T: Send, S: Default + Send>(
     let rows = BAND.div_ceil(width);
     let mut sums: Vec<S> = (0..plane.len().div_ceil(rows * width)).map(|_| S::default()).collect();
     let bands = plane.chunks_mut(rows * width).enumerate().zip(&mut sums);
-    parallel::for_each(
-        bands,
-        || (),
-        |((band, plane), sum), ()| {
-            let made = plane.chunks_mut(width).enumerate().map(|(i, row)| each(band * rows + i, row));
-            *sum = made.fold(S::default(), &add);
-        },
-    );
+    parallel::each(bands, |((band, plane), sum)| {
+        let made = plane.chunks_mut(width).enumerate().map(|(i, row)| each(band * rows + i, row));
+        *sum = made.fold(S::default(), &add);
+    });
     sums.into_iter().fold(S::default(), add)
 }

@@ -116,10 +116,7 @@ impl Projective {
         }
         let mut seen = seen.grown(self.lattice.resolution);
         if let Some(bounds) = &self.bounds {
-            for k in 0..3 {
-                seen.min[k] = seen.min[k].max(bounds.min[k]);
-                seen.max[k] = seen.max[k].min(bounds.max[k]);
-            }
+            seen = seen.intersection(*bounds);
         }
         if seen.is_empty() {
             return None;

@@ -65,20 +65,8 @@ pub(super) fn observe_block(
     octants: Octants,
     distance: &mut [f32; BLOCK],
     weight: &mut [f32; BLOCK],
-) -> usize {
-    block(view, centers, octants, distance, weight)
-}
-
-/// The same, compiled for any processor.
-#[cfg(test)]
-pub(super) fn observe_block_plain(
-    view: &ImageLookup<'_>,
-    centers: &BlockCenters,
-    octants: Octants,
-    distance: &mut [f32; BLOCK],
-    weight: &mut [f32; BLOCK],
-) -> usize {
-    block(view, centers, octants, distance, weight)
+) {
+    block(view, centers, octants, distance, weight);
 }
 
 #[inline(always)]
@@ -88,9 +76,8 @@ fn block(
     octants: Octants,
     distance: &mut [f32; BLOCK],
     weight: &mut [f32; BLOCK],
-) -> usize {
+) {
     weight.fill(0.0);
-    let mut observed = 0;
     for octant in 0..8 {
         let (mut d, mut w) = ([view.truncation; LANES], [view.carve_weight; LANES]);
         if octants.mixed >> octant & 1 == 1 {
@@ -98,14 +85,12 @@ fn block(
         } else if octants.free >> octant & 1 == 0 {
             continue;
         }
-        observed += w.iter().map(|&w| u32::from(w > 0.0)).sum::<u32>();
         for row in 0..LANES / 4 {
             let cell = cell_of(octant, 4 * row);
             distance[cell..cell + 4].copy_from_slice(&d[4 * row..4 * row + 4]);
             weight[cell..cell + 4].copy_from_slice(&w[4 * row..4 * row + 4]);
         }
     }
-    observed as usize
 }
 
 /// Where 64 points fall: the pixel left above of each, and how far right below of its center.
@@ -274,8 +259,8 @@ mod tests {
         let centers = BlockCenters { first, steps: [[0.08, 0.06, 0.0], [-0.06, 0.08, 0.0], [0.0, 0.0, 0.1]] };
         let [mut a, mut b, mut c, mut d] = [[0.0f32; BLOCK]; 4];
         let octants = Octants { free: 4, mixed: 0xfb, complete: 0 };
-        let observed = observe_block(&view, &centers, octants, &mut a, &mut b);
-        assert_eq!(observed, observe_block_plain(&view, &centers, octants, &mut c, &mut d));
+        observe_block(&view, &centers, octants, &mut a, &mut b);
+        block(&view, &centers, octants, &mut c, &mut d);
         let bits = |v: &[f32]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&b), bits(&d));
         let said = |d: &[f32], w: &[f32]| {

@@ -2,7 +2,7 @@
 
 use super::bands::each_row;
 use super::projector::Projector;
-use crate::geom::vector::{dot, norm, sub};
+use crate::geom::vector::{cross3, dot, norm, sub};
 use crate::scan::{BeamCounts, MAX_OPENING, MAX_SLOPE, RangeImage, RefusedBeams};
 use crate::sweep::{ScanStats, WeightModel};
 use multiversion::multiversion;
@@ -191,8 +191,7 @@ impl PaddedImage {
                 let ray = sub(here, image.point(column, row, 0.5 * v));
                 let cosine = match (along, down) {
                     (Some(a), Some(b)) => {
-                        let normal =
-                            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+                        let normal = cross3(a, b);
                         dot(normal, ray).abs() / (norm(normal) * norm(ray)).max(1e-30)
                     }
                     // A line of neighbors: the sine of the angle to it.

@@ -140,10 +140,7 @@ impl PlacedImage {
         if !complete && bits != 0 {
             // The window may be wider than the cell: its own pixel must have a reading, or one beside that is within its width.
             let enough = if c >= 2.0 && r >= 2.0 { BESIDE } else { OWN };
-            let mut left = bits;
-            while left != 0 {
-                let i = left.trailing_zeros() as usize;
-                left &= left - 1;
+            for i in crate::sets::bits(bits) {
                 let readings = self.readings_at(pixels.column[i], pixels.row[i]);
                 bits &= !(u64::from(readings & enough == 0) << i);
             }

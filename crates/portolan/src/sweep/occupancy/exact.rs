@@ -6,7 +6,7 @@ use crate::geom::vector::{along, distance, dot, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, RayWalk};
 use crate::parallel;
 use crate::scan::RefusedBeams;
-use crate::sweep::{LONGEST_RAY_CELLS, clip};
+use crate::sweep::{LONGEST_RAY_CELLS, PlanError, clip};
 
 /// One beam in the world's frame (metres).
 #[derive(Clone, Copy, Debug)]
@@ -29,10 +29,6 @@ pub(crate) struct Tally {
     /// Those among them with a surface.
     pub(crate) refused_hits: u64,
 }
-
-/// The rays touch more bricks than they may.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct TooManyBricks;
 
 /// Walks every beam through the cells (Amanatides & Woo 1987): each cell that beams pass gets one miss a scan, each in
 /// which one ends one hit, and a hit overrules misses (Hornung et al. 2013, as in OctoMap's `computeUpdate`). The cell in
@@ -62,38 +58,30 @@ impl ExactRays {
         ray: impl Fn(usize) -> Ray + Sync,
         further: &[Ray],
         most: usize,
-    ) -> Result<Tally, TooManyBricks> {
+    ) -> Result<Tally, PlanError> {
         let parts = parallel::threads().min(count / RAYS_A_PART).max(1);
         self.parts.resize_with(parts.max(self.parts.len()), BrickMasks::default);
         let range = |part: usize| part * count / parts..(part + 1) * count / parts;
         let mut boxes = vec![Aabb::EMPTY; parts];
-        parallel::for_each(
-            boxes.iter_mut().enumerate(),
-            || (),
-            |(i, b), ()| {
-                let short = |r: &Ray| bounds.is_some() || !is_long(lattice, r);
-                *b = extent(lattice, range(i).map(&ray).filter(short))
-            },
-        );
+        parallel::each(boxes.iter_mut().enumerate(), |(i, b)| {
+            let short = |r: &Ray| bounds.is_some() || !is_long(lattice, r);
+            *b = extent(lattice, range(i).map(&ray).filter(short))
+        });
         let all = boxes.into_iter().fold(extent(lattice, further.iter().copied()), Aabb::union);
         let (first, last) = reach(lattice, bounds, all);
         self.reach = Some((first, last));
         let mut tallies = vec![Tally::default(); parts];
         let jobs =
             self.parts[..parts].iter_mut().zip(&mut tallies).enumerate().map(|(i, (m, t))| (range(i), m, t));
-        parallel::for_each(
-            jobs,
-            || (),
-            |(range, masks, tally), ()| {
-                masks.begin(first, last);
-                for i in range {
-                    mark(masks, lattice, bounds, ray(i), tally);
-                    if masks.len() > most {
-                        break;
-                    }
+        parallel::each(jobs, |(range, masks, tally)| {
+            masks.begin(first, last);
+            for i in range {
+                mark(masks, lattice, bounds, ray(i), tally);
+                if masks.len() > most {
+                    break;
                 }
-            },
-        );
+            }
+        });
         let (whole, others) = self.parts[..parts].split_at_mut(1);
         let mut fits = whole[0].len() <= most;
         for part in others {
@@ -106,7 +94,7 @@ impl ExactRays {
         if !fits {
             // Together with the memory.
             *self = Self::default();
-            return Err(TooManyBricks);
+            return Err(PlanError::TooManyBlocks);
         }
         (self.keys, self.slots) = whole[0].sorted().into_iter().unzip();
         Ok(tallies.iter().fold(Tally::default(), |a, b| Tally {
@@ -213,8 +201,7 @@ fn extent(lattice: &Lattice<3>, rays: impl Iterator<Item = Ray> + Clone) -> Aabb
 /// The bricks of a box, as far as it is inside of the bounds, with a margin for rounding.
 fn reach(lattice: &Lattice<3>, bounds: Option<&Aabb<3>>, mut all: Aabb<3>) -> (BlockKey<3>, BlockKey<3>) {
     if let Some(b) = bounds {
-        all.min = std::array::from_fn(|k| all.min[k].max(b.min[k]));
-        all.max = std::array::from_fn(|k| all.max[k].min(b.max[k]));
+        all = all.intersection(*b);
     }
     if all.is_empty() {
         return (BlockKey([0; 3]), BlockKey([-1; 3]));
@@ -378,7 +365,7 @@ mod tests {
         // As many rays as are shared out to threads.
         sweep.plan(&lattice, None, 5000, ray, &[], usize::MAX).unwrap();
         let touched = sweep.keys().len();
-        assert_eq!(sweep.plan(&lattice, None, 5000, ray, &[], touched - 1), Err(TooManyBricks));
+        assert_eq!(sweep.plan(&lattice, None, 5000, ray, &[], touched - 1), Err(PlanError::TooManyBlocks));
         assert!(sweep.keys().is_empty());
         assert!(sweep.plan(&lattice, None, 5000, ray, &[], touched).is_ok());
         assert_eq!(sweep.keys().len(), touched);

@@ -1,6 +1,6 @@
 //! Hits and misses of 3-D scans, brick by brick: exact rays, or exact ends and misses through a range image.
 
-use super::exact::{ExactRays, Ray, Tally, TooManyBricks};
+use super::exact::{ExactRays, Ray, Tally};
 use super::masks::Bits;
 use crate::cell::HitMiss;
 use crate::geom::{BlockKey, Lattice, Pose};
@@ -105,15 +105,14 @@ impl<S: ?Sized> HitMissSweep<S> {
             || exact.plan(lattice, bounds, rays.count, &rays.ray, &further, most),
             || rays.view.into_iter().for_each(|view| misses.take(view.image, view.world_from_image, lattice)),
         );
-        let mut tally = planned.map_err(|TooManyBricks| PlanError::TooManyBlocks)?;
+        let mut tally = planned?;
         let is_searched = match (rays.view, exact.reach()) {
             (Some(_), Some((first, last))) => misses.find_blocks(first, last),
             _ => true,
         };
         if !is_searched {
             let passing = |i: usize| Ray { passes: true, ..(rays.ray)(i) };
-            let planned = exact.plan(lattice, bounds, rays.count, passing, &[], most);
-            tally = planned.map_err(|TooManyBricks| PlanError::TooManyBlocks)?;
+            tally = exact.plan(lattice, bounds, rays.count, passing, &[], most)?;
         }
         self.unite();
         Ok(stats(rays.hits, rays.count, tally))

@@ -85,9 +85,9 @@ fn least_weight<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::DistanceBrick;
     use crate::field::EsdfSettings;
     use crate::geom::Lattice;
+    use crate::testing::brick;
 
     /// Free space between a wall at x = 0.53 that was seen four times and one at x = 3.07 that was seen once.
     fn between_two_walls<const D: usize>() {
@@ -96,11 +96,9 @@ mod tests {
         for x in 0..5 {
             let key = BlockKey(std::array::from_fn(|k| if k == 0 { x } else { 0 }));
             let at = |i| lattice.center(key.cell(i))[0];
-            let distances: Vec<f32> =
-                (0..block_cells::<D>()).map(|i| (at(i) - 0.53).min(3.07 - at(i)) as f32).collect();
-            let weights: Vec<f32> =
-                (0..block_cells::<D>()).map(|i| if at(i) < 1.8 { 4.0 } else { 1.0 }).collect();
-            map.insert(key, DistanceBrick::from_parts(&distances, &weights).unwrap()).unwrap();
+            let distance = |i| (at(i) - 0.53).min(3.07 - at(i)) as f32;
+            let brick = brick::<D>(|i| Some((distance(i), if at(i) < 1.8 { 4.0 } else { 1.0 })));
+            map.insert(key, brick).unwrap();
         }
         let esdf =
             Esdf::of(&map, &EsdfSettings { min_weight: Some(0.5), max_distance: 3.0, ..Default::default() });

@@ -141,7 +141,7 @@ impl<const D: usize> Block<D> {
 mod tests {
     use super::*;
     use crate::field::esdf::surface::simplex_distance_sq;
-    use crate::field::esdf::surface::testing::Random;
+    use crate::testing::Random;
 
     fn is_the_distance_in_f64<const D: usize>() {
         let mut random = Random(4);

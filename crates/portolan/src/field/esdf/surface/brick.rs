@@ -4,6 +4,7 @@ use super::cube::{CellSurface, edge_start};
 use super::nodes::Nodes;
 use crate::cell::SignedDistance;
 use crate::geom::{BlockKey, block_cells};
+use crate::sets::{bits, bits_of};
 use crate::store::Bricks;
 
 /// A crossing that the cells of a brick use.
@@ -54,10 +55,7 @@ impl<const D: usize> Scratch<D> {
 
     /// Counts the crossings of the cell at `x`, `row` of the brick in.
     fn use_edges(&mut self, x: usize, row: usize) {
-        let mut left = self.cell.crossed;
-        while left != 0 {
-            let edge = left.trailing_zeros() as usize;
-            left &= left - 1;
+        for edge in bits(self.cell.crossed.into()) {
             let (axis, corner) = edge_start::<D>(edge);
             let [x, y, z] = [x + (corner & 1), (row & 7) + (corner >> 1 & 1), (row >> 3) + (corner >> 2)];
             let octant = x >> 3 | (y >> 3) << 1 | (z >> 3) << 2;
@@ -136,17 +134,8 @@ impl<const D: usize> BrickElements<D> {
 
     /// The cells with surface (places in the brick, ascending), and their simplices.
     pub(crate) fn cells(&self) -> impl Iterator<Item = (usize, &[[[f32; D]; D]])> {
-        let places = self.cells.iter().enumerate().flat_map(|(word, &cells)| {
-            let mut left = cells;
-            std::iter::from_fn(move || {
-                let bit = left.trailing_zeros() as usize;
-                let some = left != 0;
-                left &= left.wrapping_sub(1);
-                some.then_some(64 * word + bit)
-            })
-        });
         let ranges = self.starts.windows(2).map(|s| usize::from(s[0])..usize::from(s[1]));
-        places.zip(ranges).map(|(at, range)| (at, &self.simplices[range]))
+        bits_of(&self.cells).zip(ranges).map(|(at, range)| (at, &self.simplices[range]))
     }
 
     /// Cells with surface in a row of the brick (`y + 8 z`), a bit each.

@@ -1,12 +1,13 @@
 //! Elements against the extracted surfaces.
 
 use super::SurfaceElements;
-use super::testing::{Noise, Random, noise_brick};
+use super::testing::{Noise, noise_brick};
 use crate::cell::{Planes, SignedDistance};
 use crate::geom::{BlockKey, Grid, Lattice, block_cells};
 use crate::map::{DenseTsdf, TsdfConfig};
 use crate::store::{Bricks, Store};
 use crate::surface::{ContourSettings, MeshSettings, marching_cubes, marching_squares};
+use crate::testing::{Random, with_threads};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -171,11 +172,8 @@ proptest! {
         mesh(seed, noise);
     }
     #[test]
-    fn following_equals_starting_again_2d(seed: u64, noise in noise()) {
+    fn following_equals_starting_again_2d_and_3d(seed: u64, noise in noise()) {
         following_equals_starting_again::<2>(seed, noise);
-    }
-    #[test]
-    fn following_equals_starting_again_3d(seed: u64, noise in noise()) {
         following_equals_starting_again::<3>(seed, noise);
     }
 }
@@ -199,10 +197,7 @@ fn threads_do_not_change_a_byte() {
         let brick = noise_brick::<3>(&mut random, Noise { holes: 2, zeros: 2 });
         store.insert(BlockKey([n % 4, n / 4 % 4, n / 16]), brick).unwrap();
     }
-    let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| SurfaceElements::of(&store, 0.5))
-    };
+    let with = |threads| with_threads(threads, || SurfaceElements::of(&store, 0.5));
     let (one, three) = (with(1), with(3));
     assert_eq!(one.keys(), three.keys());
     for key in one.keys() {

@@ -155,11 +155,10 @@ fn some_bricks() -> impl Strategy<Value = Vec<[i32; 3]>> {
 
 proptest! {
     #[test]
-    fn matches_brute_force_2d(c in crossings(), b in some_bricks(), limit in prop_oneof![0.5f32..30.0, 30.0..2000.0f32]) {
+    fn matches_brute_force_2d_and_3d(
+        c in crossings(), b in some_bricks(), limit in prop_oneof![0.5f32..30.0, 30.0..2000.0f32],
+    ) {
         matches_brute_force::<2>(&c, &b, limit);
-    }
-    #[test]
-    fn matches_brute_force_3d(c in crossings(), b in some_bricks(), limit in prop_oneof![0.5f32..30.0, 30.0..2000.0f32]) {
         matches_brute_force::<3>(&c, &b, limit);
     }
 }

@@ -53,17 +53,13 @@ impl<'a, const D: usize> SeedMap<'a, D> {
         let mut found: Vec<(bool, Option<Witness<D>>)> = vec![(false, None); keys.len()];
         // A brick is too little for a task.
         let tasks = keys.chunks(SURVEYED).zip(found.chunks_mut(SURVEYED));
-        parallel::for_each(
-            tasks,
-            || (),
-            |(keys, found), ()| {
-                for (&key, found) in keys.iter().zip(found) {
-                    if let Some(brick) = store.brick(key) {
-                        *found = look(key, brick, &farthest, rule);
-                    }
+        parallel::each(tasks, |(keys, found)| {
+            for (&key, found) in keys.iter().zip(found) {
+                if let Some(brick) = store.brick(key) {
+                    *found = look(key, brick, &farthest, rule);
                 }
-            },
-        );
+            }
+        });
         let (mut observed, mut witnesses, mut seeded) = (Vec::new(), Vec::new(), Vec::new());
         for (key, (_, witness)) in keys.into_iter().zip(found).filter(|(_, found)| found.0) {
             observed.push(key);
