@@ -13,15 +13,8 @@ use std::time::Instant;
 fn main() -> Result<(), MapError> {
     let world = apartment().world;
     let log = lap(&world, &LapConfig::default());
-    let settings = GallerySettings {
-        grid: Grid::new([0.0; 2], 0.05, [240, 180]),
-        tsdf: Default::default(),
-        model: Default::default(),
-        contour: Default::default(),
-        esdf: Default::default(),
-        probes: 100_000,
-        surface_length: Some(world.wall_length()),
-    };
+    let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
+    let settings = GallerySettings::new(grid, 100_000, Some(world.wall_length()));
     let start = Instant::now();
     let gallery = run(&log, &settings, None, &mut || start.elapsed().as_secs_f64())?;
     let field = gallery.rows.iter().find(|r| r.name.starts_with("ESDF")).and_then(|r| r.distance);

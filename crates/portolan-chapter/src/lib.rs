@@ -29,15 +29,8 @@
 //!
 //! let world = apartment().world;
 //! let log = lap(&world, &LapConfig { scans: 20, ..Default::default() });
-//! let settings = GallerySettings {
-//!     grid: Grid::new([0.0; 2], 0.1, [120, 90]),
-//!     tsdf: Default::default(),
-//!     model: Default::default(),
-//!     contour: Default::default(),
-//!     esdf: Default::default(),
-//!     probes: 1000,
-//!     surface_length: Some(world.wall_length()),
-//! };
+//! let grid = Grid::new([0.0; 2], 0.1, [120, 90]);
+//! let settings = GallerySettings::new(grid, 1000, Some(world.wall_length()));
 //! let start = std::time::Instant::now();
 //! let gallery = run(&log, &settings, Some(&world as &dyn Truth<2>), &mut || start.elapsed().as_secs_f64())?;
 //! assert_eq!(gallery.rows.len(), 8);

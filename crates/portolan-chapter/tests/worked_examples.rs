@@ -100,13 +100,8 @@ fn chapter19_esdf_against_exact_distance() {
         let (worst_under, worst_over) = (-quantile(&mut signed, 0.0), quantile(&mut signed, 1.0));
         let mut sizes: Vec<f64> = signed.iter().map(|e| e.abs()).collect();
         let (median, p99) = (quantile(&mut sizes, 0.5), quantile(&mut sizes, 0.99));
-        println!(
-            "{name}: median {:.1} mm, p99 {:.1} mm, worst over {:.1} mm, worst under {:.1} mm, {over} of 4000 over by 5 cm",
-            1e3 * median,
-            1e3 * p99,
-            1e3 * worst_over,
-            1e3 * worst_under
-        );
+        let told = [median, p99, worst_over, worst_under].map(|v| format!("{:.1} mm", 1e3 * v)).join(", ");
+        println!("{name}: median, p99, worst over and under {told}; {over} of 4000 over by 5 cm");
         assert!(median < 0.03 && p99 < 0.075 && worst_under < 0.282);
         assert!(over <= 40, "{over} points are over-estimated by 5 cm");
         let steep =

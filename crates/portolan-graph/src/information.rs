@@ -1,7 +1,7 @@
 //! The information matrix of an edge.
 
 use crate::error::GraphError;
-use crate::sparse::Block;
+use crate::sparse::{Block, cholesky};
 use crate::tangent::tangent_dimension;
 
 /// The information matrix of an edge: the inverse of the covariance of its residual, symmetric and positive
@@ -74,23 +74,19 @@ impl<const D: usize> Information<D> {
     }
 
     fn check(&self) -> Result<(), GraphError> {
-        let n = tangent_dimension(D);
         if !self.matrix.iter().flatten().all(|v| v.is_finite()) {
             return Err(GraphError::InformationNotFinite);
         }
-        let mut l = [[0.0; 6]; 6];
-        for c in 0..n {
-            let pivot = self.matrix[c][c] - (0..c).map(|k| l[c][k] * l[c][k]).sum::<f64>();
-            if !(pivot.is_finite() && pivot > 1e-13 * self.matrix[c][c]) {
-                return Err(GraphError::InformationNotPositive { row: c, pivot });
-            }
-            l[c][c] = pivot.sqrt();
-            for r in c + 1..n {
-                let sum = (0..c).map(|k| l[r][k] * l[c][k]).sum::<f64>();
-                l[r][c] = (self.matrix[r][c] - sum) / l[c][c];
-            }
+        match D {
+            2 => self.positive::<3>(),
+            _ => self.positive::<6>(),
         }
-        Ok(())
+    }
+
+    fn positive<const B: usize>(&self) -> Result<(), GraphError> {
+        let diagonal = std::array::from_fn(|k| self.matrix[k][k]);
+        let factor = cholesky::<B>(&self.block(), &diagonal, 1e-13);
+        factor.map(|_| ()).map_err(|(row, pivot)| GraphError::InformationNotPositive { row, pivot })
     }
 }
 

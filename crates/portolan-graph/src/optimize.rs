@@ -97,16 +97,16 @@ impl<const D: usize, const B: usize> Descent<D, B> {
         let system = System::new(graph, held);
         Self {
             poses: graph.vertices.iter().map(|v| v.world_from_vertex).collect(),
-            h: SymmetricBlocks::zero(&system.pattern),
-            g: vec![[0.0; B]; system.free.len()],
-            factor: Cholesky::new(&system.pattern),
+            h: SymmetricBlocks::zero(&system.at.pattern),
+            g: vec![[0.0; B]; system.at.free.len()],
+            factor: Cholesky::new(&system.at.pattern),
             system,
         }
     }
 
     /// Runs the approaches of the settings and keeps the result with the lowest cost.
     fn run(mut self, settings: &Settings, report: &mut Report) -> Result<Self, GraphError> {
-        report.factor_blocks = self.system.pattern.factor_blocks();
+        report.factor_blocks = self.system.at.pattern.factor_blocks();
         let direct = |s: &mut Self| s.descend(settings.kernel, settings.relative_tolerance, settings);
         let Some(k) = settings.kernel.scale() else {
             direct(&mut self)?.write_to(report, 0);
@@ -199,7 +199,7 @@ impl<const D: usize, const B: usize> Descent<D, B> {
 
     /// The poses after a damped step, and the decrease of the cost that the linear model predicts.
     fn step(&mut self, damping: f64) -> Option<(Vec<Pose<D>>, f64)> {
-        let pattern = &self.system.pattern;
+        let pattern = &self.system.at.pattern;
         self.factor.factor(pattern, &self.h, damping)?;
         let step = self.factor.solve(pattern, &self.g);
         let mut poses = self.poses.clone();
@@ -209,14 +209,14 @@ impl<const D: usize, const B: usize> Descent<D, B> {
             for k in 0..B {
                 predicted += step[k] * (damping * diagonal[k] * step[k] + g[k]);
             }
-            let vertex = self.system.free[variable];
+            let vertex = self.system.at.free[variable];
             poses[vertex] = rigid(stepped(&poses[vertex], step))?;
         }
         Some((poses, predicted))
     }
 
     fn write(self, graph: &mut PoseGraph<D>) {
-        for &vertex in &self.system.free {
+        for &vertex in &self.system.at.free {
             graph.vertices[vertex].world_from_vertex = self.poses[vertex];
         }
     }

@@ -2,18 +2,43 @@
 
 use portolan::geom::Pose;
 
-use crate::graph::{EdgeKind, PoseGraph, quadratic};
+use crate::graph::{Edge, EdgeKind, PoseGraph, quadratic};
 use crate::kernel::Kernel;
 use crate::sparse::{Block, Pattern, SymmetricBlocks};
 use crate::tangent::{error_pose, linearize, residual};
 
-/// The edges of a graph prepared for many linearizations, and the numbering of its free vertices.
-pub(crate) struct System<const D: usize, const B: usize> {
+/// The unknowns of a graph: its free vertices, and the pairs of them that edges join.
+pub(crate) struct Numbering {
     pub(crate) pattern: Pattern,
     /// Vertex of each variable.
     pub(crate) free: Vec<usize>,
     /// Variable of each vertex; `None` where it is held.
-    variable: Vec<Option<usize>>,
+    pub(crate) variable: Vec<Option<usize>>,
+    /// For each edge, its number among the pairs of the pattern, where both ends are free.
+    pub(crate) pair: Vec<usize>,
+}
+
+impl Numbering {
+    pub(crate) fn new<const D: usize>(graph: &PoseGraph<D>, held: &[bool]) -> Self {
+        let mut variable = vec![None; held.len()];
+        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
+        for (number, &vertex) in free.iter().enumerate() {
+            variable[vertex] = Some(number);
+        }
+        let (mut pairs, mut pair) = (Vec::new(), Vec::new());
+        for &[i, j] in &graph.ends {
+            pair.push(pairs.len());
+            if let (Some(a), Some(b)) = (variable[i], variable[j]) {
+                pairs.push([a, b]);
+            }
+        }
+        Self { pattern: Pattern::new(free.len(), &pairs), free, variable, pair }
+    }
+}
+
+/// The edges of a graph prepared for many linearizations.
+pub(crate) struct System<const D: usize, const B: usize> {
+    pub(crate) at: Numbering,
     terms: Vec<Term<D, B>>,
 }
 
@@ -22,8 +47,6 @@ struct Term<const D: usize, const B: usize> {
     j_from_i: Pose<D>,
     omega: Block<B>,
     robust: bool,
-    /// Number of the pair of variables in the pattern, where both ends are free.
-    pair: usize,
 }
 
 /// The cost of a set of poses.
@@ -37,34 +60,20 @@ pub(crate) struct Cost {
 
 impl<const D: usize, const B: usize> System<D, B> {
     pub(crate) fn new(graph: &PoseGraph<D>, held: &[bool]) -> Self {
-        let mut variable = vec![None; held.len()];
-        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
-        for (number, &vertex) in free.iter().enumerate() {
-            variable[vertex] = Some(number);
-        }
-        let mut pairs = Vec::new();
-        let mut terms = Vec::with_capacity(graph.edges.len());
-        for (edge, &ends) in graph.edges.iter().zip(&graph.ends) {
-            terms.push(Term {
-                ends,
-                j_from_i: edge.i_from_j.inverse(),
-                omega: edge.information.block(),
-                robust: edge.kind == EdgeKind::Closure,
-                pair: pairs.len(),
-            });
-            if let (Some(a), Some(b)) = (variable[ends[0]], variable[ends[1]]) {
-                pairs.push([a, b]);
-            }
-        }
-        Self { pattern: Pattern::new(free.len(), &pairs), free, variable, terms }
+        let term = |(edge, &ends): (&Edge<D>, &[usize; 2])| Term {
+            ends,
+            j_from_i: edge.i_from_j.inverse(),
+            omega: edge.information.block(),
+            robust: edge.kind == EdgeKind::Closure,
+        };
+        let terms = graph.edges.iter().zip(&graph.ends).map(term).collect();
+        Self { at: Numbering::new(graph, held), terms }
     }
 
     pub(crate) fn cost(&self, poses: &[Pose<D>], kernel: Kernel) -> Cost {
         let mut cost = Cost { chi_square: 0.0, robust: 0.0 };
         for term in &self.terms {
-            let [i, j] = term.ends;
-            let s =
-                quadratic(&residual::<D, B>(&error_pose(&term.j_from_i, &poses[i], &poses[j])), &term.omega);
+            let s = term.chi_square(poses);
             cost.chi_square += s;
             cost.robust += term.kernel(kernel).cost_and_weight(s).0;
         }
@@ -74,11 +83,7 @@ impl<const D: usize, const B: usize> System<D, B> {
     /// The largest chi-square of an edge that kernels apply to.
     pub(crate) fn worst(&self, poses: &[Pose<D>]) -> f64 {
         let robust = self.terms.iter().filter(|term| term.robust);
-        robust.fold(0.0, |worst: f64, term| {
-            let [i, j] = term.ends;
-            let r = residual::<D, B>(&error_pose(&term.j_from_i, &poses[i], &poses[j]));
-            worst.max(quadratic(&r, &term.omega))
-        })
+        robust.fold(0.0, |worst: f64, term| worst.max(term.chi_square(poses)))
     }
 
     /// Fills `h` and `g` (both overwritten) at `poses`.
@@ -91,13 +96,13 @@ impl<const D: usize, const B: usize> System<D, B> {
     ) {
         h.clear();
         g.fill([0.0; B]);
-        for term in &self.terms {
+        for (term, &pair) in self.terms.iter().zip(&self.at.pair) {
             let [i, j] = term.ends;
             let linear = linearize::<D, B>(&term.j_from_i, &poses[i], &poses[j]);
             let s = quadratic(&linear.residual, &term.omega);
             let weight = term.kernel(kernel).cost_and_weight(s).1;
             let omega = term.omega.map(|row| row.map(|v| weight * v));
-            let sides = [(self.variable[i], &linear.by_i), (self.variable[j], &linear.by_j)];
+            let sides = [(self.at.variable[i], &linear.by_i), (self.at.variable[j], &linear.by_j)];
             for (side, jacobian) in sides {
                 let Some(variable) = side else { continue };
                 let pulled = left_product(jacobian, &omega);
@@ -107,18 +112,23 @@ impl<const D: usize, const B: usize> System<D, B> {
                         target[r] -= pulled[r][k] * linear.residual[k];
                     }
                 }
-                add_product(h.diagonal_mut(&self.pattern, variable), &pulled, jacobian);
+                add_product(h.diagonal_mut(&self.at.pattern, variable), &pulled, jacobian);
             }
-            if let (Some(a), Some(b)) = (self.variable[i], self.variable[j]) {
+            if let (Some(a), Some(b)) = (self.at.variable[i], self.at.variable[j]) {
                 let mut block = [[0.0; B]; B];
                 add_product(&mut block, &left_product(&linear.by_i, &omega), &linear.by_j);
-                h.add_pair(&self.pattern, term.pair, [a, b], &block);
+                h.add_pair(&self.at.pattern, pair, [a, b], &block);
             }
         }
     }
 }
 
 impl<const D: usize, const B: usize> Term<D, B> {
+    fn chi_square(&self, poses: &[Pose<D>]) -> f64 {
+        let [i, j] = self.ends;
+        quadratic(&residual::<D, B>(&error_pose(&self.j_from_i, &poses[i], &poses[j])), &self.omega)
+    }
+
     fn kernel(&self, kernel: Kernel) -> Kernel {
         if self.robust { kernel } else { Kernel::None }
     }

@@ -1,5 +1,7 @@
 //! How true the answers are.
 
+use serde::Serialize;
+
 /// The world as it is. The simulator knows it.
 pub trait Truth<const D: usize> {
     /// Signed distance to the nearest true surface (metres), positive in free space.
@@ -7,7 +9,7 @@ pub trait Truth<const D: usize> {
 }
 
 /// Order statistics of signed errors (metres): answer minus truth.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorSummary {
     /// Number of answers compared.
     pub count: usize,

@@ -3,10 +3,11 @@
 use crate::Random;
 use portolan::geom::Pose;
 use portolan::geom::vector::norm;
+use serde::Serialize;
 
 /// How far the wheels are off. Random errors grow with the square root of the way, as sums of independent ones do;
 /// a bias grows with the way itself: it is what makes a lap not close.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OdometryNoise {
     /// Standard deviation of the position after one metre (metres).
     pub position_per_metre: f64,

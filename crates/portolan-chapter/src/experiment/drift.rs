@@ -6,10 +6,10 @@ use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use portolan_graph::GraphError;
 use portolan_sim::ErrorSummary;
-use portolan_sim::{Lap, LapConfig, OdometryNoise, World, lap, measure_motions};
+use portolan_sim::{Lap, LapConfig, World, lap, measure_motions};
 use serde_json::{Value, json};
 
-use crate::poses::{CorrectedLap, CorrectionSettings, ErrorMeasures, PoseErrors, correct};
+use crate::poses::{CorrectedLap, CorrectionSettings, PoseErrors, correct};
 
 /// Which poses the maps are made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,23 +132,16 @@ impl Drift {
 
     /// Metres and radians.
     pub fn to_json(&self) -> Value {
-        let errors = |e: &PoseErrors| json!({ "translation": measures(&e.translation), "rotation": measures(&e.rotation) });
+        let errors = |e: &PoseErrors| json!({ "translation": e.translation, "rotation": e.rotation });
         let relative = |set| errors(&PoseErrors::relative(self.poses(set), &self.truth, 10));
         let contour = |k: usize| self.contours[k].map(|e| json!({ "median": e.median, "p95": e.p95 }));
         let rounds = self.lap.rounds.iter().map(|r| {
             json!({
-                "candidates": r.candidates, "closures": r.closures, "refused": r.refused.total(),
+                "candidates": r.candidates, "closures": r.closures, "refused": r.refused,
                 "iterations": r.report.iterations,
                 "chi_square": [r.report.chi_square.first(), r.report.chi_square.last()],
             })
         });
-        let OdometryNoise {
-            position_per_metre,
-            heading_per_metre,
-            heading_per_radian,
-            scale_bias,
-            heading_bias_per_metre,
-        } = CorrectionSettings::default().odometry;
         json!({
             "used": self.chosen.name(),
             "odometry": errors(&self.before),
@@ -156,11 +149,7 @@ impl Drift {
             "relative_over_10_scans": {
                 "odometry": relative(PoseSet::Odometry), "optimised": relative(PoseSet::Optimised),
             },
-            "odometry_noise": {
-                "position_per_metre": position_per_metre, "heading_per_metre": heading_per_metre,
-                "heading_per_radian": heading_per_radian, "scale_bias": scale_bias,
-                "heading_bias_per_metre": heading_bias_per_metre,
-            },
+            "odometry_noise": CorrectionSettings::default().odometry,
             "closures": self.lap.closures.len(),
             "closures_disagreeing": self.disagreeing(),
             "rounds": rounds.collect::<Vec<_>>(),
@@ -171,7 +160,7 @@ impl Drift {
     /// The same for people.
     pub fn lines(&self) -> Vec<String> {
         let closures = self.lap.closures.len();
-        let refused = self.lap.rounds.last().map_or(0, |r| r.refused.total());
+        let refused = self.lap.rounds.last().map_or(0, |r| r.refused);
         let mut lines = vec![
             format!("odometry:  {}", self.before),
             format!("optimised: {}   ({closures} loop closures, {refused} refused)", self.after),
@@ -187,8 +176,4 @@ impl Drift {
         }
         lines
     }
-}
-
-fn measures(e: &ErrorMeasures) -> Value {
-    json!({ "mean": e.mean, "rms": e.rms, "median": e.median, "max": e.max })
 }

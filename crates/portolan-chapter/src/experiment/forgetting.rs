@@ -1,6 +1,6 @@
 //! The ghost of the chair: three maps that forget at different rates, and what forgetting costs them.
 
-use crate::ghost::{Ghost, GhostGroup, GhostSettings, ghost, static_noise};
+use crate::ghost::{Ghost, GhostSettings, ghost, static_noise};
 use portolan::map::MapError;
 use portolan_sim::LapConfig;
 use serde_json::{Value, json};
@@ -33,32 +33,13 @@ impl Forgetting {
 
     /// `ghost.json`; meters, and re-observations where nothing else is said.
     pub fn to_json(&self) -> Value {
-        let runs = self.ghost.per_w_max.iter().map(|run| {
-            let noise = run.static_noise.map(|n| {
-                json!({
-                    "cells": n.cells, "observation": n.observation, "weight": n.weight,
-                    "measured": n.measured, "predicted": n.predicted,
-                    "crossings": n.crossings, "crossing": n.crossing,
-                })
-            });
-            json!({
-                "w_max": run.w_max,
-                "laps_before": run.laps_before,
-                "laps_until_saturated": run.laps_until_saturated,
-                "laps_after": run.laps_after,
-                "measured": group(&run.measured),
-                "unclamped": group(&run.unclamped),
-                "tapered": group(&run.tapered),
-                "static_noise": noise,
-            })
-        });
         json!({
             "seed": self.settings.lap.seed,
             "scans_per_lap": self.settings.lap.scans,
             "resolution": self.settings.resolution,
             "truncation": self.settings.truncation,
             "prediction": "ln 2 / ln(1 + w / W_max)",
-            "runs": runs.collect::<Vec<_>>(),
+            "runs": self.ghost.per_w_max,
         })
     }
 
@@ -107,19 +88,4 @@ pub fn shown(half_life: f64) -> String {
         h if h.is_infinite() => "never".to_owned(),
         h => format!("{h:.2}"),
     }
-}
-
-fn group(g: &GhostGroup) -> Value {
-    let finite = |v: f64| v.is_finite().then_some(v);
-    json!({
-        "cells": g.cells,
-        "halved": g.halved,
-        "half_life": finite(g.half_life_measured),
-        "half_life_predicted": finite(g.half_life_predicted),
-        "half_life_of_gains": finite(g.half_life_of_gains),
-        "weight": finite(g.weight),
-        "weight_at_move": finite(g.weight_at_move),
-        "observations_per_lap": finite(g.observations_per_lap),
-        "curve": g.curve,
-    })
 }

@@ -22,16 +22,11 @@ pub(super) fn hold_against_truth(gallery: &mut Gallery, asker: &Asker<'_>) {
         asker.wrong(inside),
         None,
     ];
-    let distances = [
-        asker.distance_error(|p| occupancy.search_distance_by_rings(p, limit)),
-        None,
-        None,
-        None,
-        None,
-        asker.distance_error(|p| distance.distance(p).known()),
-        asker.distance_error(|p| contour.nearest_distance(p)),
-        asker.distance_error(|p| gallery.cloud.nearest_distance(p)),
-    ];
+    let rings = asker.distance_error(|p| occupancy.search_distance_by_rings(p, limit));
+    let read = asker.distance_error(|p| distance.distance(p).known());
+    let nearest = asker.distance_error(|p| contour.nearest_distance(p));
+    let cloud = asker.distance_error(|p| gallery.cloud.nearest_distance(p));
+    let distances = [rings, None, None, None, None, read, nearest, cloud];
     let surfaces = [
         asker.surface_error(&contour_of_grid(occupancy)),
         asker.surface_error(&contour_of_tree(&gallery.tree)),

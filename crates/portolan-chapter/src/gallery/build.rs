@@ -33,6 +33,10 @@ impl<M> Fused<M> {
         let update = (clock() - start) / log.len().max(1) as f64;
         Ok(Self { map, update })
     }
+
+    fn row(&self, name: &str, memory_bytes: fn(&M) -> usize, note: String) -> Row {
+        row(name, memory_bytes(&self.map), Cost::direct(self.update), note)
+    }
 }
 
 /// Every map of the log.
@@ -76,38 +80,27 @@ impl Maps {
 
     /// The rows of the maps themselves; what a workload costs comes in the same order: `costs.rs`.
     fn rows(&self, segments: impl Fn(&Tsdf2) -> usize) -> Vec<Row> {
-        let (occupancy, cloud, tsdf) = (&self.occupancy.map, &self.cloud.map, &self.tsdf.map);
-        let nodes = |map: &Quadtree| {
-            format!("{} nodes, {} of them inner", map.store().nodes(), map.store().inner_nodes())
-        };
         let tree = |name, fused: &Fused<Quadtree>| {
-            row(name, fused.map.memory_bytes(), Cost::direct(fused.update), nodes(&fused.map))
+            let store = fused.map.store();
+            let note = format!("{} nodes, {} of them inner", store.nodes(), store.inner_nodes());
+            fused.row(name, Quadtree::memory_bytes, note)
         };
+        let observed = format!("{} cells observed", self.occupancy.map.observed_cells());
         let banded = format!(
             "{} ms without carving, {} segments there",
             format_ms(self.banded.update),
             segments(&self.banded.map)
         );
         let marched = format!("{} segments", segments(&self.marched.map));
-        let built =
-            format!("{} points, tree built in {} ms", cloud.points().len(), format_ms(self.cloud_build));
+        let points = self.cloud.map.points().len();
+        let built = format!("{points} points, tree built in {} ms", format_ms(self.cloud_build));
         vec![
-            row(
-                "occupancy grid, 1 B/cell",
-                occupancy.memory_bytes(),
-                Cost::direct(self.occupancy.update),
-                format!("{} cells observed", occupancy.observed_cells()),
-            ),
+            self.occupancy.row("occupancy grid, 1 B/cell", OccupancyGrid::memory_bytes, observed),
             tree("quadtree, 9 B/inner node, same cells", &self.tree),
             tree("quadtree, 6.25 cm leaves, 16 m root", &self.chapter_tree),
-            row("TSDF, f32 D and W", tsdf.memory_bytes(), Cost::direct(self.tsdf.update), banded),
-            row(
-                "TSDF, the chapter's march",
-                self.marched.map.memory_bytes(),
-                Cost::direct(self.marched.update),
-                marched,
-            ),
-            row("point cloud, k-d tree", cloud.memory_bytes(), Cost::direct(self.cloud.update), built),
+            self.tsdf.row("TSDF, f32 D and W", Tsdf2::memory_bytes, banded),
+            self.marched.row("TSDF, the chapter's march", Tsdf2::memory_bytes, marched),
+            self.cloud.row("point cloud, k-d tree", Cloud::memory_bytes, built),
         ]
     }
 }

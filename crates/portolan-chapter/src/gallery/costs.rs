@@ -130,15 +130,7 @@ mod tests {
         let circle: Vec<[f64; 2]> =
             (0..64).map(|i| f64::from(i) * 0.1).map(|a| [1.5 * a.cos(), 1.5 * a.sin()]).collect();
         let log = [(Pose::<2>::IDENTITY, Scan::from_points(&circle))];
-        let settings = GallerySettings {
-            grid: Grid::new([-2.0; 2], 0.1, [40, 40]),
-            tsdf: Default::default(),
-            model: Default::default(),
-            contour: Default::default(),
-            esdf: Default::default(),
-            probes: 100,
-            surface_length: None,
-        };
+        let settings = GallerySettings::new(Grid::new([-2.0; 2], 0.1, [40, 40]), 100, None);
         // A clock that counts how often it was read: a round of n probes seems to take a 1/n of a second each.
         let mut calls = 0.0;
         let mut clock = || {

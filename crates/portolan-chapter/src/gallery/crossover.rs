@@ -6,6 +6,7 @@ use portolan::cell::OccupancyModel;
 use portolan::geom::{Aabb, Grid, Pose};
 use portolan::map::{Cloud, MapError, Quadtree};
 use portolan::scan::Scan;
+use serde::Serialize;
 
 /// What the chapter's tree stores a node.
 pub(super) const CHAPTER_NODE: &str = "chapter's node, 20 B";
@@ -13,7 +14,7 @@ pub(super) const CHAPTER_NODE: &str = "chapter's node, 20 B";
 pub(super) const OUR_NODE: &str = "our node, 9 B an inner one";
 
 /// The memory of a tree against a dense byte array: the formula beside the measurement.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TreeCrossover {
     /// What the node is.
     pub name: String,

@@ -7,20 +7,14 @@ pub type Clock<'a> = dyn FnMut() -> f64 + 'a;
 
 /// Uniform points in a box, the same for a number in every run (additive recurrence of Roberts 2018: low
 /// discrepancy without a random generator).
-pub(super) fn points<const D: usize>(bounds: &Aabb<D>, n: usize) -> Vec<[f64; D]> {
-    // Root of x^(D+1) = x + 1.
-    let phi: f64 = match D {
-        2 => 1.324_717_957_244_746,
-        _ => 1.220_744_084_605_759_6,
+pub(super) fn points(bounds: &Aabb<2>, n: usize) -> Vec<[f64; 2]> {
+    // Root of x^3 = x + 1.
+    let phi: f64 = 1.324_717_957_244_746;
+    let at = |i: usize, k: usize| {
+        let u = (0.5 + (i + 1) as f64 * phi.powi(-(k as i32 + 1))).fract();
+        bounds.min[k] + u * (bounds.max[k] - bounds.min[k])
     };
-    (0..n)
-        .map(|i| {
-            std::array::from_fn(|k| {
-                let u = (0.5 + (i + 1) as f64 * phi.powi(-(k as i32 + 1))).fract();
-                bounds.min[k] + u * (bounds.max[k] - bounds.min[k])
-            })
-        })
-        .collect()
+    (0..n).map(|i| [at(i, 0), at(i, 1)]).collect()
 }
 
 /// Median seconds a call over five rounds of asking at every point. The answers are folded into a number that

@@ -1,9 +1,10 @@
 //! What is measured of one representation.
 
 use portolan_sim::ErrorSummary;
+use serde::{Deserialize, Serialize};
 
 /// Time of one operation (seconds) and how it is done.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Cost {
     /// Seconds an operation.
     pub seconds: f64,
@@ -22,7 +23,7 @@ impl Cost {
 }
 
 /// One representation of the gallery; `None` where it cannot answer, or, for errors, without a truth.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
     /// What it is.
     pub name: String,
@@ -50,7 +51,8 @@ pub struct Row {
 }
 
 /// The three questions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
 pub enum Workload {
     /// Occupancy probes.
     Occupancy,

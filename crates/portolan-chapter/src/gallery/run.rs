@@ -35,6 +35,21 @@ pub struct GallerySettings {
     pub surface_length: Option<f64>,
 }
 
+impl GallerySettings {
+    /// The textbook's maps over these cells, asked at so many points.
+    pub fn new(grid: Grid<2>, probes: usize, surface_length: Option<f64>) -> Self {
+        Self {
+            grid,
+            tsdf: Default::default(),
+            model: Default::default(),
+            contour: Default::default(),
+            esdf: Default::default(),
+            probes,
+            surface_length,
+        }
+    }
+}
+
 /// Everything that was built and measured.
 #[derive(Debug)]
 pub struct Gallery {

@@ -1,9 +1,10 @@
 //! Cells followed from re-observation to re-observation, and what those that share a fate have in common.
 
 use portolan::cell::{FusionEvent, TsdfRule};
+use serde::Serialize;
 
-/// Cells that share a fate.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Cells that share a fate. As JSON what is not finite is `null`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct GhostGroup {
     /// Number of cells.
     pub cells: usize,
@@ -11,6 +12,7 @@ pub struct GhostGroup {
     pub halved: usize,
     /// Re-observations until half of the error was lost: the median over the cells, those that never do included as
     /// infinite. NaN without cells.
+    #[serde(rename = "half_life")]
     pub half_life_measured: f64,
     /// `ln 2 / ln(1 + w / W_max)` for the median weight of a full observation. NaN without cells.
     pub half_life_predicted: f64,

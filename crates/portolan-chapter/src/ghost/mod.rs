@@ -13,6 +13,6 @@ mod static_noise;
 mod watch;
 
 pub use followed::GhostGroup;
-pub use run::{Ghost, GhostRun, GhostSettings, ghost};
+pub use run::{Ghost, GhostRun, GhostSettings, chair, ghost};
 pub use static_noise::{StaticNoise, static_noise};
 pub use watch::GhostWatch;

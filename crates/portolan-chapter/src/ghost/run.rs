@@ -5,10 +5,12 @@
 //! re-observation. By the theory it halves every `ln 2 / ln(1 + w / W_max)` of them.
 
 use super::{GhostGroup, GhostWatch, StaticNoise, static_noise};
+use portolan::cell::SignedDistance;
 use portolan::geom::{Aabb, Grid};
 use portolan::map::{BeamSweep, MapError, Tsdf2, TsdfConfig};
 use portolan::sweep::WeightModel;
 use portolan_sim::{CHAIR_MOVE, LapConfig, World, apartment, lap};
+use serde::Serialize;
 
 /// How the experiment is done.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +64,7 @@ pub struct Ghost {
 }
 
 /// What one map remembered.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GhostRun {
     /// The clamp.
     pub w_max: f32,
@@ -110,7 +112,7 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
     for &w_max in &settings.w_max {
         runs.push(Run {
             w_max,
-            tsdf: Tsdf2::covering(&grid, config(settings, w_max))?,
+            tsdf: Tsdf2::covering(&grid, map_config(settings, w_max))?,
             saturated_after: None,
             laps_before: 0,
             laps_after: 0,
@@ -127,7 +129,7 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
             }
             run.laps_before = k + 1;
             let all = old_place(&run.tsdf, places[0]);
-            let full = |c: &[i32; 2]| run.tsdf.store_cell(*c).is_some_and(|s| s.weight >= run.w_max);
+            let full = |c: &[i32; 2]| state(&run.tsdf, *c).is_some_and(|s| s.weight >= run.w_max);
             if all.iter().all(full) {
                 run.saturated_after = Some(k + 1);
             }
@@ -154,7 +156,7 @@ pub fn ghost(settings: &GhostSettings) -> Result<Ghost, MapError> {
     Ok(Ghost { per_w_max })
 }
 
-fn config(settings: &GhostSettings, w_max: f32) -> TsdfConfig<2> {
+pub(super) fn map_config(settings: &GhostSettings, w_max: f32) -> TsdfConfig<2> {
     TsdfConfig {
         w_max,
         truncation: settings.truncation,
@@ -164,11 +166,13 @@ fn config(settings: &GhostSettings, w_max: f32) -> TsdfConfig<2> {
     }
 }
 
-fn lap_config(settings: &GhostSettings, k: usize) -> LapConfig {
+/// The `k`-th lap: each has noise of its own.
+pub(super) fn lap_config(settings: &GhostSettings, k: usize) -> LapConfig {
     LapConfig { first_index: settings.lap.first_index + (k * settings.lap.scans) as u64, ..settings.lap }
 }
 
-fn chair(world: &World) -> Aabb<2> {
+/// Where the chair of a world stands.
+pub fn chair(world: &World) -> Aabb<2> {
     world.solids().iter().filter(|s| s.name == "chair").fold(Aabb::EMPTY, |b, s| b.union(s.aabb()))
 }
 
@@ -176,7 +180,7 @@ fn chair(world: &World) -> Aabb<2> {
 pub(crate) fn old_place(tsdf: &Tsdf2, place: Aabb<2>) -> Vec<[i32; 2]> {
     let near = place.grown(tsdf.grid().lattice.resolution);
     let limit = (0.5 * tsdf.config().truncation) as f32;
-    cells_in(tsdf, near).filter(|&c| tsdf.store_cell(c).is_some_and(|s| s.distance < limit)).collect()
+    cells_in(tsdf, near).filter(|&c| state(tsdf, c).is_some_and(|s| s.distance < limit)).collect()
 }
 
 pub(crate) fn cells_in(tsdf: &Tsdf2, place: Aabb<2>) -> impl Iterator<Item = [i32; 2]> + '_ {
@@ -184,15 +188,9 @@ pub(crate) fn cells_in(tsdf: &Tsdf2, place: Aabb<2>) -> impl Iterator<Item = [i3
     (0..grid.len()).map(|i| grid.cell(i)).filter(move |&c| place.contains(grid.lattice.center(c)))
 }
 
-/// Shorter words for what is asked often.
-pub(crate) trait StoreCell {
-    fn store_cell(&self, cell: [i32; 2]) -> Option<portolan::cell::SignedDistance>;
-}
-
-impl StoreCell for Tsdf2 {
-    fn store_cell(&self, cell: [i32; 2]) -> Option<portolan::cell::SignedDistance> {
-        self.store().at(self.grid().index(cell)?)
-    }
+/// What the map holds of a cell.
+pub(crate) fn state(tsdf: &Tsdf2, cell: [i32; 2]) -> Option<SignedDistance> {
+    tsdf.store().at(tsdf.grid().index(cell)?)
 }
 
 impl Run {

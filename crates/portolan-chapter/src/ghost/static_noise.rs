@@ -1,18 +1,21 @@
 //! What forgetting costs: a map that forgets never comes to rest.
 
 use super::GhostSettings;
-use portolan::geom::{Aabb, Grid};
-use portolan::map::{MapError, Tsdf2, TsdfConfig};
-use portolan_sim::{LapConfig, apartment, lap};
+use super::run::{chair, lap_config, map_config};
+use portolan::geom::Grid;
+use portolan::map::{MapError, Tsdf2};
+use portolan_sim::{apartment, lap};
+use serde::Serialize;
 
 /// Noise of a map of a world in which nothing moves.
 ///
 /// A lidar that loses no beam makes maps as noisy as predicted (within some percent). Lost beams add to it, more so for
 /// large clamps: single views are biased, each in its own way (projective distances), and a view that is
 /// missing in one lap moves the mean of the others.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StaticNoise {
-    /// The clamp of the weight.
+    /// The clamp of the weight; as JSON that of its [`GhostRun`](super::GhostRun).
+    #[serde(skip)]
     pub w_max: f32,
     /// Saturated cells in front of surfaces that were followed.
     pub cells: usize,
@@ -75,21 +78,11 @@ pub fn static_noise(
     laps: usize,
 ) -> Result<Vec<StaticNoise>, MapError> {
     let world = apartment().world;
-    let chair = world.solids().iter().filter(|s| s.name == "chair");
-    let region = chair.fold(Aabb::EMPTY, |b, s| b.union(s.aabb())).grown(1.2);
+    let region = chair(&world).grown(1.2);
     let grid =
         Grid::covering(region, settings.resolution).ok_or(MapError::Resolution(settings.resolution))?;
-    let mut maps = Vec::new();
-    for &w_max in &settings.w_max {
-        let config = TsdfConfig {
-            w_max,
-            truncation: settings.truncation,
-            beams: settings.sweep,
-            weights: settings.weights,
-            ..Default::default()
-        };
-        maps.push(Tsdf2::covering(&grid, config)?);
-    }
+    let map = |&w_max: &f32| Tsdf2::covering(&grid, map_config(settings, w_max));
+    let mut maps = settings.w_max.iter().map(map).collect::<Result<Vec<_>, _>>()?;
     let distance = |cell: [i32; 2]| world.signed_distance(grid.lattice.center(cell));
     let front = (0..grid.len()).map(|i| grid.cell(i));
     let front = front.filter(|&c| (0.0..0.5 * settings.truncation).contains(&distance(c)));
@@ -105,11 +98,7 @@ pub fn static_noise(
     // Snapshots after each lap: [map][lap] planes of distances.
     let mut snapshots = vec![Vec::new(); maps.len()];
     for k in 0..burn_in + laps {
-        let config = LapConfig {
-            first_index: settings.lap.first_index + (k * settings.lap.scans) as u64,
-            ..settings.lap
-        };
-        for (i, (pose, scan)) in lap(&world, &config).iter().enumerate() {
+        for (i, (pose, scan)) in lap(&world, &lap_config(settings, k)).iter().enumerate() {
             for map in &mut maps {
                 map.integrate(pose, scan)?;
             }

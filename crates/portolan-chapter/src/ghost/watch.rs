@@ -1,7 +1,7 @@
 //! The cells of a map that a moved thing concerns, watched from scan to scan.
 
 use super::followed::{Fate, Followed, GhostGroup};
-use super::run::{StoreCell, cells_in, old_place};
+use super::run::{cells_in, old_place, state};
 use portolan::cell::{FusionEvent, TsdfRule};
 use portolan::geom::Aabb;
 use portolan::map::Tsdf2;
@@ -29,7 +29,7 @@ impl GhostWatch {
         chosen.dedup_by_key(|c| c.0);
         let mut cells = Vec::new();
         for (cell, appears) in chosen {
-            let Some(state) = tsdf.store_cell(cell) else { continue };
+            let Some(state) = state(tsdf, cell) else { continue };
             let truth = after.signed_distance(tsdf.grid().lattice.center(cell)).clamp(-tau, tau);
             let (distance_at_move, weight_at_move) = (state.distance.into(), state.weight.into());
             cells.push((

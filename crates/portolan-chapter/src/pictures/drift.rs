@@ -1,9 +1,9 @@
 //! The lap as the wheels have it, and as the pose graph has it.
 
-use portolan_draw::{Entry, Panels, Pen, Swatch, View, color};
-use portolan_sim::World;
+use portolan_draw::{Entry, Panels, Pen, Swatch, color};
 
 use super::Scene;
+use super::layers::truth;
 use crate::experiment::{Drift, PoseSet};
 
 /// Width of a panel (pixels).
@@ -43,29 +43,18 @@ pub fn drift(drift: &Drift, scene: &Scene) -> Vec<u8> {
         let poses = drift.poses(set);
         let ends = drift.end_points(set, scene.log.iter().map(|(_, scan)| scan));
         canvas.dots(view, &ends, 0.7, color::MEASUREMENT.with_alpha(0.35));
-        if let Some(world) = scene.world {
-            walls(&mut canvas, view, world);
-        }
+        truth(&mut canvas, view, scene, 1.3);
         let at = |k: usize| poses[k].translation;
         let closures: Vec<_> = drift.lap.closures.iter().map(|c| [at(c.earlier), at(c.later)]).collect();
         canvas.segments(view, &closures, Pen::new(color::SURFACE.with_alpha(0.45), 1.0));
         let way = |set| drift.poses(set).iter().map(|p| p.translation).collect::<Vec<_>>();
         canvas.polyline(view, &way(set), Pen::new(tone, 2.6));
         canvas.polyline(view, &way(PoseSet::True), Pen::new(color::INK, 1.2).dashed());
-        canvas.dots(
-            view,
-            &poses.first().map(|p| p.translation).into_iter().collect::<Vec<_>>(),
-            5.0,
-            color::INK,
-        );
+        let start: Vec<_> = poses.iter().take(1).map(|p| p.translation).collect();
+        canvas.dots(view, &start, 5.0, color::INK);
     }
     if let Some(view) = views.first() {
         canvas.scale_bar(view);
     }
     canvas.encode_png()
-}
-
-fn walls(canvas: &mut portolan_draw::Canvas, view: &View, world: &World) {
-    let segments: Vec<_> = world.boundary().iter().map(|s| [s.a, s.b]).collect();
-    canvas.segments(view, &segments, Pen::new(color::TRUTH, 1.3).dashed());
 }

@@ -25,8 +25,15 @@ fn runs(forgetting: &Forgetting) -> impl Iterator<Item = (&GhostRun, portolan_dr
     forgetting.ghost.per_w_max.iter().zip(TONES.into_iter().cycle())
 }
 
-fn chart(title: &str, subtitle: &str) -> Chart {
-    Chart::new(title).subtitle(subtitle).x("re-observations since the chair moved").log_x()
+fn chart(forgetting: &Forgetting, title: &str, subtitle: &str) -> Chart {
+    Chart::new(title)
+        .subtitle(subtitle)
+        .x("re-observations since the chair moved")
+        .log_x()
+        .x_range(1.0, longest(forgetting))
+        .y("error left")
+        .y_range(0.0, 1.0)
+        .horizontal(0.5, "half", color::MUTED)
 }
 
 /// Error left after `n` observations, for as long as the measured curve is shown.
@@ -43,13 +50,10 @@ fn longest(forgetting: &Forgetting) -> f64 {
 
 fn measured(forgetting: &Forgetting) -> Chart {
     let mut chart = chart(
+        forgetting,
         "Saturated cells seen as free: the filter's own rate",
         "Median error of the cells, as a part of the error when the chair moved. Dots: half-lives.",
-    )
-    .y("error left")
-    .y_range(0.0, 1.0)
-    .x_range(1.0, longest(forgetting))
-    .horizontal(0.5, "half", color::MUTED);
+    );
     for (run, tone) in runs(forgetting).filter(|(r, _)| r.measured.cells > 0) {
         let m = &run.measured;
         let name = format!("W_max {}: {:.1}", run.w_max, m.half_life_measured);
@@ -74,22 +78,18 @@ fn measured(forgetting: &Forgetting) -> Chart {
 
 fn deviating(forgetting: &Forgetting) -> Chart {
     let mut chart = chart(
+        forgetting,
         "Cells that do not obey: tapered weights, or not yet clamped",
         "Tapered: seen from behind a surface at least once. Not yet clamped: the gain is higher than the clamp's.",
-    )
-    .y("error left")
-    .y_range(0.0, 1.0)
-    .x_range(1.0, longest(forgetting))
-    .horizontal(0.5, "half", color::MUTED);
+    );
     for (run, tone) in runs(forgetting) {
-        if run.unclamped.cells > 0 {
-            let name = format!("W_max {}, not yet clamped", run.w_max);
-            let shown = run.unclamped.curve.iter().copied();
-            chart = chart.series(Series::line(name, shown, tone.with_alpha(0.55)).width(2.0));
-        }
-        if run.tapered.cells > 0 {
-            let name = format!("W_max {}, tapered", run.w_max);
-            chart = chart.series(Series::line(name, run.tapered.curve.iter().copied(), tone).width(4.5));
+        let groups = [
+            (&run.unclamped, "not yet clamped", tone.with_alpha(0.55), 2.0),
+            (&run.tapered, "tapered", tone, 4.5),
+        ];
+        for (group, what, tone, width) in groups.into_iter().filter(|(group, ..)| group.cells > 0) {
+            let name = format!("W_max {}, {what}", run.w_max);
+            chart = chart.series(Series::line(name, group.curve.iter().copied(), tone).width(width));
         }
     }
     for (n, (run, _)) in runs(forgetting).filter(|(r, _)| r.measured.cells > 0).enumerate() {

@@ -99,11 +99,7 @@ fn log(canvas: &mut Canvas, view: &View, scene: &Scene) {
 fn grid(canvas: &mut Canvas, view: &View, scene: &Scene) {
     let map = &scene.gallery.occupancy;
     let cells = *map.store().grid();
-    canvas.fill_rect(view.rect(), color::UNKNOWN);
-    cell_raster(canvas, view, &cells, |i| match map.store().at(i) {
-        Some(v) => color::occupancy(v.probability(map.rule())),
-        None => color::UNKNOWN,
-    });
+    cell_raster(canvas, view, &cells, |i| Some(color::occupancy(map.store().at(i)?.probability(map.rule()))));
 }
 
 fn tree(canvas: &mut Canvas, view: &View, scene: &Scene) {
@@ -137,32 +133,24 @@ fn tsdf(canvas: &mut Canvas, view: &View, scene: &Scene) {
 fn tsdf_cells(canvas: &mut Canvas, view: &View, scene: &Scene) {
     let map = &scene.gallery.tsdf;
     let truncation = map.config().truncation;
-    canvas.fill_rect(view.rect(), color::UNKNOWN);
-    cell_raster(canvas, view, map.grid(), |i| match map.store().at(i) {
-        Some(cell) => {
-            let tone = color::signed_distance(f64::from(cell.distance), truncation);
-            tone.with_alpha(TSDF_STRENGTH * f64::from(tone.a) / 255.0).over(color::PAPER)
-        }
-        None => color::UNKNOWN,
+    cell_raster(canvas, view, map.grid(), |i| {
+        let tone = color::signed_distance(f64::from(map.store().at(i)?.distance), truncation);
+        Some(tone.with_alpha(TSDF_STRENGTH * f64::from(tone.a) / 255.0).over(color::PAPER))
     });
 }
 
 fn weight(canvas: &mut Canvas, view: &View, scene: &Scene) {
     let map = &scene.gallery.tsdf;
     let most = (0..map.grid().len()).filter_map(|i| map.store().at(i)).map(|c| c.weight).fold(1.0, f32::max);
-    canvas.fill_rect(view.rect(), color::UNKNOWN);
-    cell_raster(canvas, view, map.grid(), |i| match map.store().at(i) {
-        Some(cell) => color::sequential(f64::from(cell.weight / most)),
-        None => color::UNKNOWN,
+    cell_raster(canvas, view, map.grid(), |i| {
+        Some(color::sequential(f64::from(map.store().at(i)?.weight / most)))
     });
 }
 
 fn esdf(canvas: &mut Canvas, view: &View, scene: &Scene) {
     let field = scene.gallery.distance();
-    canvas.fill_rect(view.rect(), color::UNKNOWN);
-    pixel_raster(canvas, view, |p| match field.distance(p).known() {
-        Some(d) => color::signed_distance(d, FAR).over(color::PAPER),
-        None => color::UNKNOWN,
+    pixel_raster(canvas, view, |p| {
+        Some(color::signed_distance(field.distance(p).known()?, FAR).over(color::PAPER))
     });
     let grid = field.grid();
     let samples = field.samples();
@@ -183,18 +171,14 @@ fn esdf(canvas: &mut Canvas, view: &View, scene: &Scene) {
 }
 
 fn esdf_error(canvas: &mut Canvas, view: &View, scene: &Scene) {
-    canvas.fill_rect(view.rect(), color::UNKNOWN);
-    let Some(world) = scene.world else { return };
     let field = scene.gallery.distance();
     cell_raster(canvas, view, field.grid(), |i| {
         let p = field.grid().lattice.center(field.grid().cell(i));
         let d = f64::from(field.samples()[i]);
-        let truth = world.signed_distance(p);
-        match d.is_nan() || d < 0.0 || truth < 0.0 {
-            true => color::UNKNOWN,
-            // Orange where the answer is too large, which a planner must fear; blue where it is too small.
-            false => color::signed_distance(truth - d, ERROR).over(color::PAPER),
-        }
+        let truth = scene.world?.signed_distance(p);
+        // Orange where the answer is too large, which a planner must fear; blue where it is too small.
+        let error = color::signed_distance(truth - d, ERROR).over(color::PAPER);
+        (d >= 0.0 && truth >= 0.0).then_some(error)
     });
     truth(canvas, view, scene, 1.0);
 }
@@ -217,7 +201,7 @@ fn close_up(canvas: &mut Canvas, view: &View, scene: &Scene) {
 }
 
 /// The true surfaces, dashed.
-fn truth(canvas: &mut Canvas, view: &View, scene: &Scene, width: f64) {
+pub(super) fn truth(canvas: &mut Canvas, view: &View, scene: &Scene, width: f64) {
     let Some(world) = scene.world else { return };
     let segments: Vec<_> = world.boundary().iter().map(|s| [s.a, s.b]).collect();
     canvas.segments(view, &segments, Pen::new(color::TRUTH, width).dashed());
@@ -240,18 +224,20 @@ fn cell_lines(canvas: &mut Canvas, view: &View, grid: &Grid<2>) {
     canvas.segments(view, &lines, pen);
 }
 
-/// One color per cell, by the cell's index.
-fn cell_raster(canvas: &mut Canvas, view: &View, grid: &Grid<2>, color: impl Fn(usize) -> Color) {
+/// One color per cell, by the cell's index; unknown where there is none, and around the cells.
+fn cell_raster(canvas: &mut Canvas, view: &View, grid: &Grid<2>, tone: impl Fn(usize) -> Option<Color>) {
     let (origin, r) = (grid.lattice.origin, grid.lattice.resolution);
-    canvas.raster(view, grid.shape, origin, r, |[x, y]| color(y * grid.shape[0] + x));
+    canvas.fill_rect(view.rect(), color::UNKNOWN);
+    let tone = |[x, y]: [usize; 2]| tone(y * grid.shape[0] + x).unwrap_or(color::UNKNOWN);
+    canvas.raster(view, grid.shape, origin, r, tone);
 }
 
-/// One color per pixel, by its place in the world.
-fn pixel_raster(canvas: &mut Canvas, view: &View, color: impl Fn([f64; 2]) -> Color) {
+/// One color per pixel, by its place in the world; unknown where there is none.
+fn pixel_raster(canvas: &mut Canvas, view: &View, tone: impl Fn([f64; 2]) -> Option<Color>) {
     let (low, _) = view.world_box();
     let r = 1.0 / view.scale()[0];
     let shape = [view.rect().width, view.rect().height].map(|v| v.round() as usize);
     canvas.raster(view, shape, low, r, |c| {
-        color([low[0] + (c[0] as f64 + 0.5) * r, low[1] + (c[1] as f64 + 0.5) * r])
+        tone([0, 1].map(|k| low[k] + (c[k] as f64 + 0.5) * r)).unwrap_or(color::UNKNOWN)
     });
 }

@@ -1,6 +1,6 @@
 //! From odometry and scans to poses: places seen again, and a pose graph of them.
 
-use super::{MatchRefusal, MatchSettings, Outline, ScanMatch, match_scans};
+use super::{MatchSettings, Outline, ScanMatch, match_scans};
 use portolan::geom::Pose;
 use portolan::scan::Scan;
 use portolan_graph::{Edge, EdgeKind, GraphError, Information, Kernel, PoseGraph, Report, Settings};
@@ -53,53 +53,6 @@ pub struct Closure {
     pub found: ScanMatch,
 }
 
-/// Candidates that were refused, by cause.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RefusedCandidates {
-    /// Too few pairs of points.
-    pub too_few_pairs: usize,
-    /// Most of the scan did not lie on the other.
-    pub too_few_inliers: usize,
-    /// A direction was free.
-    pub degenerate: usize,
-    /// The residuals were large.
-    pub large_residuals: usize,
-    /// A scan had surfaces where the other saw through.
-    pub contradicted: usize,
-    /// The match left the guess.
-    pub far_from_guess: usize,
-    /// The iterations did not come to rest.
-    pub restless: usize,
-    /// Forth and back differed.
-    pub round_trip: usize,
-}
-
-impl RefusedCandidates {
-    /// All of them.
-    pub fn total(&self) -> usize {
-        self.too_few_pairs
-            + self.too_few_inliers
-            + self.degenerate
-            + self.large_residuals
-            + self.contradicted
-            + self.far_from_guess
-            + self.restless
-            + self.round_trip
-    }
-
-    fn count(&mut self, refusal: &MatchRefusal) {
-        match refusal {
-            MatchRefusal::TooFewPairs { .. } => self.too_few_pairs += 1,
-            MatchRefusal::TooFewInliers { .. } => self.too_few_inliers += 1,
-            MatchRefusal::Degenerate { .. } => self.degenerate += 1,
-            MatchRefusal::LargeResiduals { .. } => self.large_residuals += 1,
-            MatchRefusal::Contradicted { .. } => self.contradicted += 1,
-            MatchRefusal::FarFromGuess { .. } => self.far_from_guess += 1,
-            MatchRefusal::Restless => self.restless += 1,
-        }
-    }
-}
-
 /// One round of proposing, matching and optimizing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Round {
@@ -108,7 +61,7 @@ pub struct Round {
     /// Those of them that were believed.
     pub closures: usize,
     /// The others.
-    pub refused: RefusedCandidates,
+    pub refused: usize,
     /// What the optimizer did.
     pub report: Report,
 }
@@ -154,7 +107,7 @@ pub fn correct(
         rounds: Vec::new(),
     };
     for _ in 0..settings.rounds {
-        let (closures, candidates, refused) = find_closures(&lap.poses, &outlines, settings);
+        let (closures, candidates) = find_closures(&lap.poses, &outlines, settings);
         let mut graph = odometry_graph(&lap.poses, motions, &settings.odometry)?;
         for c in &closures {
             graph.add_edge(Edge {
@@ -168,6 +121,7 @@ pub fn correct(
         let report = graph.optimize(&Settings { kernel: settings.kernel, ..Settings::default() })?;
         lap.poses = graph.vertices().iter().map(|v| v.world_from_vertex).collect();
         lap.agrees = graph.edge_chi_squares()[motions.len()..].iter().map(|&c| c < 11.3).collect();
+        let refused = candidates - closures.len();
         lap.rounds.push(Round { candidates, closures: closures.len(), refused, report });
         (lap.graph, lap.closures) = (graph, closures);
     }
@@ -198,42 +152,39 @@ fn odometry_graph(
     Ok(graph)
 }
 
-/// Matches every scan to the nearest earlier ones; also the number of candidates, and why the others were refused.
+/// Matches every scan to the nearest earlier ones; also the number of candidates.
 fn find_closures(
     poses: &[Pose<2>],
     outlines: &[Outline],
     settings: &CorrectionSettings,
-) -> (Vec<Closure>, usize, RefusedCandidates) {
-    let (mut closures, mut candidates, mut refused) = (Vec::new(), 0, RefusedCandidates::default());
+) -> (Vec<Closure>, usize) {
+    let (mut closures, mut candidates) = (Vec::new(), 0);
     for later in settings.min_lag..poses.len() {
         let distance = |earlier: &usize| poses[*earlier].translation_to(&poses[later]);
         let mut near: Vec<usize> =
             (0..=later - settings.min_lag).filter(|e| distance(e) <= settings.radius).collect();
         near.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
         near.truncate(settings.candidates);
-        for earlier in near {
-            candidates += 1;
+        candidates += near.len();
+        closures.extend(near.into_iter().filter_map(|earlier| {
             let guess = poses[earlier].inverse() * poses[later];
-            match closure(&outlines[earlier], &outlines[later], &guess, settings) {
-                Ok(Some(found)) => closures.push(Closure { earlier, later, found }),
-                Ok(None) => refused.round_trip += 1,
-                Err(why) => refused.count(&why),
-            }
-        }
+            let found = closure(&outlines[earlier], &outlines[later], &guess, settings)?;
+            Some(Closure { earlier, later, found })
+        }));
     }
-    (closures, candidates, refused)
+    (closures, candidates)
 }
 
-/// The match, if it is the same from both sides.
+/// The match, if it is believed and the same from both sides.
 fn closure(
     earlier: &Outline,
     later: &Outline,
     guess: &Pose<2>,
     settings: &CorrectionSettings,
-) -> Result<Option<ScanMatch>, MatchRefusal> {
-    let forth = match_scans(earlier, later, guess, &settings.matching)?;
-    let back = match_scans(later, earlier, &guess.inverse(), &settings.matching)?;
+) -> Option<ScanMatch> {
+    let forth = match_scans(earlier, later, guess, &settings.matching).ok()?;
+    let back = match_scans(later, earlier, &guess.inverse(), &settings.matching).ok()?;
     let [metres, radians] = Outline::apart(&forth.reference_from_scan.inverse(), &back.reference_from_scan);
     let [metres_allowed, radians_allowed] = settings.round_trip;
-    Ok((metres <= metres_allowed && radians <= radians_allowed).then_some(forth))
+    (metres <= metres_allowed && radians <= radians_allowed).then_some(forth)
 }

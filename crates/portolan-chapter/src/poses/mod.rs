@@ -6,16 +6,13 @@
 //! | `scan_match` | two scans matched point to line |
 //! | `loop_closure` | candidates, closures, the graph, twice |
 //! | `pose_error` | poses against true ones |
-//! | `relations` | poses against relations that people verified |
 
 mod loop_closure;
 mod outline;
 mod pose_error;
-mod relations;
 mod scan_match;
 
-pub use loop_closure::{Closure, CorrectedLap, CorrectionSettings, RefusedCandidates, Round, correct};
+pub use loop_closure::{Closure, CorrectedLap, CorrectionSettings, Round, correct};
 pub use outline::Outline;
 pub use pose_error::{ErrorMeasures, PoseErrors};
-pub use relations::{Relation, RelationError, parse_relations, score_relations};
 pub use scan_match::{MatchRefusal, MatchSettings, ScanMatch, match_scans};

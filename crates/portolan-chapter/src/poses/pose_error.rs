@@ -3,9 +3,10 @@
 use portolan::geom::Pose;
 use portolan::geom::vector::norm;
 use portolan_sim::heading;
+use serde::Serialize;
 
 /// Mean, root mean square, median and maximum of errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ErrorMeasures {
     /// The mean.
     pub mean: f64,

@@ -1,14 +1,14 @@
 //! One run of the toy: a scene, a start, a fit, and what became of it. The named seeds show what to look for.
 
-use super::fit::{Fit, Report, Residuals};
+use super::fit::{Fit, Report, Residuals, Scratch};
 use super::line::{Far, Line, LineRay};
 use super::model::{Channels, Measurement};
-use super::ray::{Passage, Sample, render};
 use super::scene::Scene;
 use super::settings::{FitError, Settings};
+use serde::Serialize;
 
 /// A seed worth looking at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct NamedSeed {
     /// Its name.
     pub name: &'static str,
@@ -75,7 +75,7 @@ impl Default for Experiment {
 }
 
 /// The fit at one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Progress {
     /// Negative logarithm of the posterior, up to a constant.
     pub objective: f64,
@@ -145,6 +145,11 @@ impl Outcome {
         self.curve[self.curve.len() - 1]
     }
 
+    /// What was measured along every ray, and whether that was held out.
+    pub fn rays(&self) -> impl Iterator<Item = (&Measurement, bool)> {
+        self.training.iter().map(|m| (m, false)).chain(self.held_out.iter().map(|m| (m, true)))
+    }
+
     /// [`Scene::misplaced`] of the field that was found.
     pub fn misplaced(&self, scene: &Scene, margin: f64) -> f64 {
         scene.misplaced(self.fit.line(), margin)
@@ -159,13 +164,9 @@ impl Outcome {
 /// Transmittance along a ray at each of its samples, in the order of the ray, and behind the last one.
 pub fn transmittance(line: &Line, ray: &LineRay) -> Vec<f64> {
     let crossing = line.crossing(ray);
-    let empty = Sample { density: 0.0, length: 0.0, depth: 0.0, color: [0.0; 2] };
-    let mut samples = vec![empty; crossing.count];
-    let mut passages = vec![Passage::default(); crossing.count];
-    line.sample(ray, &crossing, &mut samples);
-    let background = Far::default().background();
-    let rendered = render(&samples, &background, &mut passages);
-    passages.iter().map(|p| p.transmittance).chain([rendered.transmittance]).collect()
+    let mut scratch = Scratch::new(crossing.count);
+    let rendered = scratch.render(line, ray, &crossing, &Far::default());
+    scratch.passages.iter().map(|p| p.transmittance).chain([rendered.transmittance]).collect()
 }
 
 fn add_reach(line: &Line, training: &[Measurement], reach: &mut [f64]) {

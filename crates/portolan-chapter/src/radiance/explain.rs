@@ -10,12 +10,13 @@
 //! `T_{k+1}` is the same for all channels: no channel sees past an opaque bin. The contrast `v_k − v̄_k`
 //! and the residual in front of it are each channel's own: those a second channel can repair.
 
-use super::fit::{Fit, differences, precisions};
+use super::fit::{Fit, Scratch, differences, precisions};
 use super::model::{Measurement, logistic};
-use super::ray::{Passage, Sample, SampleGradient, Upstream, backward, render};
+use super::ray::Upstream;
+use serde::Serialize;
 
 /// One channel's share in the gradient of one bin by one ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Term {
     /// Rendered minus measured, in standard deviations of the noise.
     pub residual: f64,
@@ -93,20 +94,15 @@ impl Fit {
         let mut out = Vec::new();
         for (measurement, crossing) in self.measurements() {
             let Some(k) = crossing.sample_in(bin) else { continue };
-            let empty = Sample { density: 0.0, length: 0.0, depth: 0.0, color: [0.0; 2] };
-            let mut samples = vec![empty; crossing.count];
-            let mut passages = vec![Passage::default(); crossing.count];
-            let mut gradients = vec![SampleGradient::ZERO; crossing.count];
-            line.sample(&measurement.ray, crossing, &mut samples);
-            let rendered = render(&samples, &background, &mut passages);
-            let passes = passages.get(k + 1).map_or(rendered.transmittance, |p| p.transmittance);
+            let mut scratch = Scratch::new(crossing.count);
+            let rendered = scratch.render(line, &measurement.ray, crossing, &settings.far);
+            let passes = scratch.passages.get(k + 1).map_or(rendered.transmittance, |p| p.transmittance);
             let difference = differences(&rendered, measurement);
             let mut term = |channel: usize| {
                 let unit = |c: usize| if c == channel { 1.0 } else { 0.0 };
                 let upstream = Upstream { depth: unit(0), color: [unit(1), unit(2)] };
-                backward(&samples, &background, &passages, &rendered, &upstream, &mut gradients);
-                let slope = gradients[k].density;
-                let through = samples[k].length * passes;
+                let slope = scratch.backward(crossing.count, &background, &rendered, &upstream)[k].density;
+                let through = scratch.samples[k].length * passes;
                 Term {
                     residual: difference[channel] / noise[channel],
                     contrast: if through > 0.0 { slope / through } else { 0.0 },

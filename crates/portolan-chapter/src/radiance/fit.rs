@@ -7,9 +7,10 @@ use super::line::{COLORS, Crossing, Far, Line, LineRay};
 use super::model::{Channels, Measurement, Noise, logistic, softplus, softplus_inverse};
 use super::ray::{Background, Passage, Rendered, Sample, SampleGradient, Upstream, backward, render};
 use super::settings::{FitError, Optimizer, Settings};
+use serde::Serialize;
 
 /// Root mean square residuals over a set of rays; 0 for no rays.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Residuals {
     /// Of the depth, m.
     pub depth: f64,
@@ -44,9 +45,9 @@ pub struct Fit {
 
 /// Buffers of one ray.
 #[derive(Clone, Debug)]
-struct Scratch {
-    samples: Vec<Sample<COLORS>>,
-    passages: Vec<Passage>,
+pub(super) struct Scratch {
+    pub(super) samples: Vec<Sample<COLORS>>,
+    pub(super) passages: Vec<Passage>,
     gradients: Vec<SampleGradient<COLORS>>,
 }
 
@@ -235,7 +236,7 @@ impl Fit {
 }
 
 impl Scratch {
-    fn new(bins: usize) -> Self {
+    pub(super) fn new(bins: usize) -> Self {
         let sample = Sample { density: 0.0, length: 0.0, depth: 0.0, color: [0.0; COLORS] };
         Self {
             samples: vec![sample; bins],
@@ -244,14 +245,20 @@ impl Scratch {
         }
     }
 
-    fn render(&mut self, line: &Line, ray: &LineRay, crossing: &Crossing, far: &Far) -> Rendered<COLORS> {
+    pub(super) fn render(
+        &mut self,
+        line: &Line,
+        ray: &LineRay,
+        crossing: &Crossing,
+        far: &Far,
+    ) -> Rendered<COLORS> {
         line.sample(ray, crossing, &mut self.samples);
         let count = crossing.count;
         render(&self.samples[..count], &far.background(), &mut self.passages[..count])
     }
 
     /// Gradients by the samples of the ray that was rendered last.
-    fn backward(
+    pub(super) fn backward(
         &mut self,
         count: usize,
         background: &Background<COLORS>,

@@ -4,6 +4,7 @@
 //! field in 2-D or 3-D does the same with cells.
 
 use super::ray::{Background, Sample};
+use serde::Serialize;
 
 /// Quantities that a bin has besides its depth: reflectance and the square of the distance.
 ///
@@ -33,7 +34,7 @@ pub struct LineRay {
 }
 
 /// What lies behind the line, alike for every ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Far {
     /// Distance of the far plane from the origin of the ray, m.
     pub depth: f64,

@@ -1,6 +1,7 @@
 //! The measurement model around the renderer: what was measured, how well, and what is believed beforehand.
 
 use super::line::LineRay;
+use serde::Serialize;
 
 /// Which quantities of a ray enter the likelihood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -26,7 +27,7 @@ impl Channels {
 }
 
 /// Standard deviations of the Gaussian noise of a measurement.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Noise {
     /// Of the depth, m.
     pub depth: f64,
@@ -60,7 +61,7 @@ pub struct Measurement {
 ///
 /// Densities are `softplus(θ) / resolution`, so that `softplus(θ)` is the optical depth `σδ` of a bin and
 /// no step can make it negative; reflectances are `logistic(φ)`, between 0 and 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Prior {
     /// Mean of `θ`.
     pub density_mean: f64,

@@ -3,9 +3,10 @@
 use super::line::{Line, LineRay};
 use super::model::{Measurement, Noise};
 use portolan_sim::Random;
+use serde::Serialize;
 
 /// An opaque body on the line.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Body {
     /// Its lower end, m.
     pub low: f64,

@@ -2,9 +2,11 @@
 
 use super::line::Far;
 use super::model::{Channels, Noise, Prior};
+use serde::Serialize;
 
 /// How a step is made from a gradient.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Optimizer {
     /// `θ ← θ − rate ∇J`.
     GradientDescent {

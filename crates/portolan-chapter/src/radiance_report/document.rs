@@ -2,32 +2,21 @@
 
 use std::path::Path;
 
-use crate::radiance::{
-    Experiment, LineRay, Measurement, Optimizer, Outcome, Residuals, Term, Terms, transmittance,
-};
+use crate::radiance::{Experiment, LineRay, Measurement, Outcome, Terms, transmittance};
 use serde_json::{Value, json};
 
 use super::{BEGUN, Comparison, MARGIN, Run, name};
 
 /// Everything, fit for a file: the same bytes for the same seed, so without times.
 pub(super) fn full(comparison: &Comparison) -> serde_json::Result<Vec<u8>> {
-    let Comparison { experiment, runs, .. } = comparison;
-    let mut document = head(comparison);
-    let fits: Vec<Value> = runs
-        .iter()
-        .map(|run| {
-            let mut fit = summary_of(experiment, run);
-            let outcome = &run.outcome;
-            fit["density"] = json!(outcome.fit.line().density);
-            fit["reflectance"] = json!(outcome.fit.line().reflectance);
-            fit["density_start"] = json!(outcome.start.density);
-            fit["reach"] = json!(outcome.reach);
-            fit["rays"] = rays(outcome);
-            fit["curve"] = curve(outcome);
-            fit
-        })
-        .collect();
-    document["fits"] = json!(fits);
+    let document = document(comparison, |fit, Run { outcome, .. }| {
+        fit["density"] = json!(outcome.fit.line().density);
+        fit["reflectance"] = json!(outcome.fit.line().reflectance);
+        fit["density_start"] = json!(outcome.start.density);
+        fit["reach"] = json!(outcome.reach);
+        fit["rays"] = rays(outcome);
+        fit["curve"] = curve(outcome);
+    });
     let mut bytes = serde_json::to_vec_pretty(&document)?;
     bytes.push(b'\n');
     Ok(bytes)
@@ -35,58 +24,38 @@ pub(super) fn full(comparison: &Comparison) -> serde_json::Result<Vec<u8>> {
 
 /// The results without the long lists, with times: for stdout.
 pub(super) fn summary(comparison: &Comparison, out: &Path, files: &[&str]) -> Value {
-    let Comparison { experiment, runs, .. } = comparison;
-    let mut document = head(comparison);
-    let fits: Vec<Value> = runs
-        .iter()
-        .map(|run| {
-            let mut fit = summary_of(experiment, run);
-            fit["seconds"] = json!(run.seconds);
-            fit["microseconds_per_step"] = json!(per_step(experiment, run));
-            fit
-        })
-        .collect();
-    document["fits"] = json!(fits);
+    let mut document = document(comparison, |fit, run| {
+        fit["seconds"] = json!(run.seconds);
+        fit["microseconds_per_step"] = json!(per_step(&comparison.experiment, run));
+    });
     document["out"] = json!(out.display().to_string());
     document["files"] = json!(files);
     document
 }
 
-fn head(comparison: &Comparison) -> Value {
-    let Comparison { experiment: Experiment { scene, settings, steps }, seed, explanation, .. } = comparison;
-    let optimizer = match settings.optimizer {
-        Optimizer::GradientDescent { rate } => json!({ "kind": "gradient-descent", "rate": rate }),
-        Optimizer::Adam { rate, beta1, beta2, epsilon } => {
-            json!({ "kind": "adam", "rate": rate, "beta1": beta1, "beta2": beta2, "epsilon": epsilon })
-        }
+/// What both have, and of each fit what `more` adds.
+fn document(comparison: &Comparison, more: impl Fn(&mut Value, &Run)) -> Value {
+    let Comparison { experiment, seed, explanation, runs } = comparison;
+    let Experiment { scene, settings, steps } = experiment;
+    let fit = |run: &Run| {
+        let mut fit = summary_of(experiment, run);
+        more(&mut fit, run);
+        fit
     };
-    let bodies: Vec<Value> = scene
-        .bodies
-        .iter()
-        .map(|b| json!({ "low": b.low, "high": b.high, "low_face": b.low_face, "high_face": b.high_face }))
-        .collect();
     json!({
         "command": "radiance",
         "seed": seed.value,
         "seed_name": seed.named.map(|named| named.name),
         "shows": seed.named.map(|named| named.shows),
         "steps": steps,
-        "optimizer": optimizer,
-        "noise": {
-            "depth": settings.noise.depth,
-            "reflectance": settings.noise.reflectance,
-            "second_moment": settings.noise.second_moment,
-        },
-        "prior": {
-            "density_mean": settings.prior.density_mean,
-            "density_spread": settings.prior.density_spread,
-            "reflectance_spread": settings.prior.reflectance_spread,
-        },
-        "far": { "depth": settings.far.depth, "reflectance": settings.far.reflectance },
+        "optimizer": settings.optimizer,
+        "noise": settings.noise,
+        "prior": settings.prior,
+        "far": settings.far,
         "scene": {
             "bins": scene.bins,
             "resolution": scene.length / scene.bins as f64,
-            "bodies": bodies,
+            "bodies": scene.bodies,
             "training": scene.training.iter().map(ray).collect::<Vec<_>>(),
             "held_out": scene.held_out.iter().map(ray).collect::<Vec<_>>(),
         },
@@ -96,6 +65,7 @@ fn head(comparison: &Comparison) -> Value {
             "steps_with_reflectance": BEGUN,
             "with_reflectance": e.begun.iter().map(terms).collect::<Vec<_>>(),
         })),
+        "fits": runs.iter().map(fit).collect::<Vec<_>>(),
     })
 }
 
@@ -104,8 +74,8 @@ fn summary_of(experiment: &Experiment, run: &Run) -> Value {
     json!({
         "channels": name(run.channels),
         "objective": last.objective,
-        "training": residuals(&last.training),
-        "held_out": residuals(&last.held_out),
+        "training": last.training,
+        "held_out": last.held_out,
         "optical_depth_in_empty_space": run.outcome.misplaced(&experiment.scene, MARGIN),
         "memory_bytes": run.outcome.fit.memory_bytes(),
         "samples_per_step": run.outcome.fit.samples_per_step(),
@@ -116,26 +86,16 @@ pub(super) fn per_step(experiment: &Experiment, run: &Run) -> f64 {
     run.seconds * 1e6 / experiment.steps.max(1) as f64
 }
 
-fn residuals(r: &Residuals) -> Value {
-    json!({ "depth": r.depth, "reflectance": r.reflectance, "second_moment": r.second_moment })
-}
-
 fn ray(ray: &LineRay) -> Value {
     json!({ "origin": ray.origin, "direction": if ray.ascending { 1 } else { -1 } })
 }
 
 fn terms(t: &Terms) -> Value {
-    let of = |term: &Term| json!({ "residual": term.residual, "contrast": term.contrast, "slope": term.slope, "pull": term.pull });
-    json!({
-        "ray": ray(&t.measurement.ray),
-        "passes": t.passes,
-        "depth": of(&t.depth),
-        "reflectance": of(&t.reflectance),
-    })
+    let ray = ray(&t.measurement.ray);
+    json!({ "ray": ray, "passes": t.passes, "depth": t.depth, "reflectance": t.reflectance })
 }
 
 fn rays(outcome: &Outcome) -> Value {
-    let all = outcome.training.iter().map(|m| (m, false)).chain(outcome.held_out.iter().map(|m| (m, true)));
     let entry = |(m, held_out): (&Measurement, bool)| {
         let rendered = outcome.fit.render(&m.ray);
         json!({
@@ -150,19 +110,15 @@ fn rays(outcome: &Outcome) -> Value {
             "transmittance": transmittance(outcome.fit.line(), &m.ray),
         })
     };
-    json!(all.map(entry).collect::<Vec<_>>())
+    json!(outcome.rays().map(entry).collect::<Vec<_>>())
 }
 
 /// The curve at about two hundred steps, evenly spaced on a logarithmic axis, first and last included.
 fn curve(outcome: &Outcome) -> Value {
     let points = thinned(outcome.curve.len()).into_iter().map(|step| {
-        let p = &outcome.curve[step];
-        json!({
-            "step": step,
-            "objective": p.objective,
-            "training": residuals(&p.training),
-            "held_out": residuals(&p.held_out),
-        })
+        let mut point = json!(outcome.curve[step]);
+        point["step"] = json!(step);
+        point
     });
     json!(points.collect::<Vec<_>>())
 }

@@ -1,8 +1,6 @@
 //! What a run looks like.
 
-use crate::radiance::{
-    Experiment, Far, LineRay, Measurement, Passage, Sample, render, transmittance as along_ray,
-};
+use crate::radiance::{Experiment, Far, LineRay, Passage, Sample, render, transmittance as along_ray};
 use portolan_draw::{
     Anchor, Canvas, Chart, Color, Entry, Font, Panels, Pen, PixelRect, Series, Swatch, View, color,
 };
@@ -14,16 +12,14 @@ const WIDTH: f64 = 940.0;
 
 /// Density per bin, one panel per fit.
 pub(super) fn density(comparison: &Comparison) -> Vec<u8> {
-    let Comparison { experiment, runs, .. } = comparison;
+    let experiment = &comparison.experiment;
     let legend = [
         Entry::new(Swatch::Line(Pen::new(color::MUTED, 1.5).dashed()), "start"),
         Entry::new(Swatch::Area(color::SURFACE.with_alpha(0.45)), "fit"),
         Entry::new(Swatch::Area(color::TRUTH.with_alpha(0.16)), "solid bodies, in truth"),
     ];
     let note = "Volume density per bin of 10 cm. At 50 1/m a bin lets 0.7 % pass; below 0.1 1/m, 99 %.";
-    let sheet = sheet("Density", note, comparison).legend(legend);
-    let (mut canvas, rects) = sheet.layout_rects(WIDTH, 230.0);
-    for (run, rect) in runs.iter().zip(rects) {
+    panels(comparison, "Density", note, legend, 230.0, |canvas, run, rect| {
         let fit = run.outcome.fit.line();
         let steps = |density: &[f64]| -> Vec<[f64; 2]> {
             let edge = |i: usize| fit.origin + i as f64 * fit.resolution;
@@ -43,14 +39,13 @@ pub(super) fn density(comparison: &Comparison) -> Vec<u8> {
             .y_range(0.01, 200.0)
             .series(Series::filled("", steps(&fit.density), color::SURFACE))
             .series(Series::step("", steps(&run.outcome.start.density), color::MUTED).width(1.5).dashed());
-        chart.draw(&mut canvas, inner(rect));
-    }
-    canvas.encode_png()
+        chart.draw(canvas, inner(rect));
+    })
 }
 
 /// Transmittance along every training ray, one panel per fit.
 pub(super) fn transmittance(comparison: &Comparison) -> Vec<u8> {
-    let Comparison { experiment, runs, .. } = comparison;
+    let experiment = &comparison.experiment;
     let legend = [
         Entry::new(Swatch::Line(Pen::new(color::POSITIVE, 2.0)), "rays to the right"),
         Entry::new(Swatch::Line(Pen::new(color::NEGATIVE, 2.0)), "rays to the left"),
@@ -58,9 +53,7 @@ pub(super) fn transmittance(comparison: &Comparison) -> Vec<u8> {
         Entry::new(Swatch::Area(color::TRUTH.with_alpha(0.16)), "solid bodies, in truth"),
     ];
     let note = "Share of a ray's light that is left at each place. What no light reaches gets no gradient.";
-    let sheet = sheet("Transmittance of the training rays", note, comparison).legend(legend);
-    let (mut canvas, rects) = sheet.layout_rects(WIDTH, 230.0);
-    for (run, rect) in runs.iter().zip(rects) {
+    panels(comparison, "Transmittance of the training rays", note, legend, 230.0, |canvas, run, rect| {
         let line = run.outcome.fit.line();
         let mut chart = line_chart(experiment, "position (m)").y("light that is left").y_range(0.0, 1.06);
         let mut starts = Vec::new();
@@ -78,14 +71,13 @@ pub(super) fn transmittance(comparison: &Comparison) -> Vec<u8> {
             chart = chart.series(Series::line("", points, way(&m.ray)).width(1.8));
             starts.push([m.ray.origin, 1.0]);
         }
-        chart.series(Series::scatter("", starts, color::INK).width(3.5)).draw(&mut canvas, inner(rect));
-    }
-    canvas.encode_png()
+        chart.series(Series::scatter("", starts, color::INK).width(3.5)).draw(canvas, inner(rect));
+    })
 }
 
 /// Every ray with what was measured and what is rendered along it, one panel per fit.
 pub(super) fn rays(comparison: &Comparison) -> Vec<u8> {
-    let Comparison { experiment, runs, .. } = comparison;
+    let experiment = &comparison.experiment;
     let legend = [
         Entry::new(Swatch::Line(Pen::new(color::MEASUREMENT, 2.5)), "measured depth"),
         Entry::new(Swatch::Dot(color::SURFACE), "rendered depth"),
@@ -95,24 +87,16 @@ pub(super) fn rays(comparison: &Comparison) -> Vec<u8> {
     ];
     let note = "Squares on the right: reflectance, measured and rendered. The last three rays were held out.";
     let count = experiment.scene.training.len() + experiment.scene.held_out.len();
-    let sheet = sheet("Rays", note, comparison).legend(legend);
-    let (mut canvas, rects) = sheet.layout_rects(WIDTH, 24.0 * (count + 2) as f64 + 30.0);
-    for (run, rect) in runs.iter().zip(rects) {
-        draw_rays(&mut canvas, experiment, run, rect);
-    }
-    canvas.encode_png()
+    let height = 24.0 * (count + 2) as f64 + 30.0;
+    panels(comparison, "Rays", note, legend, height, |canvas, run, rect| {
+        draw_rays(canvas, experiment, run, rect);
+    })
 }
 
 fn draw_rays(canvas: &mut Canvas, experiment: &Experiment, run: &Run, rect: PixelRect) {
     let outcome = &run.outcome;
     let small = Font::new(16);
-    let all: Vec<(&Measurement, bool)> = outcome
-        .training
-        .iter()
-        .map(|m| (m, false))
-        .chain(outcome.held_out.iter().map(|m| (m, true)))
-        .collect();
-    let rows = all.len() as f64 + 1.0;
+    let rows = outcome.rays().count() as f64 + 1.0;
     let plot = rect.inset(104.0, 8.0, 78.0, 30.0);
     let (low, high) = (-1.5, experiment.scene.length + 1.5);
     let view = View::stretch([low, 0.0], [high, rows], plot);
@@ -127,7 +111,7 @@ fn draw_rays(canvas: &mut Canvas, experiment: &Experiment, run: &Run, rect: Pixe
         canvas.rect(&view, [from, rows - 0.78], [to, rows - 0.22], Some(tone), None);
     }
     canvas.text([rect.x + 10.0, plot.y + 2.0], "field", small.color(color::MUTED), Anchor::Left);
-    for (i, (m, held_out)) in all.iter().enumerate() {
+    for (i, (m, held_out)) in outcome.rays().enumerate() {
         let y = rows - 1.5 - i as f64;
         let sign = if m.ray.ascending { 1.0 } else { -1.0 };
         let at = |depth: f64| (m.ray.origin + sign * depth).clamp(low + 0.05, high - 0.05);
@@ -138,8 +122,7 @@ fn draw_rays(canvas: &mut Canvas, experiment: &Experiment, run: &Run, rect: Pixe
         canvas.dashed(&view, &[[measured_x, y], [rendered_x, y]], color::SURFACE, 1.5);
         canvas.dots(&view, &[[rendered_x, y]], 4.5, color::SURFACE);
         let [_, pixel_y] = view.pixel_from_world([0.0, y]);
-        let (label, tone) =
-            if *held_out { ("held out", color::NEGATIVE) } else { ("training", color::MUTED) };
+        let (label, tone) = if held_out { ("held out", color::NEGATIVE) } else { ("training", color::MUTED) };
         canvas.text([rect.x + 10.0, pixel_y - 8.0], label, small.color(tone), Anchor::Left);
         for (slot, value) in [(0.0, m.reflectance), (1.0, rendered.color[0])] {
             let left = (plot.right() + 16.0 + 24.0 * slot).round();
@@ -207,12 +190,20 @@ pub(super) fn bias(experiment: &Experiment) -> Vec<u8> {
         .encode_png(820, 460)
 }
 
-/// A sheet of one column with a heading per fit.
-fn sheet(what: &str, note: &str, comparison: &Comparison) -> Panels {
+/// A sheet of one column with a heading per fit, and what `draw` makes of each, as PNG bytes.
+fn panels<const N: usize>(
+    comparison: &Comparison,
+    what: &str,
+    note: &str,
+    legend: [Entry; N],
+    height: f64,
+    draw: impl Fn(&mut Canvas, &Run, PixelRect),
+) -> Vec<u8> {
     let Comparison { experiment, seed, runs, .. } = comparison;
     let mut sheet = Panels::new(format!("{what}, {}, {} steps", seed_name(*seed), experiment.steps))
         .subtitle(note)
-        .columns(1);
+        .columns(1)
+        .legend(legend);
     for run in runs {
         let last = run.outcome.last();
         let line = format!(
@@ -221,7 +212,9 @@ fn sheet(what: &str, note: &str, comparison: &Comparison) -> Panels {
         );
         sheet = sheet.panel(format!("Fit to {}", title(run.channels)), [line]);
     }
-    sheet
+    let (mut canvas, rects) = sheet.layout_rects(WIDTH, height);
+    runs.iter().zip(rects).for_each(|(run, rect)| draw(&mut canvas, run, rect));
+    canvas.encode_png()
 }
 
 fn seed_name(seed: Seed) -> String {

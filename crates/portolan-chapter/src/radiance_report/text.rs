@@ -1,7 +1,5 @@
 //! The numbers of a run for people: a table of the fits, and why the worst bin stays or goes.
 
-use std::fmt::Write as _;
-
 use crate::radiance::{Channels, Experiment, Terms};
 
 use super::document::per_step;
@@ -10,21 +8,15 @@ use super::{BEGUN, Comparison, Explanation, MARGIN, Run, title};
 /// Table, terms and what they say.
 pub(super) fn report(comparison: &Comparison) -> String {
     let Comparison { experiment, seed, runs, explanation } = comparison;
-    let mut out = String::new();
     let shows = seed.named.map_or(String::new(), |named| format!(" ({}): {}", named.name, named.shows));
-    // Writing to a string cannot fail.
-    let _ = writeln!(out, "seed {}{shows}", seed.value);
-    let _ = writeln!(out, "noise: depth {} m\n", experiment.settings.noise.depth);
-    let _ = writeln!(
-        out,
-        "{:30}  {:>9}  {:>9}  {:>12}  {:>9}  {:>8}",
-        "measured along a ray", "training", "held out", "in empty space", "per step", "memory"
+    let mut out = format!(
+        "seed {}{shows}\nnoise: depth {} m\n\n{:30}   training   held out  in empty space   per step    memory\n",
+        seed.value, experiment.settings.noise.depth, "measured along a ray"
     );
     for run in runs {
         let last = run.outcome.last();
-        let _ = writeln!(
-            out,
-            "{:30}  {:7.3} m  {:7.3} m  {:14.2}  {:6.1} µs  {:5.1} kB",
+        out += &format!(
+            "{:30}  {:7.3} m  {:7.3} m  {:14.2}  {:6.1} µs  {:5.1} kB\n",
             title(run.channels),
             last.training.depth,
             last.held_out.depth,
@@ -33,11 +25,10 @@ pub(super) fn report(comparison: &Comparison) -> String {
             run.outcome.fit.memory_bytes() as f64 / 1000.0,
         );
     }
-    let _ = writeln!(
-        out,
-        "(training, held out: root mean square residual of depth; in empty space: optical depth"
+    out += &format!(
+        "(training, held out: root mean square residual of depth; in empty space: optical depth\n\
+         that the fit has more than {MARGIN} m from any surface)\n"
     );
-    let _ = writeln!(out, "that the fit has more than {MARGIN} m from any surface)");
     if let Some(explanation) = explanation {
         out += &explain(experiment, runs, explanation);
     }
@@ -74,41 +65,34 @@ fn third(experiment: &Experiment, runs: &[Run]) -> String {
         line.reflectance[bin],
     );
     if let Some(three) = find(Channels::DepthReflectanceSpread) {
-        let _ = writeln!(out, "With it: {:.3} m on the held-out rays.", three.last().held_out.depth);
+        out += &format!("With it: {:.3} m on the held-out rays.\n", three.last().held_out.depth);
     }
     out
 }
 
 /// The two tables of terms, and what they say.
 fn explain(experiment: &Experiment, runs: &[Run], explanation: &Explanation) -> String {
-    let mut out = String::new();
     let bin = explanation.bin;
     let x = experiment.scene.uniform(0.0).centre(bin);
-    let _ =
-        writeln!(out, "\nThe most density in empty space under depth alone is in bin {bin}, at {x:.2} m.");
+    let mut out =
+        format!("\nThe most density in empty space under depth alone is in bin {bin}, at {x:.2} m.\n");
     if let Some(run) = runs.first() {
         let line = run.outcome.fit.line();
         let depth = |density: &[f64]| density[bin] * line.resolution;
-        let _ = writeln!(
-            out,
-            "Optical depth there: {:.2} at the start, {:.2} after {}.",
+        out += &format!(
+            "Optical depth there: {:.2} at the start, {:.2} after {}.\n",
             depth(&run.outcome.start.density),
             depth(&line.density),
             title(run.channels)
         );
     }
-    let _ = writeln!(
-        out,
-        "Its gradient, ray by ray: dv/dsigma = length x passes x contrast, with contrast = value of the bin"
+    out += &format!(
+        "Its gradient, ray by ray: dv/dsigma = length x passes x contrast, with contrast = value of the bin\n\
+         less mean value behind it (far plane included); pull = residual / noise^2 x dv/dsigma, > 0: less density.\n\
+         \nwhere depth alone ended:\n{}\n{BEGUN} steps later, with reflectance in the likelihood:\n{}",
+        table(&explanation.stuck),
+        table(&explanation.begun)
     );
-    let _ = writeln!(
-        out,
-        "less mean value behind it (far plane included); pull = residual / noise^2 x dv/dsigma, > 0: less density."
-    );
-    let _ = writeln!(out, "\nwhere depth alone ended:");
-    table(&mut out, &explanation.stuck);
-    let _ = writeln!(out, "\n{BEGUN} steps later, with reflectance in the likelihood:");
-    table(&mut out, &explanation.begun);
     let stuck = &explanation.stuck;
     let (net, gross) = stuck.iter().fold((0.0, 0.0), |s, t| (s.0 + t.depth.pull, s.1 + t.depth.pull.abs()));
     if stuck.iter().all(|t| t.passes < 0.01) {
@@ -126,17 +110,13 @@ fn explain(experiment: &Experiment, runs: &[Run], explanation: &Explanation) -> 
     out
 }
 
-fn table(out: &mut String, terms: &[Terms]) {
-    let _ = writeln!(
-        out,
-        "  {:>12} {:>7} | {:>8} {:>9} {:>8} | {:>8} {:>9} {:>8}",
-        "ray from", "passes", "z: resid", "contrast", "pull", "c: resid", "contrast", "pull"
-    );
+fn table(terms: &[Terms]) -> String {
+    let mut out =
+        "      ray from  passes | z: resid  contrast     pull | c: resid  contrast     pull\n".to_owned();
     for t in terms {
         let way = if t.measurement.ray.ascending { '>' } else { '<' };
-        let _ = writeln!(
-            out,
-            "  {:9.2} m {way} {:7.3} | {:6.1} s {:7.2} m {:8.2} | {:6.1} s {:9.2} {:8.2}",
+        out += &format!(
+            "  {:9.2} m {way} {:7.3} | {:6.1} s {:7.2} m {:8.2} | {:6.1} s {:9.2} {:8.2}\n",
             t.measurement.ray.origin,
             t.passes,
             t.depth.residual,
@@ -149,5 +129,5 @@ fn table(out: &mut String, terms: &[Terms]) {
     }
     let sum = |pull: fn(&Terms) -> f64| terms.iter().map(pull).sum::<f64>();
     let (z, c) = (sum(|t| t.depth.pull), sum(|t| t.reflectance.pull));
-    let _ = writeln!(out, "  {:>20} | {:>8} {:>9} {z:8.2} | {:>8} {:>9} {c:8.2}", "sum", "", "", "", "");
+    out + &format!("  {:>20} | {:18} {z:8.2} | {:18} {c:8.2}\n", "sum", "", "")
 }

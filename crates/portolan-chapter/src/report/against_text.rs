@@ -40,8 +40,7 @@ impl Ours<'_> {
 
 pub(super) fn section(facts: &Facts) -> Section {
     let ours = Ours(&facts.scene);
-    let lines = [maps(&ours), derived(&ours), probes(&ours), slopes(&ours), errors(&ours)].concat();
-    let rows: Vec<Vec<String>> = lines
+    let rows: Vec<Vec<String>> = lines(&ours)
         .into_iter()
         .map(|(what, text, ours, why)| vec![what.into(), text.into(), ours, why.into()])
         .collect();
@@ -54,8 +53,19 @@ pub(super) fn section(facts: &Facts) -> Section {
     Section { title: "Against the text's numbers", body, command: "portolan demo --out out" }
 }
 
-fn maps(ours: &Ours) -> Vec<Line> {
+fn lines(ours: &Ours) -> Vec<Line> {
     let banded = ours.note("TSDF").split(',').next().unwrap_or_default().to_owned();
+    let cm = |e: Option<ErrorSummary>, of: fn(&ErrorSummary) -> f64| {
+        e.map_or("–".into(), |e| format!("{:.1} cm", 100.0 * of(&e)))
+    };
+    let field = ours.seeded();
+    let both = |of: fn(&ErrorSummary) -> f64| {
+        format!(
+            "{}<small>{} against the world</small>",
+            cm(field.against_contour, of),
+            cm(field.against_truth, of)
+        )
+    };
     vec![
         (
             "grid, memory",
@@ -90,11 +100,6 @@ fn maps(ours: &Ours) -> Vec<Line> {
             ours.time("TSDF, the chapter", |r| r.update),
             "The same algorithm, compiled: two samples a cell on every beam.",
         ),
-    ]
-}
-
-fn derived(ours: &Ours) -> Vec<Line> {
-    vec![
         ("ESDF, memory", "+173 kB", format!("+{}", ours.bytes("ESDF")), "One plane of f32; the same."),
         ("ESDF, rebuild", "13.4 ms", shown_seconds(ours.seeded().seconds), LANGUAGE),
         (
@@ -110,11 +115,6 @@ fn derived(ours: &Ours) -> Vec<Line> {
             "Vertices in f64 and shared, with indices; the text keeps four f32 a segment. Allocated bytes are counted.",
         ),
         ("contour, extraction", "15.5 ms", ours.time("extracted contour", |r| r.update), LANGUAGE),
-    ]
-}
-
-fn probes(ours: &Ours) -> Vec<Line> {
-    vec![
         ("occupancy probe, grid", "317 ns", ours.time("occupancy grid", |r| r.occupancy), LANGUAGE),
         ("occupancy probe, quadtree", "429 ns", ours.time("quadtree, 6.25", |r| r.occupancy), LANGUAGE),
         ("occupancy probe, TSDF", "422 ns", ours.time("TSDF, f32", |r| r.occupancy), LANGUAGE),
@@ -131,11 +131,6 @@ fn probes(ours: &Ours) -> Vec<Line> {
             ours.time("extracted contour", |r| r.distance),
             "The same brute force over all segments, a few more of them, compiled.",
         ),
-    ]
-}
-
-fn slopes(ours: &Ours) -> Vec<Line> {
-    vec![
         (
             "‖∇d‖, ESDF",
             "0.93",
@@ -148,22 +143,6 @@ fn slopes(ours: &Ours) -> Vec<Line> {
             format!("{:.3}", ours.0.gallery.tsdf_gradient),
             "Beyond the truncation every cell holds the same constant; the median probe lies there.",
         ),
-    ]
-}
-
-fn errors(ours: &Ours) -> Vec<Line> {
-    let cm = |e: Option<ErrorSummary>, of: fn(&ErrorSummary) -> f64| {
-        e.map_or("–".into(), |e| format!("{:.1} cm", 100.0 * of(&e)))
-    };
-    let field = ours.seeded();
-    let both = |of: fn(&ErrorSummary) -> f64| {
-        format!(
-            "{}<small>{} against the world</small>",
-            cm(field.against_contour, of),
-            cm(field.against_truth, of)
-        )
-    };
-    vec![
         (
             "ESDF error, median",
             "3.0 cm",

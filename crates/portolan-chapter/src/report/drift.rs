@@ -11,7 +11,7 @@ use crate::pictures;
 pub(super) fn section(facts: &Facts) -> Section {
     let drift = facts.drift;
     let noise = CorrectionSettings::default().odometry;
-    let (candidates, refused) = drift.lap.rounds.last().map_or((0, 0), |r| (r.candidates, r.refused.total()));
+    let (candidates, refused) = drift.lap.rounds.last().map_or((0, 0), |r| (r.candidates, r.refused));
     let picture = figure(
         &pictures::drift(drift, &facts.scene),
         "full",

@@ -22,20 +22,19 @@ fn variance_after(w_max: f32, (sigma, w): (f64, f64), n: usize, runs: u64) -> f6
     sum_sq / runs as f64 - mean * mean
 }
 
+/// The variance of a clamped cell at rest, `n` long enough for the beginning to be forgotten to a part in 10,000, and
+/// the prediction.
+fn settled(w_max: f32, (sigma, w): (f64, f64)) -> [f64; 2] {
+    let n = (10.0 * (f64::from(w_max) / w + 1.0)) as usize;
+    [variance_after(w_max, (sigma, w), n, 8000), sigma * sigma / (2.0 * f64::from(w_max) + w)]
+}
+
 /// Exercise 1 (a): a clamped cell never comes to rest, and its variance is `sigma^2 / (2 W_max + w)`.
 #[test]
 fn exercise_1_steady_state_variance() {
-    let sigma = 0.02;
     for (w_max, w) in [(4.0f32, 1.0), (24.0, 1.0), (64.0, 1.0), (16.0, 2.0), (8.0, 0.5)] {
-        // Long enough for the beginning to be forgotten to a part in 10,000.
-        let n = (10.0 * (f64::from(w_max) / w + 1.0)) as usize;
-        let measured = variance_after(w_max, (sigma, w), n, 8000);
-        let predicted = sigma * sigma / (2.0 * f64::from(w_max) + w);
-        println!(
-            "W_max {w_max}, w {w}: {:.3} mm, predicted {:.3}",
-            1e3 * measured.sqrt(),
-            1e3 * predicted.sqrt()
-        );
+        let [measured, predicted] = settled(w_max, (0.02, w));
+        println!("W_max {w_max}, w {w}: {} predicted {}", mm(measured.sqrt()), mm(predicted.sqrt()));
         // The variance of 8000 runs is known to 1.6 %: three of those.
         assert!((measured / predicted - 1.0).abs() < 0.05);
     }
@@ -47,11 +46,7 @@ fn exercise_1_w_max_of_24_5_equals_50_unclamped_scans() {
     let sigma = 0.02;
     let clamped = variance_after(24.5, (sigma, 1.0), 400, 8000);
     let unclamped = variance_after(f32::INFINITY, (sigma, 1.0), 50, 8000);
-    println!(
-        "standard deviation: clamped {:.3} mm, 50 scans {:.3} mm",
-        1e3 * clamped.sqrt(),
-        1e3 * unclamped.sqrt()
-    );
+    println!("standard deviation: clamped {}, 50 scans {}", mm(clamped.sqrt()), mm(unclamped.sqrt()));
     assert!((clamped / unclamped - 1.0).abs() < 0.07);
     assert!((unclamped / (sigma * sigma / 50.0) - 1.0).abs() < 0.05);
 }
@@ -60,9 +55,7 @@ fn exercise_1_w_max_of_24_5_equals_50_unclamped_scans() {
 fn exercise_1_on_the_page() {
     let sigma = 0.02;
     let settled = |w_max: f32, w: f64| {
-        let n = (10.0 * (f64::from(w_max) / w + 1.0)) as usize;
-        let measured = variance_after(w_max, (sigma, w), n, 8000).sqrt();
-        let predicted = sigma / (2.0 * f64::from(w_max) + w).sqrt();
+        let [measured, predicted] = settled(w_max, (sigma, w)).map(f64::sqrt);
         format!("{} measured, {} predicted", mm(measured), mm(predicted))
     };
     let unclamped = variance_after(f32::INFINITY, (sigma, 1.0), 50, 8000).sqrt();

@@ -11,14 +11,23 @@ use portolan_sim::{LapConfig, apartment, lap};
 const PLANE: (f64, f64) = (180.6, 108.0);
 const HEIGHT: f64 = 3.0;
 
+/// Crossovers of trees of so many bytes a node in the plane and in space: in the plane, under the ceiling for walls
+/// alone, and there with floor and ceiling.
+fn crossovers([plane, space]: [f64; 2]) -> [f64; 3] {
+    let (s, v) = PLANE;
+    let crossovers = [
+        crossover_resolution::<2>(plane, s, v),
+        crossover_resolution::<3>(space, s * HEIGHT, v * HEIGHT),
+        crossover_resolution::<3>(space, s * HEIGHT + 2.0 * v, v * HEIGHT),
+    ];
+    println!("crossovers: {}", crossovers.map(cm).join(", "));
+    crossovers
+}
+
 /// Exercise 2 (a) and (b): 1.5 cm in the plane, and in space 1.25 cm for walls alone and 0.89 cm with floor and ceiling.
 #[test]
 fn exercise_2_crossovers_of_the_texts_node() {
-    let (s, v) = PLANE;
-    let plane = crossover_resolution::<2>(20.0, s, v);
-    let walls = crossover_resolution::<3>(36.0, s * HEIGHT, v * HEIGHT);
-    let closed = crossover_resolution::<3>(36.0, s * HEIGHT + 2.0 * v, v * HEIGHT);
-    println!("crossovers: {:.2} cm; {:.2} cm, {:.2} cm", 1e2 * plane, 1e2 * walls, 1e2 * closed);
+    let [plane, walls, closed] = crossovers([20.0, 36.0]);
     assert!((plane - 0.015).abs() < 5e-5);
     assert!((walls - 0.0125).abs() < 5e-5);
     assert!((closed - 0.0089).abs() < 5e-5);
@@ -52,12 +61,8 @@ fn lap_in_a_tree() -> (Quadtree, usize) {
 /// nodes that the formula counts one in two is inner in the plane and one in four in space.
 #[test]
 fn exercise_2_crossovers_of_our_node() {
-    let (s, v) = PLANE;
     let (plane_node, space_node) = (9.0 / 2.0, 13.0 / 4.0);
-    let plane = crossover_resolution::<2>(plane_node, s, v);
-    let walls = crossover_resolution::<3>(space_node, s * HEIGHT, v * HEIGHT);
-    let closed = crossover_resolution::<3>(space_node, s * HEIGHT + 2.0 * v, v * HEIGHT);
-    println!("crossovers: {:.2} cm; {:.2} cm, {:.2} cm", 1e2 * plane, 1e2 * walls, 1e2 * closed);
+    let [plane, walls, closed] = crossovers([plane_node, space_node]);
     println!("V/S at 5 cm: {:.3} m, {:.3} m", 0.05 * plane_node * 2.0, 0.05 * space_node * 4.0 / 3.0);
     assert!((plane - 0.0664).abs() < 1e-4);
     assert!((walls - 0.138).abs() < 5e-4 && (closed - 0.0987).abs() < 5e-4);
@@ -67,7 +72,7 @@ fn exercise_2_crossovers_of_our_node() {
     // And measured: the lap in a tree at 5 cm. It refines along furniture and along the border of the unknown too.
     let (tree, cells) = lap_in_a_tree();
     let records = tree.store().inner_nodes();
-    let counted = s / 0.05;
+    let counted = PLANE.0 / 0.05;
     println!(
         "measured: {records} inner records, {counted:.0} by the walls; {} bytes, {:.2} of a byte a cell",
         tree.memory_bytes(),
@@ -85,39 +90,31 @@ fn shape<const D: usize>(node_bytes: f64, r: f64) -> f64 {
 #[test]
 fn exercise_2_on_the_page() {
     let (s, v) = PLANE;
-    let (walls, closed, volume) = (s * HEIGHT, s * HEIGHT + 2.0 * v, v * HEIGHT);
+    let [plane, walls, closed] = crossovers([20.0, 36.0]).map(cm);
     let ours = [inner_only_node_bytes::<2>(9.0), inner_only_node_bytes::<3>(13.0)];
+    let [our_plane, our_walls, our_closed] = crossovers(ours).map(cm);
     let [long, wide, high] = [100.0, 60.0, 12.0];
     let hall = long * wide * high / (2.0 * long * wide + 2.0 * (long + wide) * high);
     let yard = 60.0 * 40.0 / 200.0;
     let (tree, cells) = lap_in_a_tree();
     let m = |metres: f64| format!("{metres:.2} m");
     let rows = [
-        ("(a) the Apartment in 2-D, a node of 20 B", cm(crossover_resolution::<2>(20.0, s, v))),
-        (
-            "(b) under a ceiling of 3 m, a node of 36 B, walls alone",
-            cm(crossover_resolution::<3>(36.0, walls, volume)),
-        ),
-        ("(b) with floor and ceiling", cm(crossover_resolution::<3>(36.0, closed, volume))),
+        ("(a) the Apartment in 2-D, a node of 20 B", plane),
+        ("(b) under a ceiling of 3 m, a node of 36 B, walls alone", walls),
+        ("(b) with floor and ceiling", closed),
         ("(c) `V / S` from which leaves of 5 cm pay, 2-D, 20 B", m(shape::<2>(20.0, 0.05))),
         ("(c) 3-D, 36 B", m(shape::<3>(36.0, 0.05))),
         ("`V / S` of the Apartment, 2-D", m(v / s)),
-        ("`V / S` of the Apartment, 3-D, with floor and ceiling", m(volume / closed)),
+        ("`V / S` of the Apartment, 3-D, with floor and ceiling", m(v * HEIGHT / (s * HEIGHT + 2.0 * v))),
         ("`V / S` of a yard of 60 m x 40 m with 200 m of fence", m(yard)),
         ("`V / S` of a hall of 100 m x 60 m x 12 m", m(hall)),
         (
             "bytes of the tree over those of the array in that hall, 5 cm, 36 B",
             format!("{:.2}", memory_ratio::<3>(36.0, 1.0, hall, 0.05)),
         ),
-        (
-            "(a) with the nodes of this project: 9 B for four children",
-            cm(crossover_resolution::<2>(ours[0], s, v)),
-        ),
-        (
-            "(b) the same, 13 B for eight children, walls alone",
-            cm(crossover_resolution::<3>(ours[1], walls, volume)),
-        ),
-        ("(b) the same, with floor and ceiling", cm(crossover_resolution::<3>(ours[1], closed, volume))),
+        ("(a) with the nodes of this project: 9 B for four children", our_plane),
+        ("(b) the same, 13 B for eight children, walls alone", our_walls),
+        ("(b) the same, with floor and ceiling", our_closed),
         ("(c) the same, 2-D", m(shape::<2>(ours[0], 0.05))),
         ("(c) the same, 3-D", m(shape::<3>(ours[1], 0.05))),
         (

@@ -37,22 +37,35 @@ fn crossing_and_slope(map: &Tsdf2) -> (f64, f64) {
     (y0 + (y1 - y0) * d0 / (d0 - d1), d1 / y1)
 }
 
+const TAU: f64 = 0.15;
+
+/// Zero crossing and slope of beams at 0 and 60 degrees, the second of this weight, in cells of `r`.
+fn two_beams(r: f64, weight: f64, errors: [f64; 2]) -> (f64, f64) {
+    let beams = [(0.0, 1.0, errors[0]), (60f64.to_radians(), weight, errors[1])];
+    crossing_and_slope(&fused_line(&beams, r, TAU))
+}
+
+/// Variance of the wall by noise of the range alone, over that of the range.
+fn variance(weight: f64) -> f64 {
+    let off = |errors: [f64; 2]| (two_beams(0.005, weight, errors).0 / 1e-3).powi(2);
+    off([1e-3, 0.0]) + off([0.0, 1e-3])
+}
+
 /// Exercise 3 (a) and (b): beams at 0 and 60 degrees say `y` and `2 y` about a point `y` in front of a wall. Fused with
 /// equal weights that is `1.5 y`: the slope is wrong, the zero is not. What a map's cells add is the taper: behind
 /// the wall the steeper beam counts less, the slopes on both sides differ, and the straight line between two cells
 /// misses the wall by half a millimetre in 5 cm.
 #[test]
 fn exercise_3_zero_crossing_of_beams_at_0_and_60_degrees() {
-    let (tau, sixty) = (0.15, 60f64.to_radians());
-    let (zero, slope) = crossing_and_slope(&fused_line(&[(0.0, 1.0, 0.0), (sixty, 1.0, 0.0)], 0.05, tau));
+    let (zero, slope) = two_beams(0.05, 1.0, [0.0; 2]);
     println!("equal weights: zero at {:.3} mm, slope {slope:.4}", 1e3 * zero);
     assert!((slope - 1.5).abs() < 1e-6 && zero.abs() < 6e-4);
     // It is the cells: with smaller ones it vanishes, with the square.
-    let (fine, _) = crossing_and_slope(&fused_line(&[(0.0, 1.0, 0.0), (sixty, 1.0, 0.0)], 0.005, tau));
+    let (fine, _) = two_beams(0.005, 1.0, [0.0; 2]);
     assert!(fine.abs() < 1.2e-2 * zero.abs());
     // One beam alone, however grazing: exactly there.
     for theta in [0.0f64, 0.7, 1.0] {
-        let (zero, slope) = crossing_and_slope(&fused_line(&[(theta, 1.0, 0.0)], 0.02, tau));
+        let (zero, slope) = crossing_and_slope(&fused_line(&[(theta, 1.0, 0.0)], 0.02, TAU));
         assert!(zero.abs() < 1e-8 && (slope - 1.0 / theta.cos()).abs() < 1e-5);
     }
 }
@@ -63,56 +76,39 @@ fn exercise_3_zero_crossing_of_beams_at_0_and_60_degrees() {
 /// better one across the wall.
 #[test]
 fn exercise_3_what_cos_weighting_does() {
-    let (r, tau, sixty) = (0.005, 0.15, 60f64.to_radians());
+    let sixty = 60f64.to_radians();
     let cosine = sixty.cos();
-    let crossing =
-        |w: f64, e1: f64, e2: f64| crossing_and_slope(&fused_line(&[(0.0, 1.0, e1), (sixty, w, e2)], r, tau));
-    let slope = crossing(cosine, 0.0, 0.0).1;
+    let slope = two_beams(0.005, cosine, [0.0; 2]).1;
     assert!((slope - 4.0 / 3.0).abs() < 1e-6);
 
     // A bearing off by 0.1 degrees at 2 m from the wall: the beam head-on does not notice.
     let z = 2.0 / cosine;
     let error = z * sixty.tan() * 0.1f64.to_radians();
-    let (equal, weighted) = (crossing(1.0, 0.0, error).0, crossing(cosine, 0.0, error).0);
-    println!(
-        "0.1 degrees: the range is off by {:.1} mm, the wall by {:.2} mm, with cos {:.2} mm",
-        1e3 * error,
-        1e3 * equal,
-        1e3 * weighted
-    );
+    let [equal, weighted] = [1.0, cosine].map(|w| two_beams(0.005, w, [0.0, error]).0);
+    println!("0.1 degrees: range off by {}, wall by {}, with cos {}", mm(error), mm(equal), mm(weighted));
     assert!((equal + error / 3.0).abs() < 5e-4 && (weighted + error / 4.0).abs() < 5e-4);
 
     // Range noise of sigma on both: 2/9 against 5/16 of sigma squared.
-    let sigma = 1e-3;
-    let variance =
-        |w: f64| (crossing(w, sigma, 0.0).0 / sigma).powi(2) + (crossing(w, 0.0, sigma).0 / sigma).powi(2);
     println!("range noise: variance {:.3} sigma^2, with cos {:.3}", variance(1.0), variance(cosine));
     assert!((variance(1.0) - 2.0 / 9.0).abs() < 0.02 && (variance(cosine) - 5.0 / 16.0).abs() < 0.02);
 }
 
 #[test]
 fn exercise_3_on_the_page() {
-    let (tau, sixty) = (0.15, 60f64.to_radians());
+    let sixty = 60f64.to_radians();
     let cosine = sixty.cos();
-    let fused = |r: f64, w: f64, e: [f64; 2]| {
-        crossing_and_slope(&fused_line(&[(0.0, 1.0, e[0]), (sixty, w, e[1])], r, tau))
-    };
-    let (zero, slope) = fused(0.05, 1.0, [0.0; 2]);
-    let (fine, _) = fused(0.005, 1.0, [0.0; 2]);
-    let (alone, steep) = crossing_and_slope(&fused_line(&[(sixty, 1.0, 0.0)], 0.05, tau));
+    let (zero, slope) = two_beams(0.05, 1.0, [0.0; 2]);
+    let (fine, _) = two_beams(0.005, 1.0, [0.0; 2]);
+    let (alone, steep) = crossing_and_slope(&fused_line(&[(sixty, 1.0, 0.0)], 0.05, TAU));
     let off = 2.0 / cosine * sixty.tan() * 0.1f64.to_radians();
-    let wall = |w: f64| fused(0.005, w, [0.0, off]).0.abs();
-    let sigma = 1e-3;
-    let variance = |w: f64| {
-        (fused(0.005, w, [sigma, 0.0]).0 / sigma).powi(2) + (fused(0.005, w, [0.0, sigma]).0 / sigma).powi(2)
-    };
+    let wall = |w: f64| two_beams(0.005, w, [0.0, off]).0.abs();
     let rows = [
         ("(a) one beam at 60 degrees: zero crossing off by", mm(alone.abs())),
         ("(a) the slope there", format!("{steep:.3}")),
         ("(b) beams at 0 and 60 degrees, equal weights, cells of 5 cm: zero crossing off by", mm(zero.abs())),
         ("(b) the slope in front of the wall", format!("{slope:.3}")),
         ("(b) the same in cells of 0.5 cm: zero crossing off by", mm(fine.abs())),
-        ("(c) the slope with weights of cos theta", format!("{:.3}", fused(0.005, cosine, [0.0; 2]).1)),
+        ("(c) the slope with weights of cos theta", format!("{:.3}", two_beams(0.005, cosine, [0.0; 2]).1)),
         (
             "(c) a bearing off by 0.1 degrees at 2 m from the wall: the grazing beam's range is off by",
             mm(off),

@@ -38,6 +38,5 @@ fn exercise_4_on_the_page() {
         rows.push((format!("{name}: counted at `W_max` 4"), counted(m)));
         rows.push((format!("{name}: by the weights that arrived"), shown_half_life(m.half_life_of_gains)));
     }
-    let rows: Vec<(&str, String)> = rows.iter().map(|(what, value)| (what.as_str(), value.clone())).collect();
     check(4, &rows);
 }

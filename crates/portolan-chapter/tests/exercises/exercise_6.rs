@@ -82,15 +82,8 @@ fn exercise_6_a_cloud_cannot_forget() {
 fn exercise_6_on_the_page() {
     let world = apartment().world;
     let log = lap(&world, &LapConfig::default());
-    let settings = GallerySettings {
-        grid: Grid::new([0.0; 2], 0.05, [240, 180]),
-        tsdf: Default::default(),
-        model: Default::default(),
-        contour: Default::default(),
-        esdf: Default::default(),
-        probes: 100_000,
-        surface_length: None,
-    };
+    let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
+    let settings = GallerySettings::new(grid, 100_000, None);
     let gallery = run(&log, &settings, Some(&world as &dyn Truth<2>), &mut || 0.0).unwrap();
     let row = |name: &str| gallery.rows.iter().find(|r| r.name.starts_with(name)).unwrap();
     let error = |row: &Row| mm(row.distance_error.unwrap().median);

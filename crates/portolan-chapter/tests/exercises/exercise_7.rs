@@ -12,14 +12,6 @@ fn run(seed: NamedSeed, channels: Channels) -> Outcome {
     Experiment::default().run(seed.seed, channels).unwrap()
 }
 
-fn held_out(outcome: &Outcome) -> String {
-    format!("{:.3} m", outcome.last().held_out.depth)
-}
-
-fn training(outcome: &Outcome) -> String {
-    format!("{:.3} m", outcome.last().training.depth)
-}
-
 fn optical_depth(outcome: &Outcome, bin: usize) -> f64 {
     let line = outcome.fit.line();
     line.density[bin] * line.resolution
@@ -45,6 +37,8 @@ fn exercise_7_on_the_page() {
         let seen = two.fit.explain(parked).into_iter().filter(|t| t.passes > 0.5);
         format!("{:.1} s", seen.map(|t| of(&t).abs()).fold(0.0, f64::max))
     };
+    let held_out = |outcome: &Outcome| format!("{:.3} m", outcome.last().held_out.depth);
+    let training = |outcome: &Outcome| format!("{:.3} m", outcome.last().training.depth);
     let rows = [
         ("seed on which depth alone parks density", PARKED.seed.to_string()),
         ("depth alone: residual of the training rays", training(&stuck)),

@@ -18,10 +18,10 @@ fn rows_of(page: &str, exercise: u32) -> Vec<(String, String)> {
 }
 
 /// Holds the page's tables of an exercise to what was computed: the same rows in the same order.
-pub(crate) fn check(exercise: u32, computed: &[(&str, String)]) {
+pub(crate) fn check(exercise: u32, computed: &[(impl ToString, String)]) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/EXERCISES.md");
     let page = std::fs::read_to_string(path).unwrap();
-    let computed: Vec<_> = computed.iter().map(|(what, value)| ((*what).to_owned(), value.clone())).collect();
+    let computed: Vec<_> = computed.iter().map(|(what, value)| (what.to_string(), value.clone())).collect();
     if rows_of(&page, exercise) != computed {
         let lines: String = computed.iter().map(|(what, value)| format!("| {what} | {value} |\n")).collect();
         panic!("docs/EXERCISES.md, exercise {exercise}, is not what was computed, in this order:\n{lines}");

@@ -34,14 +34,18 @@ pub(super) fn subtract_times<const B: usize>(x: &mut [f64; B], a: &Block<B>, v: 
     }
 }
 
-/// The lower triangle `L` of `a = L L^T`; `None` where `a` is not positive definite (a pivot is not above 1e-14
-/// of its diagonal entry, or not finite).
-pub(super) fn cholesky<const B: usize>(a: &Block<B>, diagonal: &[f64; B]) -> Option<Block<B>> {
+/// The lower triangle `L` of `a = L L^T`; the row and the pivot where `a` is not positive definite (a pivot is not above
+/// `least` times its diagonal entry, or not finite).
+pub(crate) fn cholesky<const B: usize>(
+    a: &Block<B>,
+    diagonal: &[f64; B],
+    least: f64,
+) -> Result<Block<B>, (usize, f64)> {
     let mut l = [[0.0; B]; B];
     for c in 0..B {
         let pivot = a[c][c] - (0..c).map(|k| l[c][k] * l[c][k]).sum::<f64>();
-        if !(pivot.is_finite() && pivot > 1e-14 * diagonal[c]) {
-            return None;
+        if !(pivot.is_finite() && pivot > least * diagonal[c]) {
+            return Err((c, pivot));
         }
         l[c][c] = pivot.sqrt();
         for r in c + 1..B {
@@ -49,7 +53,7 @@ pub(super) fn cholesky<const B: usize>(a: &Block<B>, diagonal: &[f64; B]) -> Opt
             l[r][c] = (a[r][c] - sum) / l[c][c];
         }
     }
-    Some(l)
+    Ok(l)
 }
 
 /// `y` with `L y = b`.

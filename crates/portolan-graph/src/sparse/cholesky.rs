@@ -66,7 +66,7 @@ impl<const B: usize> Cholesky<B> {
                 self.blocks[self.end[j]] = l_jk;
                 self.end[j] += 1;
             }
-            self.diagonal[k] = cholesky(&diagonal, &before)?;
+            self.diagonal[k] = cholesky(&diagonal, &before, 1e-14).ok()?;
         }
         Some(())
     }

@@ -8,6 +8,6 @@ mod block;
 mod cholesky;
 mod pattern;
 
-pub(crate) use block::{Block, transposed};
-pub(crate) use cholesky::Cholesky;
+pub(crate) use self::cholesky::Cholesky;
+pub(crate) use block::{Block, cholesky, transposed};
 pub(crate) use pattern::{Pattern, SymmetricBlocks};

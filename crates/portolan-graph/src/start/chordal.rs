@@ -7,7 +7,8 @@ use portolan::geom::vector::sub;
 use crate::components::anchors;
 use crate::error::GraphError;
 use crate::graph::PoseGraph;
-use crate::sparse::{Block, Cholesky, Pattern, SymmetricBlocks, transposed};
+use crate::sparse::{Block, Cholesky, SymmetricBlocks, transposed};
+use crate::system::Numbering;
 
 impl<const D: usize> PoseGraph<D> {
     /// Places every free vertex at the chordal solution, from which large loops converge; its previous pose has no
@@ -101,34 +102,6 @@ impl<const D: usize> PoseGraph<D> {
             }
         }
         Ok(())
-    }
-}
-
-/// The unknowns: free vertices, and the pairs of them that edges join.
-struct Numbering {
-    free: Vec<usize>,
-    variable: Vec<Option<usize>>,
-    /// For each edge, its number among the pairs, where both ends are free.
-    pair: Vec<usize>,
-    pattern: Pattern,
-}
-
-impl Numbering {
-    fn new<const D: usize>(graph: &PoseGraph<D>, held: &[bool]) -> Self {
-        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
-        let mut variable = vec![None; held.len()];
-        for (number, &vertex) in free.iter().enumerate() {
-            variable[vertex] = Some(number);
-        }
-        let (mut pairs, mut pair) = (Vec::new(), Vec::new());
-        for &[i, j] in &graph.ends {
-            pair.push(pairs.len());
-            if let (Some(a), Some(b)) = (variable[i], variable[j]) {
-                pairs.push([a, b]);
-            }
-        }
-        let pattern = Pattern::new(free.len(), &pairs);
-        Self { free, variable, pair, pattern }
     }
 }
 

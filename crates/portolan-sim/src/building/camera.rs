@@ -49,11 +49,6 @@ impl Default for DepthCamera {
 }
 
 impl DepthCamera {
-    /// The camera with constant noise (meters), like that of a lidar.
-    pub fn with_noise(self, noise: f64) -> Self {
-        Self { noise, noise_quadratic: 0.0, ..self }
-    }
-
     /// The camera with a share of the pixels along each side and the same field of view.
     pub fn scaled(self, share: f64) -> Self {
         let c = self.pinhole;

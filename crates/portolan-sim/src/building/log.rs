@@ -18,6 +18,30 @@ pub enum BuildingSensor {
     Camera(DepthCamera),
 }
 
+impl BuildingSensor {
+    /// Unit directions of a lidar's rays, which [`BuildingSensor::frame`] takes; none of a camera.
+    pub fn directions(&self) -> Vec<[f64; 3]> {
+        match self {
+            Self::Lidar(lidar) => lidar.directions(),
+            Self::Camera(_) => Vec::new(),
+        }
+    }
+
+    /// The frame from a pose; its noise depends on the stream `(seed, index)` alone.
+    pub fn frame(
+        &self,
+        world: &World3,
+        world_from_sensor: &Pose<3>,
+        directions: &[[f64; 3]],
+        noise: (u64, u64),
+    ) -> Frame {
+        match self {
+            Self::Lidar(lidar) => lidar_frame(world, world_from_sensor, lidar, directions, noise),
+            Self::Camera(camera) => camera_frame(world, world_from_sensor, camera, noise),
+        }
+    }
+}
+
 /// The settings of a walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BuildingConfig {
@@ -61,18 +85,10 @@ pub struct BuildingLog {
 pub fn building_log(config: &BuildingConfig) -> BuildingLog {
     let building = building_world(config.seed);
     let poses = building_poses(&building, config);
-    let directions = match &config.sensor {
-        BuildingSensor::Lidar(lidar) => lidar.directions(),
-        BuildingSensor::Camera(_) => Vec::new(),
-    };
+    let directions = config.sensor.directions();
     let world = building.world;
     let scan = |(i, pose): (usize, Pose<3>)| {
-        let noise = (config.seed, i as u64);
-        let frame = match &config.sensor {
-            BuildingSensor::Lidar(lidar) => lidar_frame(&world, &pose, lidar, &directions, noise),
-            BuildingSensor::Camera(camera) => camera_frame(&world, &pose, camera, noise),
-        };
-        (pose, frame)
+        (pose, config.sensor.frame(&world, &pose, &directions, (config.seed, i as u64)))
     };
     let scans: Vec<_> = poses.into_iter().enumerate().map(scan).collect();
     let times = (0..scans.len()).map(|i| 0.1 * i as f64).collect();

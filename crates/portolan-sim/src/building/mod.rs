@@ -6,7 +6,6 @@
 //! | scans with poses, in one call | [`building_log`] |
 //! | the world | [`building_world`], [`World3`], [`Body`], [`Shape`] |
 //! | sensors and their noise | [`SpinningLidar`], [`DepthCamera`] |
-//! | evaluation of maps | [`surface_points`], [`free_points`]; [`score_free`], [`score_surface`], [`surface_errors`] |
 
 mod camera;
 mod floor_plan;
@@ -15,7 +14,6 @@ mod lidar;
 mod log;
 mod shape;
 mod tree;
-mod truth;
 mod walk;
 mod world;
 
@@ -24,8 +22,4 @@ pub use floor_plan::{Building, building_world};
 pub use lidar::{SpinningLidar, lidar_frame};
 pub use log::{BuildingConfig, BuildingLog, BuildingSensor, building_log, building_poses};
 pub use shape::Shape;
-pub use truth::{
-    Labels, SurfacePoint, free_points, score_free, score_surface, seen_surface, surface_errors,
-    surface_points,
-};
 pub use world::{Body, CHECKER, DEPTH_TOLERANCE, RayHit3, World3};

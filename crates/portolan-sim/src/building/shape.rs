@@ -1,6 +1,5 @@
 //! Boxes, cylinders and spheres: rays, distances, surfaces, in closed form.
 
-use crate::Random;
 use portolan::geom::vector::{along, dot, norm, scale, sub};
 use portolan::geom::{Aabb, Pose};
 
@@ -94,58 +93,6 @@ impl Shape {
                 let (near, _) = roots(1.0, dot(o, direction), dot(o, o) - radius * radius)?;
                 let normal = scale(along(o, direction, near), 1.0 / radius);
                 (near >= 0.0).then_some(Entry { range: near, normal })
-            }
-        }
-    }
-
-    /// Area of the surface (square meters).
-    pub fn area(&self) -> f64 {
-        let tau = std::f64::consts::TAU;
-        match *self {
-            Self::Box { half: [a, b, c], .. } => 8.0 * (a * b + b * c + c * a),
-            Self::Cylinder { radius, half_height, .. } => tau * radius * (2.0 * half_height + radius),
-            Self::Sphere { radius, .. } => 2.0 * tau * radius * radius,
-        }
-    }
-
-    /// A random point of the surface, uniform by area, with its outward unit normal.
-    pub(super) fn surface_point(&self, random: &mut Random) -> ([f64; 3], [f64; 3]) {
-        let turn = |random: &mut Random| {
-            let angle = std::f64::consts::TAU * random.uniform();
-            [libm::cos(angle), libm::sin(angle)]
-        };
-        match *self {
-            Self::Box { world_from_box, half: [a, b, c] } => {
-                // Pairs of faces across x, y, z.
-                let areas = [b * c, c * a, a * b];
-                let pick = random.uniform() * areas.iter().sum::<f64>();
-                let axis = usize::from(pick >= areas[0]) + usize::from(pick >= areas[0] + areas[1]);
-                let mut p = [a, b, c].map(|h| h * (2.0 * random.uniform() - 1.0));
-                let mut normal = [0.0; 3];
-                normal[axis] = if p[axis] < 0.0 { -1.0 } else { 1.0 };
-                p[axis] = normal[axis] * [a, b, c][axis];
-                (world_from_box.transform_point(p), world_from_box.rotate(normal))
-            }
-            Self::Cylinder { centre, radius, half_height } => {
-                let [x, y] = turn(random);
-                let pick = (2.0 * half_height + radius) * random.uniform();
-                if pick < 2.0 * half_height {
-                    (
-                        [0, 1, 2].map(|k| centre[k] + [radius * x, radius * y, pick - half_height][k]),
-                        [x, y, 0.0],
-                    )
-                } else {
-                    let r = radius * random.uniform().sqrt();
-                    let up = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
-                    ([0, 1, 2].map(|k| centre[k] + [r * x, r * y, up * half_height][k]), [0.0, 0.0, up])
-                }
-            }
-            Self::Sphere { centre, radius } => {
-                let z = 2.0 * random.uniform() - 1.0;
-                let [x, y] = turn(random);
-                let r = (1.0 - z * z).max(0.0).sqrt();
-                let normal = [r * x, r * y, z];
-                (along(centre, normal, radius), normal)
             }
         }
     }

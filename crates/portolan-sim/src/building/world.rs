@@ -2,7 +2,6 @@
 
 use super::shape::Shape;
 use super::tree::Tree;
-use crate::Truth;
 use portolan::geom::Aabb;
 use portolan::geom::vector::{along, distance, scale, sub, unit};
 use std::cmp::{Ordering, Reverse};
@@ -189,12 +188,6 @@ impl World3 {
             walked += d;
         }
         whole - walked.min(whole)
-    }
-}
-
-impl Truth<3> for World3 {
-    fn signed_distance(&self, p_world: [f64; 3]) -> f64 {
-        self.signed_distance(p_world)
     }
 }
 

@@ -4,14 +4,10 @@ use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::vector::norm;
 use portolan::map::Tsdf2;
 use portolan::surface::{ContourSettings, Polyline, marching_squares};
-use portolan_io::{IoError, MapFile, MapHeader, esdf_to_bytes, geojson_to_bytes};
+use portolan_io::{MapFile, MapHeader, esdf_to_bytes, geojson_to_bytes};
 use serde_json::{Map, Value, json};
 
 use super::{Refusal, Reply};
-
-fn refused(error: IoError) -> Refusal {
-    Refusal::new(error)
-}
 
 /// A file under a name.
 pub(super) fn file(name: &str, bytes: Vec<u8>) -> Result<Reply, Refusal> {
@@ -36,7 +32,7 @@ pub(super) fn esdf(tsdf: &Tsdf2) -> Result<Reply, Refusal> {
     let dense = field(tsdf, false).dense(tsdf.grid());
     let status = dense.is_saturated().then(|| dense.status_bytes());
     let bytes = esdf_to_bytes(dense.grid(), dense.samples(), status.as_deref());
-    file("esdf.bin", bytes.map_err(refused)?)
+    file("esdf.bin", bytes.map_err(Refusal::new)?)
 }
 
 /// `contour.geojson`
@@ -47,7 +43,7 @@ pub(super) fn contour(tsdf: &Tsdf2) -> Result<Reply, Refusal> {
         line.vertices.into_iter().chain(again).collect()
     };
     let lines: Vec<Vec<[f64; 2]>> = lines.into_iter().map(closed).collect();
-    file("contour.geojson", geojson_to_bytes(&lines).map_err(refused)?)
+    file("contour.geojson", geojson_to_bytes(&lines).map_err(Refusal::new)?)
 }
 
 /// `map.portolan`
@@ -56,5 +52,5 @@ pub(super) fn map(tsdf: &Tsdf2, log: &str, scans: usize, settings: &Value) -> Re
     let header = MapHeader { logs: vec![log.into()], scans: scans as u64, settings, ..MapHeader::default() };
     let mut content = MapFile::<2>::default();
     (content.header, content.tsdf) = (header, Some(tsdf.clone()));
-    file("map.portolan", content.to_bytes().map_err(refused)?)
+    file("map.portolan", content.to_bytes().map_err(Refusal::new)?)
 }

@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 
-use super::files::FILES;
+/// Paths in `page/` with the content of each file, in the order of their paths; `build.rs` makes the table.
+const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/files.rs"));
 
 /// A file of the page.
 pub(super) async fn serve(method: Method, uri: Uri) -> Response {
@@ -71,7 +72,7 @@ mod tests {
         walk(&folder(), "", &mut found);
         found.sort();
         let listed: Vec<_> = FILES.iter().map(|(path, _)| path.to_string()).collect();
-        assert_eq!(listed, found, "src/server/files.rs lists the files of page/ in order");
+        assert_eq!(listed, found, "the files of page/ in order");
         for (path, bytes) in FILES {
             assert_eq!(read(path).as_deref(), Some(*bytes), "{path}");
         }

@@ -12,7 +12,6 @@
 
 mod assets;
 mod connections;
-mod files;
 mod guard;
 mod socket;
 

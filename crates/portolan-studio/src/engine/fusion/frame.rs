@@ -4,6 +4,7 @@ use portolan::geom::{Grid, Pose};
 use portolan::map::Tsdf2;
 use portolan::scan::{BeamKind, Scan, ScanStats};
 use portolan::surface::{ContourSettings, Polyline, marching_squares};
+use portolan_chapter::ghost::chair;
 use portolan_sim::World;
 use serde_json::{Value, json};
 
@@ -60,7 +61,7 @@ pub(in crate::engine) fn grid(grid: &Grid<2>) -> Value {
 
 /// Faces of walls and things, and where the chair stands.
 pub(in crate::engine) fn truth(world: &World) -> Value {
-    let chair = super::scans::chair(world);
+    let chair = chair(world);
     let faces: Vec<_> = world.boundary().iter().map(|s| [s.a, s.b]).collect();
     json!({ "faces": faces, "chair": { "min": chair.min, "max": chair.max } })
 }

@@ -54,7 +54,7 @@ impl Inspected {
             "distance": state.map(|s| s.distance),
             "weight": state.map(|s| s.weight),
             "from": from,
-            "events": rows(&self.events[from..]),
+            "events": self.events[from..].iter().map(row).collect::<Vec<_>>(),
             "decay": self.decay(tsdf, moved),
         })
     }
@@ -94,10 +94,7 @@ fn weight(event: &FusionEvent) -> f64 {
 }
 
 /// `[scan, D before, W before, d, K, D after, W after]`; `D before` is `null` where nothing was known.
-fn rows(events: &[(usize, FusionEvent)]) -> Vec<Value> {
-    let row = |(scan, e): &(usize, FusionEvent)| {
-        let before = (e.weight_before > 0.0).then_some(e.before);
-        json!([scan, before, e.weight_before, e.observation, e.gain, e.after, e.weight_after])
-    };
-    events.iter().map(row).collect()
+pub(in crate::engine) fn row((scan, e): &(usize, FusionEvent)) -> Value {
+    let before = (e.weight_before > 0.0).then_some(e.before);
+    json!([scan, before, e.weight_before, e.observation, e.gain, e.after, e.weight_after])
 }

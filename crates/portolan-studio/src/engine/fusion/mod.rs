@@ -3,7 +3,7 @@
 mod ask;
 mod chair;
 pub(super) mod frame;
-mod inspect;
+pub(super) mod inspect;
 mod page_copy;
 mod scans;
 mod settings;

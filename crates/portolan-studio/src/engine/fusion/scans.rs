@@ -5,6 +5,7 @@ use std::sync::Arc;
 use portolan::geom::vector::sub;
 use portolan::geom::{Aabb, Pose};
 use portolan::scan::Scan;
+use portolan_chapter::ghost::chair;
 use portolan_sim::{Lidar, SEED, World, apartment, lap_poses, scan_at};
 
 use crate::engine::{Logs, Refusal, Source2d};
@@ -190,11 +191,6 @@ impl Driven {
         }
         &self.scans[i]
     }
-}
-
-/// Where the chair of a world stands.
-pub(in crate::engine) fn chair(world: &World) -> Aabb<2> {
-    world.solids().iter().filter(|s| s.name == "chair").fold(Aabb::EMPTY, |b, s| b.union(s.aabb()))
 }
 
 fn middle(b: Aabb<2>) -> [f64; 2] {

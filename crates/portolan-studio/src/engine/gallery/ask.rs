@@ -15,7 +15,7 @@ pub(in crate::engine) enum Ask {
     /// Measures one workload now.
     Run {
         /// Which.
-        workload: Word,
+        workload: Workload,
         /// Points to ask at, 100 to 300,000; searches get a fiftieth.
         probes: usize,
     },
@@ -26,23 +26,4 @@ pub(in crate::engine) enum Ask {
     },
     /// Fuses trees over leaves of other sizes: the formula's line and what is measured.
     Trees {},
-}
-
-/// A workload's name.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(in crate::engine) enum Word {
-    Occupancy,
-    Distance,
-    Surface,
-}
-
-impl From<Word> for Workload {
-    fn from(word: Word) -> Self {
-        match word {
-            Word::Occupancy => Self::Occupancy,
-            Word::Distance => Self::Distance,
-            Word::Surface => Self::Surface,
-        }
-    }
 }

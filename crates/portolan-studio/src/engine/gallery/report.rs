@@ -1,7 +1,6 @@
 //! The numbers: metres, seconds, bytes; `null` where a representation cannot answer.
 
-use portolan_chapter::gallery::{Cost, MeasuredField, Row, TreeCrossover, Winner};
-use portolan_sim::ErrorSummary;
+use portolan_chapter::gallery::{MeasuredField, Row, Winner};
 use serde_json::{Value, json};
 
 use super::state::Built;
@@ -37,7 +36,7 @@ pub(super) fn constants(built: &Built) -> Value {
         "area": w * h,
         "surface": surface_length(built),
         "surface_known": built.settings.surface_length.is_some(),
-        "trees": m.trees.iter().map(tree).collect::<Vec<_>>(),
+        "trees": m.trees,
         "fields": m.fields.iter().map(field).collect::<Vec<_>>(),
         "tsdf_gradient": m.tsdf_gradient,
     })
@@ -53,25 +52,9 @@ fn panel(row: &Row) -> Option<&'static str> {
 }
 
 fn row(row: &Row) -> Value {
-    json!({
-        "name": row.name, "panel": panel(row), "memory_bytes": row.memory_bytes, "derived": row.derived,
-        "update": cost(row.update), "occupancy": cost(row.occupancy), "distance": cost(row.distance),
-        "surface": cost(row.surface), "occupancy_wrong": row.occupancy_wrong,
-        "distance_error": error(row.distance_error), "surface_error": error(row.surface_error), "note": row.note,
-    })
-}
-
-fn cost(cost: Option<Cost>) -> Option<Value> {
-    cost.map(|c| json!({ "seconds": c.seconds, "by": c.by }))
-}
-
-fn error(error: Option<ErrorSummary>) -> Option<Value> {
-    error.map(|e| {
-        json!({
-            "count": e.count, "median": e.median, "p95": e.p95, "p99": e.p99, "bias": e.bias,
-            "worst_over": e.worst_over, "worst_under": e.worst_under,
-        })
-    })
+    let mut told = json!(row);
+    told["panel"] = json!(panel(row));
+    told
 }
 
 /// The winner, those level with it, and how many times dearer each row is: `null` where it cannot answer, or where the
@@ -86,22 +69,9 @@ fn winner(winner: &Winner, rows: &[Row]) -> Value {
     })
 }
 
-fn tree(t: &TreeCrossover) -> Value {
-    json!({
-        "name": t.name, "node_bytes": t.node_bytes, "resolution": t.resolution,
-        "predicted_resolution": t.predicted_resolution, "predicted_ratio": t.predicted_ratio,
-        "measured_ratio": t.measured_ratio,
-    })
-}
-
-/// The textbook's node and ours over leaves of one size.
-pub(super) fn tree_pair(pair: &[TreeCrossover; 2]) -> Value {
-    json!(pair.each_ref().map(tree))
-}
-
 fn field(f: &MeasuredField) -> Value {
     json!({
         "name": f.name(), "seconds": f.seconds, "gradient": f.gradient,
-        "against_contour": error(f.against_contour), "against_truth": error(f.against_truth),
+        "against_contour": f.against_contour, "against_truth": f.against_truth,
     })
 }

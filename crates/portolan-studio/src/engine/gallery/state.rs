@@ -1,6 +1,5 @@
 //! The representations, and when they are built anew.
 
-use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::surface::ContourSettings;
 use portolan_chapter::gallery::{
@@ -47,6 +46,7 @@ pub(super) struct Built {
     /// Seconds that building and measuring took.
     pub(super) seconds: f64,
     pub(super) truth: Option<World>,
+    /// The textbook's node and ours over leaves of each size.
     trees: Option<Vec<[TreeCrossover; 2]>>,
 }
 
@@ -74,7 +74,7 @@ impl Gallery {
                     )));
                 }
                 let built = self.built(fusion)?;
-                let measure = || built.measured.measure(workload.into(), probes, &mut || clock.now());
+                let measure = || built.measured.measure(workload, probes, &mut || clock.now());
                 let ((), seconds) = clock.time(measure);
                 Reply::of(
                     json!({ "revision": built.revision, "seconds": seconds, "costs": report::costs(built) }),
@@ -110,13 +110,10 @@ impl Gallery {
         }
         let truth = lap.world(fusion.at());
         let settings = GallerySettings {
-            grid,
             tsdf: fusion.settings().config()?,
-            model: OccupancyModel::default(),
             contour,
             esdf,
-            probes: FIRST_PROBES,
-            surface_length: truth.map(World::wall_length),
+            ..GallerySettings::new(grid, FIRST_PROBES, truth.map(World::wall_length))
         };
         let clock = self.clock.clone();
         let known = truth.map(|world| world as &dyn Truth<2>);
@@ -161,8 +158,7 @@ impl Gallery {
             let trees = tree_crossovers_at(&few, built.settings.model, &bounds, surface, &fit);
             built.trees = Some(trees.map_err(Refusal::new)?);
         }
-        let pairs: Vec<_> = built.trees.iter().flatten().map(report::tree_pair).collect();
-        Reply::of(json!({ "revision": built.revision, "every": every, "sizes": pairs }))
+        Reply::of(json!({ "revision": built.revision, "every": every, "sizes": built.trees }))
     }
 
     pub(in crate::engine) fn memory_bytes(&self) -> usize {

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use portolan::cell::OccupancyModel;
 use portolan::field::EsdfSettings;
 use portolan::geom::{Grid, Pose};
 use portolan::map::{Tsdf2, TsdfConfig};
@@ -55,13 +54,9 @@ fn library() -> Gallery {
     let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
     let tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
     let settings = GallerySettings {
-        grid,
-        tsdf: TsdfConfig::default(),
-        model: OccupancyModel::default(),
         contour: ContourSettings::of(&tsdf),
         esdf: EsdfSettings::of(&tsdf),
-        probes: 10_000,
-        surface_length: Some(world.wall_length()),
+        ..GallerySettings::new(grid, 10_000, Some(world.wall_length()))
     };
     let mut now = 0.0;
     let mut clock = || {

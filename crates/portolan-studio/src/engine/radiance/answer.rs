@@ -1,8 +1,6 @@
 //! What the page gets: the corridor once, the fit again and again.
 
-use portolan_chapter::radiance::{
-    Fit, Measurement, NAMED_SEEDS, Residuals, Scene, Term, Terms, opacity, transmittance,
-};
+use portolan_chapter::radiance::{Fit, Measurement, NAMED_SEEDS, Scene, Terms, opacity, transmittance};
 use serde_json::{Value, json};
 
 use super::run::Run;
@@ -38,14 +36,10 @@ pub(super) fn scene(scene: &Scene, run: &mut Run) -> Value {
         "truth": { "opacity": opacities(&truth.density, truth.resolution), "reflectance": truth.reflectance },
         "marks": MARKS.map(|density| [density, opacity(density * truth.resolution).0]),
         "rays": rays,
-        "noise": {
-            "depth": settings.noise.depth,
-            "reflectance": settings.noise.reflectance,
-            "second_moment": settings.noise.second_moment,
-        },
+        "noise": settings.noise,
         "far": settings.far.depth,
         "margin": MARGIN,
-        "named": NAMED_SEEDS.map(|n| json!({ "name": n.name, "seed": n.seed, "shows": n.shows })),
+        "named": NAMED_SEEDS,
     })
 }
 
@@ -70,8 +64,8 @@ pub(super) fn frame(
         "made": made,
         "seconds": seconds,
         "objective": progress.objective,
-        "training": residuals(&progress.training),
-        "held_out": residuals(&progress.held_out),
+        "training": progress.training,
+        "held_out": progress.held_out,
         "misplaced": scene.misplaced(line, MARGIN),
         "worst": scene.worst_bin(line, MARGIN),
         "rays": measured.iter().map(|m| rendered(&run.fit, m)).collect::<Vec<_>>(),
@@ -113,10 +107,6 @@ fn rendered(fit: &Fit, m: &Measurement) -> Value {
     })
 }
 
-fn residuals(r: &Residuals) -> Value {
-    json!({ "depth": r.depth, "reflectance": r.reflectance, "second_moment": r.second_moment })
-}
-
 /// A ray's light on its way.
 struct Light {
     /// Where on the line: the beginning of the ray, and the far border of every bin that it crosses (metres).
@@ -154,7 +144,7 @@ fn explained(run: &Run, gradient: &[f64], bin: usize) -> Value {
     let row = |t: &Terms| {
         json!({
             "ray": ray(t), "passes": t.passes, "pull": t.pull(),
-            "depth": term(&t.depth), "reflectance": term(&t.reflectance), "second_moment": term(&t.second_moment),
+            "depth": t.depth, "reflectance": t.reflectance, "second_moment": t.second_moment,
         })
     };
     let optical_depth = line.density[bin] * line.resolution;
@@ -191,10 +181,6 @@ fn hint(terms: &[Terms], free: f64) -> Option<&'static str> {
     } else {
         None
     }
-}
-
-fn term(t: &Term) -> Value {
-    json!({ "residual": t.residual, "contrast": t.contrast, "slope": t.slope, "pull": t.pull })
 }
 
 fn opacities(density: &[f64], resolution: f64) -> Vec<f64> {

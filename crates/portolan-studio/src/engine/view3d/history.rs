@@ -8,6 +8,7 @@ use portolan::map::{Tsdf3, TsdfConfig};
 use serde_json::{Value, json};
 
 use super::source::Source;
+use crate::engine::fusion::inspect::row;
 use crate::engine::{Clock, Refusal};
 
 /// Seconds that one answer spends on what happened before.
@@ -77,10 +78,4 @@ impl Watched {
             "to_look_at": self.since,
         })
     }
-}
-
-/// `[frame, D before, W before, d, K, D after, W after]`; `D before` is `null` where nothing was known.
-fn row((frame, e): &(usize, FusionEvent)) -> Value {
-    let before = (e.weight_before > 0.0).then_some(e.before);
-    json!([frame, before, e.weight_before, e.observation, e.gain, e.after, e.weight_after])
 }

@@ -10,7 +10,6 @@ use portolan_io::scan_log::ScanLog;
 use portolan_sim::SEED;
 use portolan_sim::building::{
     BuildingConfig, BuildingSensor, DepthCamera, SpinningLidar, World3, building_poses, building_world,
-    camera_frame, lidar_frame,
 };
 
 use super::settings::Sensor;
@@ -179,24 +178,14 @@ impl Walk {
         };
         let building = building_world(SEED);
         let poses = building_poses(&building, &BuildingConfig { scans, sensor, seed: SEED });
-        let directions = match &sensor {
-            BuildingSensor::Lidar(lidar) => lidar.directions(),
-            BuildingSensor::Camera(_) => Vec::new(),
-        };
-        let frames = vec![None; poses.len()];
+        let (directions, frames) = (sensor.directions(), vec![None; poses.len()]);
         Self { sensor, kind, world: building.world, poses, directions, frames, bytes: 0 }
     }
 
     fn frame(&mut self, i: usize) -> Option<Arc<Frame>> {
         let (place, pose) = (self.frames.get_mut(i)?, self.poses.get(i)?);
         if place.is_none() {
-            let noise = (SEED, i as u64);
-            let frame = match &self.sensor {
-                BuildingSensor::Lidar(lidar) => {
-                    lidar_frame(&self.world, pose, lidar, &self.directions, noise)
-                }
-                BuildingSensor::Camera(camera) => camera_frame(&self.world, pose, camera, noise),
-            };
+            let frame = self.sensor.frame(&self.world, pose, &self.directions, (SEED, i as u64));
             self.bytes += frame_bytes(&frame);
             *place = Some(Arc::new(frame));
         }

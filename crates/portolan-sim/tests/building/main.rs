@@ -2,15 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
 
+mod truth;
+
 use portolan::geom::Lattice;
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan::sweep::OccupancySweep;
-use portolan_sim::building::{
-    BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, building_log, free_points, score_free,
-    score_surface, seen_surface, surface_errors, surface_points,
-};
+use portolan_sim::building::{BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, building_log};
 use std::sync::LazyLock;
+use truth::{free_points, score_free, score_surface, seen_surface, surface_errors, surface_points};
 
 /// The default lidar: 40 scans of 64 x 1024 rays, noise 1 cm.
 static LIDAR: LazyLock<BuildingLog> = LazyLock::new(|| building_log(&BuildingConfig::default()));
@@ -98,7 +98,7 @@ fn the_surface_of_lidar_scans_is_3_mm_off_in_the_median() {
 
 #[test]
 fn the_surface_and_colours_of_depth_images_are_right() {
-    let camera = DepthCamera::default().with_noise(0.01);
+    let camera = DepthCamera { noise: 0.01, noise_quadratic: 0.0, ..Default::default() };
     let log = building_log(&BuildingConfig {
         scans: 60,
         sensor: BuildingSensor::Camera(camera),

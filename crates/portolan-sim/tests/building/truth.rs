@@ -2,42 +2,44 @@
 //!
 //! The scores take closures, so that they work with any map.
 
-use super::world::World3;
-use crate::{ErrorSummary, Random, Truth};
 use portolan::geom::vector::{along, distance, dot, norm, scale, sub};
 use portolan::geom::{Aabb, Pose};
 use portolan::scan::Frame;
+use portolan_sim::building::{
+    Body, BuildingConfig, BuildingSensor, Shape, SpinningLidar, World3, building_log,
+};
+use portolan_sim::{ErrorSummary, Random};
 
 /// A point of the true surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
+pub(crate) struct SurfacePoint {
     /// The point (world, meters).
-    pub point: [f64; 3],
+    pub(crate) point: [f64; 3],
     /// Unit normal, toward free space.
-    pub normal: [f64; 3],
+    pub(crate) normal: [f64; 3],
     /// Index of the body.
-    pub body: usize,
+    pub(crate) body: usize,
 }
 
 /// Points of the surface of the union of all bodies within a box, uniform by area. O(tries): points inside other bodies and
 /// outside the box are rejected; at most `1000 * count` are drawn.
-pub fn surface_points(world: &World3, within: &Aabb<3>, count: usize, seed: u64) -> Vec<SurfacePoint> {
+pub(crate) fn surface_points(world: &World3, within: &Aabb<3>, count: usize, seed: u64) -> Vec<SurfacePoint> {
     let mut random = Random::stream(seed, 0x5u64);
     let mut sums = Vec::new();
-    let mut area = 0.0;
+    let mut whole = 0.0;
     for body in world.bodies() {
-        area += body.shape.area();
-        sums.push(area);
+        whole += area(&body.shape);
+        sums.push(whole);
     }
     let mut points = Vec::with_capacity(count);
     for _ in 0..count.saturating_mul(1000) {
         if points.len() == count {
             break;
         }
-        let pick = area * random.uniform();
+        let pick = whole * random.uniform();
         let body = sums.partition_point(|s| *s <= pick);
         let Some(b) = world.bodies().get(body) else { continue };
-        let (point, normal) = b.shape.surface_point(&mut random);
+        let (point, normal) = surface_point(&b.shape, &mut random);
         // A step off the face lies in free space, unless another body covers it.
         if within.contains(point) && !world.is_inside(along(point, normal, 1e-6)) {
             points.push(SurfacePoint { point, normal, body });
@@ -51,7 +53,7 @@ pub fn surface_points(world: &World3, within: &Aabb<3>, count: usize, seed: u64)
 ///
 /// Points that no scan observed are unknown to any map. Surfaces at grazing incidence can be lost in maps updated ray by
 /// ray, where rays that end beyond pass through the same cells. O(points x scans + end points).
-pub fn seen_surface(
+pub(crate) fn seen_surface(
     world: &World3,
     points: &[SurfacePoint],
     scans: &[(Pose<3>, Frame)],
@@ -99,7 +101,7 @@ fn end_points(frame: &Frame) -> Box<dyn Iterator<Item = [f64; 3]> + '_> {
 ///
 /// Scans and rays are drawn uniformly, the position on a ray with the square of the range, as for a uniform density in
 /// volume.
-pub fn free_points(
+pub(crate) fn free_points(
     world: &World3,
     scans: &[(Pose<3>, Frame)],
     margin: f64,
@@ -133,7 +135,7 @@ pub fn free_points(
         // The noisy end may lie behind the surface; the ray ended at the true one.
         let true_length = world.cast_ray(pose.translation, direction).map_or(0.0, |h| h.range);
         let p = along(pose.translation, direction, reach);
-        if reach <= true_length - margin && Truth::signed_distance(world, p) >= margin {
+        if reach <= true_length - margin && world.signed_distance(p) >= margin {
             points.push(p);
         }
     }
@@ -142,29 +144,29 @@ pub fn free_points(
 
 /// Counts of the labels that a map gives to points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Labels {
+pub(crate) struct Labels {
     /// Number of free points.
-    pub free: usize,
+    pub(crate) free: usize,
     /// Number of occupied points.
-    pub occupied: usize,
+    pub(crate) occupied: usize,
     /// Number of unknown points.
-    pub unknown: usize,
+    pub(crate) unknown: usize,
 }
 
 impl Labels {
     /// Share of free points.
-    pub fn free_share(&self) -> f64 {
+    pub(crate) fn free_share(&self) -> f64 {
         self.free as f64 / (self.free + self.occupied + self.unknown).max(1) as f64
     }
 
     /// Share of occupied points.
-    pub fn occupied_share(&self) -> f64 {
+    pub(crate) fn occupied_share(&self) -> f64 {
         self.occupied as f64 / (self.free + self.occupied + self.unknown).max(1) as f64
     }
 }
 
 /// Labels of points of true free space. `is_free` returns `None` where the map is unknown.
-pub fn score_free(points: &[[f64; 3]], mut is_free: impl FnMut([f64; 3]) -> Option<bool>) -> Labels {
+pub(crate) fn score_free(points: &[[f64; 3]], mut is_free: impl FnMut([f64; 3]) -> Option<bool>) -> Labels {
     let mut labels = Labels::default();
     points.iter().for_each(|&p| count(&mut labels, is_free(p)));
     labels
@@ -173,7 +175,7 @@ pub fn score_free(points: &[[f64; 3]], mut is_free: impl FnMut([f64; 3]) -> Opti
 /// Labels of points of the true surface: occupied where the map is occupied at the point or one `voxel` (meters) beside it
 /// along an axis, because noise puts hits of a surface into either of two cells; free where the point is free and all of
 /// those are not occupied.
-pub fn score_surface(
+pub(crate) fn score_surface(
     points: &[SurfacePoint],
     voxel: f64,
     mut is_free: impl FnMut([f64; 3]) -> Option<bool>,
@@ -202,62 +204,101 @@ fn count(labels: &mut Labels, is_free: Option<bool>) {
 
 /// The error of a reconstructed surface: signed distances of its points to the true surface (meters), positive in free
 /// space. `None` without points.
-pub fn surface_errors(world: &impl Truth<3>, points: impl Iterator<Item = [f64; 3]>) -> Option<ErrorSummary> {
+pub(crate) fn surface_errors(world: &World3, points: impl Iterator<Item = [f64; 3]>) -> Option<ErrorSummary> {
     ErrorSummary::of(points.map(|p| world.signed_distance(p)).collect())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::building::{BuildingConfig, BuildingSensor, SpinningLidar, building_log};
+/// Area of the surface (square meters).
+fn area(shape: &Shape) -> f64 {
+    let tau = std::f64::consts::TAU;
+    match *shape {
+        Shape::Box { half: [a, b, c], .. } => 8.0 * (a * b + b * c + c * a),
+        Shape::Cylinder { radius, half_height, .. } => tau * radius * (2.0 * half_height + radius),
+        Shape::Sphere { radius, .. } => 2.0 * tau * radius * radius,
+    }
+}
 
-    #[test]
-    fn samples_are_where_they_say() {
-        let lidar = SpinningLidar { rings: 32, columns: 360, ..Default::default() };
-        let log = building_log(&BuildingConfig {
-            scans: 8,
-            sensor: BuildingSensor::Lidar(lidar),
-            ..Default::default()
-        });
-        let world = &log.world;
-        let inner = world.aabb().grown(-0.1);
-        let surface = surface_points(world, &inner, 4000, 1);
-        assert_eq!(surface.len(), 4000);
-        for s in &surface {
-            assert!(world.signed_distance(s.point).abs() < 1e-9 && inner.contains(s.point));
-            assert!(world.signed_distance(along(s.point, s.normal, 1e-3)) > 0.0);
+/// A random point of the surface, uniform by area, with its outward unit normal.
+fn surface_point(shape: &Shape, random: &mut Random) -> ([f64; 3], [f64; 3]) {
+    let turn = |random: &mut Random| {
+        let angle = std::f64::consts::TAU * random.uniform();
+        [libm::cos(angle), libm::sin(angle)]
+    };
+    match *shape {
+        Shape::Box { world_from_box, half: [a, b, c] } => {
+            // Pairs of faces across x, y, z.
+            let areas = [b * c, c * a, a * b];
+            let pick = random.uniform() * areas.iter().sum::<f64>();
+            let axis = usize::from(pick >= areas[0]) + usize::from(pick >= areas[0] + areas[1]);
+            let mut p = [a, b, c].map(|h| h * (2.0 * random.uniform() - 1.0));
+            let mut normal = [0.0; 3];
+            normal[axis] = if p[axis] < 0.0 { -1.0 } else { 1.0 };
+            p[axis] = normal[axis] * [a, b, c][axis];
+            (world_from_box.transform_point(p), world_from_box.rotate(normal))
         }
-        let seen = seen_surface(world, &surface, &log.scans, 0.1, 0.1);
-        println!("{} of {} surface points seen", seen.len(), surface.len());
-        assert!(seen.len() > 1000 && seen.len() < 4000);
-        let free = free_points(world, &log.scans, 0.2, 3000, 1);
-        assert_eq!(free.len(), 3000);
-        assert!(free.iter().all(|&p| world.signed_distance(p) >= 0.2));
-        // A perfect map scores perfectly, an empty map is unknown everywhere.
-        let truth = |p| Some(world.signed_distance(p) > 0.05);
-        assert_eq!(score_free(&free, truth).free_share(), 1.0);
-        assert_eq!(score_surface(&surface, 0.1, truth).occupied_share(), 1.0);
-        assert_eq!(score_free(&free, |_| None).unknown, 3000);
-        assert_eq!(score_surface(&surface, 0.1, |_| Some(true)).free_share(), 1.0);
-        let shifted = surface.iter().map(|s| along(s.point, s.normal, 2e-3));
-        let errors = surface_errors(world, shifted).unwrap();
-        assert!((errors.median - 2e-3).abs() < 1e-9 && errors.bias > 0.0);
+        Shape::Cylinder { centre, radius, half_height } => {
+            let [x, y] = turn(random);
+            let pick = (2.0 * half_height + radius) * random.uniform();
+            if pick < 2.0 * half_height {
+                ([0, 1, 2].map(|k| centre[k] + [radius * x, radius * y, pick - half_height][k]), [x, y, 0.0])
+            } else {
+                let r = radius * random.uniform().sqrt();
+                let up = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+                ([0, 1, 2].map(|k| centre[k] + [r * x, r * y, up * half_height][k]), [0.0, 0.0, up])
+            }
+        }
+        Shape::Sphere { centre, radius } => {
+            let z = 2.0 * random.uniform() - 1.0;
+            let [x, y] = turn(random);
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            let normal = [r * x, r * y, z];
+            (along(centre, normal, radius), normal)
+        }
     }
+}
 
-    #[test]
-    fn area_is_drawn_evenly() {
-        // Half of a box is buried in another one: its points are those of what is left.
-        let shape = |min, max| crate::building::Body {
-            name: String::new(),
-            shape: crate::building::Shape::between(min, max),
-            color: [0; 3],
-        };
-        let world =
-            World3::new(vec![shape([0.0; 3], [2.0, 1.0, 1.0]), shape([1.0, -1.0, -1.0], [4.0, 2.0, 2.0])]);
-        let points = surface_points(&world, &world.aabb(), 40_000, 3);
-        // 1 m of a bar of 1 m x 1 m with one end, and a block without the bar's end.
-        let (bar, block) = (4.0 + 1.0, 2.0 * 9.0 + 4.0 * 9.0 - 1.0);
-        let share = points.iter().filter(|s| s.body == 0).count() as f64 / points.len() as f64;
-        assert!((share - bar / (bar + block)).abs() < 0.006, "{share}");
+#[test]
+fn samples_are_where_they_say() {
+    let lidar = SpinningLidar { rings: 32, columns: 360, ..Default::default() };
+    let log = building_log(&BuildingConfig {
+        scans: 8,
+        sensor: BuildingSensor::Lidar(lidar),
+        ..Default::default()
+    });
+    let world = &log.world;
+    let inner = world.aabb().grown(-0.1);
+    let surface = surface_points(world, &inner, 4000, 1);
+    assert_eq!(surface.len(), 4000);
+    for s in &surface {
+        assert!(world.signed_distance(s.point).abs() < 1e-9 && inner.contains(s.point));
+        assert!(world.signed_distance(along(s.point, s.normal, 1e-3)) > 0.0);
     }
+    let seen = seen_surface(world, &surface, &log.scans, 0.1, 0.1);
+    println!("{} of {} surface points seen", seen.len(), surface.len());
+    assert!(seen.len() > 1000 && seen.len() < 4000);
+    let free = free_points(world, &log.scans, 0.2, 3000, 1);
+    assert_eq!(free.len(), 3000);
+    assert!(free.iter().all(|&p| world.signed_distance(p) >= 0.2));
+    // A perfect map scores perfectly, an empty map is unknown everywhere.
+    let truth = |p| Some(world.signed_distance(p) > 0.05);
+    assert_eq!(score_free(&free, truth).free_share(), 1.0);
+    assert_eq!(score_surface(&surface, 0.1, truth).occupied_share(), 1.0);
+    assert_eq!(score_free(&free, |_| None).unknown, 3000);
+    assert_eq!(score_surface(&surface, 0.1, |_| Some(true)).free_share(), 1.0);
+    let shifted = surface.iter().map(|s| along(s.point, s.normal, 2e-3));
+    let errors = surface_errors(world, shifted).unwrap();
+    assert!((errors.median - 2e-3).abs() < 1e-9 && errors.bias > 0.0);
+}
+
+#[test]
+fn area_is_drawn_evenly() {
+    // Half of a box is buried in another one: its points are those of what is left.
+    let shape = |min, max| Body { name: String::new(), shape: Shape::between(min, max), color: [0; 3] };
+    let world =
+        World3::new(vec![shape([0.0; 3], [2.0, 1.0, 1.0]), shape([1.0, -1.0, -1.0], [4.0, 2.0, 2.0])]);
+    let points = surface_points(&world, &world.aabb(), 40_000, 3);
+    // 1 m of a bar of 1 m x 1 m with one end, and a block without the bar's end.
+    let (bar, block) = (4.0 + 1.0, 2.0 * 9.0 + 4.0 * 9.0 - 1.0);
+    let share = points.iter().filter(|s| s.body == 0).count() as f64 / points.len() as f64;
+    assert!((share - bar / (bar + block)).abs() < 0.006, "{share}");
 }
