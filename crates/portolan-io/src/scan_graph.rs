@@ -147,7 +147,7 @@ mod tests {
         let mut wrong = one_scan();
         wrong[8] = 9;
         says(read(wrong), "byte 8: a point is 9 numbers; 3 are expected");
-        no_panic(&one_scan(), 3, 3000, read);
+        no_panic(one_scan(), 3, 3000, read);
     }
 
     #[test]

@@ -20,7 +20,6 @@ fn crossovers([plane, space]: [f64; 2]) -> [f64; 3] {
         crossover_resolution::<3>(space, s * HEIGHT, v * HEIGHT),
         crossover_resolution::<3>(space, s * HEIGHT + 2.0 * v, v * HEIGHT),
     ];
-    println!("crossovers: {}", crossovers.map(cm).join(", "));
     crossovers
 }
 

@@ -5,12 +5,18 @@ pub(crate) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty())
 }
 
-/// The numbers of a line before its comment, at most `N` of them, and how many; `Err` is the word that is none and its column.
+/// A word that is not a number, and its column.
+pub(crate) type BadWord<'a> = (&'a [u8], String);
+
+/// The numbers of a line before its comment, at most `N` of them, and how many.
+///
+/// # Errors
+/// The first word that is not a number.
 pub(crate) fn columns<const N: usize>(
     line: &[u8],
     separates: impl Fn(u8) -> bool,
     number: impl Fn(&[u8]) -> Option<f64>,
-) -> Result<([f64; N], usize), (&[u8], String)> {
+) -> Result<([f64; N], usize), BadWord<'_>> {
     let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
     let words = content.split(|b| b.is_ascii_whitespace() || separates(*b));
     let (mut values, mut count) = ([0.0; N], 0);

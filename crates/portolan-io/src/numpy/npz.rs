@@ -37,7 +37,7 @@ pub fn write_npz(path: impl AsRef<Path>, arrays: &[(&str, &NpyArray)]) -> Result
         npy::check(path, array)?;
         let plain = !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
         if !plain || name.len() > 100 || arrays[..k].iter().any(|(other, _)| other == name) {
-            return refuse("the name of an array", shown(&name), "give each a unique name in ASCII");
+            return refuse("the name of an array", shown(name), "give each a unique name in ASCII");
         }
         let mut sum = Summed::default();
         npy::write(&mut sum, array).map_err(|e| IoError::os(path, "write it", e))?;
