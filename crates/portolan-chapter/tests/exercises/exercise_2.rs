@@ -15,12 +15,11 @@ const HEIGHT: f64 = 3.0;
 /// alone, and there with floor and ceiling.
 fn crossovers([plane, space]: [f64; 2]) -> [f64; 3] {
     let (s, v) = PLANE;
-    let crossovers = [
+    [
         crossover_resolution::<2>(plane, s, v),
         crossover_resolution::<3>(space, s * HEIGHT, v * HEIGHT),
         crossover_resolution::<3>(space, s * HEIGHT + 2.0 * v, v * HEIGHT),
-    ];
-    crossovers
+    ]
 }
 
 /// Exercise 2 (a) and (b): 1.5 cm in the plane, and in space 1.25 cm for walls alone and 0.89 cm with floor and ceiling.
