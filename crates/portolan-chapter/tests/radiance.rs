@@ -1,4 +1,4 @@
-//! The behaviours of the chapter's last section and of its exercise 7, each on its named seed.
+//! The behaviours of the textbook's last section and of its exercise 7, each on its named seed.
 //!
 //! The numbers asserted leave room about those observed (in comments): the arithmetic is the same on every
 //! platform, the margins are for changes of the settings.

@@ -26,7 +26,7 @@ struct Args {
     log: Option<PathBuf>,
     #[arg(long, default_value = "drive.png")]
     out: PathBuf,
-    /// Radius of the robot (metres)
+    /// Radius of the robot (meters)
     #[arg(long, default_value_t = 0.25)]
     radius: f64,
 }

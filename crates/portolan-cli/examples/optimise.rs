@@ -25,10 +25,10 @@ struct Args {
     log: Option<PathBuf>,
     #[arg(long, default_value = "optimise.png")]
     out: PathBuf,
-    /// Radius of the robot (metres)
+    /// Radius of the robot (meters)
     #[arg(long, default_value_t = 0.18)]
     radius: f64,
-    /// Clearance beyond the radius that costs nothing (metres)
+    /// Clearance beyond the radius that costs nothing (meters)
     #[arg(long, default_value_t = 0.25)]
     margin: f64,
     #[arg(long, default_value_t = 400)]
@@ -121,7 +121,7 @@ fn descend(place: &Place, line: &mut [[f64; 2]], wanted: f64) {
     }
 }
 
-/// Sum of the angles between legs (radians) for a metre.
+/// Sum of the angles between legs (radians) for a meter.
 fn roughness(line: &[[f64; 2]]) -> f64 {
     let turn = |w: &[[f64; 2]]| {
         let [a, b] = [vector::sub(w[1], w[0]), vector::sub(w[2], w[1])];
@@ -130,7 +130,7 @@ fn roughness(line: &[[f64; 2]]) -> f64 {
     line.windows(3).map(turn).sum::<f64>() / length(line)
 }
 
-/// Share of the way with less than this certified (metres).
+/// Share of the way with less than this certified (meters).
 fn narrow(place: &Place, line: &[[f64; 2]], wanted: f64) -> f64 {
     let profile = place.profile(line);
     profile.iter().filter(|[_, lower]| *lower < wanted).count() as f64 / profile.len() as f64

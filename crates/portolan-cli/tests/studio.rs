@@ -167,7 +167,7 @@ fn fused_scans(map: &Path) -> u64 {
     summary["scans"]["fused"].as_u64().unwrap_or_else(|| panic!("{summary}"))
 }
 
-/// The triangles of a mesh, whatever their order: corners in tenths of millimetres.
+/// The triangles of a mesh, whatever their order: corners in tenths of millimeters.
 fn surface(mesh: &Path) -> Vec<[[i64; 3]; 3]> {
     let mesh = read_ply_mesh(mesh).unwrap();
     let corner = |i: u32| mesh.vertices[i as usize].map(|v| (v * 1e4).round() as i64);

@@ -37,7 +37,7 @@ impl Chart {
         let left = rect.x + y_label_width + widest + 7.0;
         let width = rect.right() - left;
         let x_ticks = ticks(&self.x, x, (width / 90.0) as usize);
-        // The last label is centred below its tick, which may be the end of the axis.
+        // The last label is centerd below its tick, which may be the end of the axis.
         let overhang = x_ticks.last().map_or(0.0, |(value, label)| {
             let room = (x[1] - value) / (x[1] - x[0]) * width;
             (0.5 * small.width(label) - room).max(0.0)

@@ -1,7 +1,7 @@
 //! OctoMap files of a map that was fused here, with their leaves as text; or how long reading a file takes.
 //!
-//! `octree_files OUT` writes `bytes.bt`, `bytes.ot`, `bytes.csv` and the same of `floats` into a folder; a row is the centre
-//! of a leaf, its edge (metres) and its log odds. `octree_files --time FILE` prints milliseconds, the best of ten.
+//! `octree_files OUT` writes `bytes.bt`, `bytes.ot`, `bytes.csv` and the same of `floats` into a folder; a row is the center
+//! of a leaf, its edge (meters) and its log odds. `octree_files --time FILE` prints milliseconds, the best of ten.
 //! `bench/octomap_roundtrip.py` uses both.
 
 use std::error::Error;

@@ -8,17 +8,17 @@ use portolan::{Answer, Status};
 /// One row of answers; `None` becomes an empty field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnswerRow<const D: usize> {
-    /// The query point (metres).
+    /// The query point (meters).
     pub point: [f64; D],
     /// What is known about the distance.
     pub status: Status,
     /// Probability of being occupied.
     pub occupancy: Option<f64>,
-    /// Signed distance (metres).
+    /// Signed distance (meters).
     pub distance: Option<f64>,
-    /// Certified lower bound (metres).
+    /// Certified lower bound (meters).
     pub lower: Option<f64>,
-    /// Certified upper bound (metres).
+    /// Certified upper bound (meters).
     pub upper: Option<f64>,
     /// Gradient of the distance.
     pub gradient: Option<[f64; D]>,
@@ -44,7 +44,7 @@ impl<const D: usize> AnswerRow<D> {
     }
 
     /// Fills in the certified bounds, where the row has a distance; `p` is its point in the frame of the field.
-    /// A lower bound of `limit` metres or more makes the answer saturated.
+    /// A lower bound of `limit` meters or more makes the answer saturated.
     pub fn certify(
         &mut self,
         field: &impl ClearanceField<D>,
@@ -73,7 +73,7 @@ impl<const D: usize> AnswerRow<D> {
 /// A field is computed this many cells farther than it is reported, so that a saturated answer is certified.
 pub const HELD_BACK: f64 = 2.0;
 
-/// Metres up to which a field in bricks certifies: bounds fall short of distances by less than the two cells that are
+/// Meters up to which a field in bricks certifies: bounds fall short of distances by less than the two cells that are
 /// held back.
 pub fn certified_reach<const D: usize>(field: &Esdf<D>) -> f64 {
     f64::from(field.max_distance()) - HELD_BACK * field.lattice().resolution

@@ -9,9 +9,9 @@
 //! | 12 | u32 | D, 2 or 3 |
 //! | 16 | u32 x 3 | shape x, y, z (unused = 1) |
 //! | 28 | u32 | flags; bit 0: a status plane follows |
-//! | 32 | f64 x 3 | origin, the corner of cell 0 (metres; unused = 0) |
-//! | 56 | f64 | resolution (metres) |
-//! | 64 | f32 x cells | signed distance (metres), x fastest, NaN where unknown |
+//! | 32 | f64 x 3 | origin, the corner of cell 0 (meters; unused = 0) |
+//! | 56 | f64 | resolution (meters) |
+//! | 64 | f32 x cells | signed distance (meters), x fastest, NaN where unknown |
 //! | then, with bit 0 | u8 x cells | 0 unknown, 1 known, 2 saturated |
 
 use std::fs::File;
@@ -35,13 +35,13 @@ const MOST_CELLS: u64 = 1 << 29;
 /// A field whose dimension the file tells.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EsdfFile {
-    /// A field in the plane.
+    /// A 2-D field.
     Two(EsdfGrid<2>),
-    /// A field in space.
+    /// A 3-D field.
     Three(EsdfGrid<3>),
 }
 
-/// Writes an `esdf.bin`: distances (metres, x fastest, NaN where unknown), and what each is worth as [`Status::byte`] has it.
+/// Writes an `esdf.bin`: distances (meters, x fastest, NaN where unknown), and what each is worth as [`Status::byte`] has it.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] where lengths do not fit the grid or the grid does not fit the format, else as

@@ -1,6 +1,6 @@
 //! Contours as GeoJSON: one `Feature` with a `MultiLineString`.
 //!
-//! Coordinates are metres of the map's own frame, not degrees as RFC 7946 has it; as the property `units` states.
+//! Coordinates are meters of the map's own frame, not degrees as RFC 7946 has it; as the property `units` states.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -17,7 +17,7 @@ use crate::{IoError, Polyline, Result};
 /// The longest file that is read (bytes).
 const LONGEST: u64 = 256 << 20;
 
-/// Writes polylines (metres, in order; a closed one repeats its first point).
+/// Writes polylines (meters, in order; a closed one repeats its first point).
 ///
 /// # Errors
 /// [`IoError::Unwritable`] for a coordinate that is not finite, else as [`write_atomic`].

@@ -10,7 +10,7 @@ use crate::{IoError, Result, write_atomic};
 /// Bytes of a point.
 const STRIDE: usize = 16;
 
-/// Reads a scan (metres, the lidar's frame: x forward, y left, z up).
+/// Reads a scan (meters, the lidar's frame: x forward, y left, z up).
 ///
 /// # Errors
 /// [`IoError::Binary`] where the length is not a multiple of 16 bytes.
@@ -38,7 +38,7 @@ pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile> {
     Ok(builder.finish())
 }
 
-/// Whether a file, which has no magic, may be a scan: by its length, and by its first numbers, which are metres.
+/// Whether a file, which has no magic, may be a scan: by its length, and by its first numbers, which are meters.
 pub(crate) fn may_be_scan(path: &Path) -> bool {
     let whole = std::fs::metadata(path).is_ok_and(|m| m.len() > 0 && m.len() % STRIDE as u64 == 0);
     let head = || open(path).and_then(|mut input| input.read_up_to(4096)).unwrap_or_default();

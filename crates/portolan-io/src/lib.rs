@@ -101,5 +101,5 @@ pub use scan_graph::{ScanGraphNode, parse_scan_graph, read_scan_graph};
 pub use svg::{SvgStyle, write_svg};
 pub use xyz::read_xyz;
 
-/// Points joined by straight segments (metres); a closed line repeats its first point at the end.
+/// Points joined by straight segments (meters); a closed line repeats its first point at the end.
 pub type Polyline = Vec<[f64; 2]>;

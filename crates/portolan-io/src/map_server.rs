@@ -46,9 +46,9 @@ pub enum MapMode {
 pub struct MapServerInfo {
     /// The image, as written in the file (relative to it); empty for an image alone.
     pub image: PathBuf,
-    /// Edge of a pixel (metres).
+    /// Edge of a pixel (meters).
     pub resolution: f64,
-    /// Pose of the lower left corner of the lower left pixel: x, y (metres), yaw (radians).
+    /// Pose of the lower left corner of the lower left pixel: x, y (meters), yaw (radians).
     pub origin: [f64; 3],
     /// Whether white means occupied.
     pub negate: bool,

@@ -9,7 +9,7 @@ use crate::{IoError, Result};
 /// The most points of a file.
 const MOST_POINTS: usize = 1 << 25;
 
-/// Query points (metres), 2-D or 3-D as the file has them.
+/// Query points (meters), 2-D or 3-D as the file has them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum QueryPoints {
     /// `x,y`
@@ -19,7 +19,7 @@ pub enum QueryPoints {
 }
 
 impl QueryPoints {
-    /// Reads a file: `x,y` or `x,y,z` per line, in metres; `#` starts a comment, blank lines are ignored, a
+    /// Reads a file: `x,y` or `x,y,z` per line, in meters; `#` starts a comment, blank lines are ignored, a
     /// first line `x,y` or `x,y,z` in letters is a header.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Contours as SVG: one unit is one metre, y up.
+//! Contours as SVG: one unit is one meter, y up.
 
 use std::fmt::Write as _;
 use std::io::Write;
@@ -18,7 +18,7 @@ pub struct SvgStyle {
     pub stroke_width_px: f64,
     /// Longer edge of the picture when it is opened alone (pixels).
     pub size_px: f64,
-    /// Empty border around the contour (metres).
+    /// Empty border around the contour (meters).
     pub margin: f64,
 }
 
@@ -32,7 +32,7 @@ impl Default for SvgStyle {
 /// Coordinates beyond this are drawn relative to a corner: viewers compute with f32.
 const FAR: f64 = 10_000.0;
 
-/// Writes polylines (metres, y up).
+/// Writes polylines (meters, y up).
 ///
 /// The coordinates of the paths are the world's; where they lie farther than 10 km from its zero they are
 /// relative to the point in the attribute `data-origin`.
@@ -68,7 +68,7 @@ pub fn write_svg(path: impl AsRef<Path>, lines: &[Polyline], style: &SvgStyle) -
     })
 }
 
-/// Path commands, a tenth of a millimetre fine.
+/// Path commands, a tenth of a millimeter fine.
 fn data(line: &[[f64; 2]], origin: [f64; 2]) -> String {
     let closed = line.len() > 2 && line.first() == line.last();
     let drawn = if closed { &line[..line.len() - 1] } else { line };

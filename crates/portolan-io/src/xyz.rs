@@ -22,7 +22,7 @@ const MOST_COLUMNS: usize = 64;
 /// The most points of a file.
 const MOST_POINTS: usize = 1 << 30;
 
-/// Reads a text file of points (metres), plain or packed by gzip or bzip2. Memory grows with the points, not with the text.
+/// Reads a text file of points (meters), plain or packed by gzip or bzip2. Memory grows with the points, not with the text.
 ///
 /// # Errors
 /// [`IoError::Text`] for a line that is not a point, for lines with different numbers of columns, and for a file without

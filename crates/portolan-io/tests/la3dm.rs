@@ -60,7 +60,7 @@ fn fused(folder: &std::path::Path) -> Occupancy<3, LogOdds32> {
     map
 }
 
-/// Centre and probability of each leaf.
+/// Center and probability of each leaf.
 fn rows(folder: &std::path::Path) -> Vec<([f64; 3], f64)> {
     let text = std::fs::read_to_string(folder.join("sim_structured_octomap.csv")).unwrap();
     let row = |line: &str| {

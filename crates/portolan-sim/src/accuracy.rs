@@ -4,11 +4,11 @@ use serde::Serialize;
 
 /// The world as it is. The simulator knows it.
 pub trait Truth<const D: usize> {
-    /// Signed distance to the nearest true surface (metres), positive in free space.
+    /// Signed distance to the nearest true surface (meters), positive in free space.
     fn signed_distance(&self, p_world: [f64; D]) -> f64;
 }
 
-/// Order statistics of signed errors (metres): answer minus truth.
+/// Order statistics of signed errors (meters): answer minus truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorSummary {
     /// Number of answers compared.

@@ -9,20 +9,20 @@ use serde::Serialize;
 /// a bias grows with the way itself: it is what makes a lap not close.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OdometryNoise {
-    /// Standard deviation of the position after one metre (metres).
+    /// Standard deviation of the position after one meter (meters).
     pub position_per_metre: f64,
-    /// Standard deviation of the heading after one metre (radians).
+    /// Standard deviation of the heading after one meter (radians).
     pub heading_per_metre: f64,
     /// Standard deviation of the heading after a turn of one radian (radians).
     pub heading_per_radian: f64,
     /// Distances are measured too long by this part of them (a wheel's radius).
     pub scale_bias: f64,
-    /// The heading drifts by so much on every metre (radians; wheels of different radii).
+    /// The heading drifts by so much on every meter (radians; wheels of different radii).
     pub heading_bias_per_metre: f64,
 }
 
 impl Default for OdometryNoise {
-    /// A small differential drive: after a lap of the Apartment it is about a metre and some degrees off.
+    /// A small differential drive: after a lap of the Apartment it is about a meter and some degrees off.
     fn default() -> Self {
         Self {
             position_per_metre: 0.01,
@@ -35,7 +35,7 @@ impl Default for OdometryNoise {
 }
 
 impl OdometryNoise {
-    /// Standard deviations `[position (metres), heading (radians)]` of a measured motion, bias included; never
+    /// Standard deviations `[position (meters), heading (radians)]` of a measured motion, bias included; never
     /// quite zero, so that they can be inverted.
     pub fn sigmas(&self, motion: &Pose<2>) -> [f64; 2] {
         let (way, turn) = (norm(motion.translation), heading(motion).abs());
@@ -86,7 +86,7 @@ pub fn heading(pose: &Pose<2>) -> f64 {
     libm::atan2(pose.rotation[1][0], pose.rotation[0][0])
 }
 
-/// A pose of a position (metres) and a heading (radians), the same bytes on every platform.
+/// A pose of a position (meters) and a heading (radians), the same bytes on every platform.
 pub fn planar(x: f64, y: f64, theta: f64) -> Pose<2> {
     Pose::from_cos_sin(x, y, libm::cos(theta), libm::sin(theta))
 }

@@ -1,4 +1,4 @@
-//! Meshes of a gyroid of four periods in 256^3 cells: as an array, and as bricks with weights and colours.
+//! Meshes of a gyroid of four periods in 256^3 cells: as an array, and as bricks with weights and colors.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

@@ -1,4 +1,4 @@
-//! Occupancy of space from a lidar of 64 x 1024 beams in a building, at 10 and 5 cm, with one and two threads.
+//! 3-D occupancy from a lidar of 64 x 1024 beams in a building, at 10 and 5 cm, with one and two threads.
 //!
 //! `update` fuses 20 scans into an empty map (the range images are made inside the clock); the items of the counter are
 //! scans. With `PORTOLAN_BENCH_DATA` set to a folder that holds `lidar_building/` (KITTI layout) its first scans are taken,
@@ -97,7 +97,7 @@ fn fused(sweep: OccupancySweep, resolution: f64) -> Map {
     map
 }
 
-/// Resolution in centimetres and number of threads.
+/// Resolution in centimeters and number of threads.
 const CASES: [(u32, usize); 4] = [(10, 1), (10, 2), (5, 1), (5, 2)];
 
 fn update(bencher: Bencher, sweep: OccupancySweep, (cm, threads): (u32, usize)) {

@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut mapper = Mapper::<3>::with(MapperSettings { color: true, ..MapperSettings::new(0.02) });
     for i in 0..10 {
         let x = 0.05 * f64::from(i);
-        // A ball of 0.5 m before a wall at 2 m, seen from (x, 0, 0); metres along z, 0 where nothing was measured.
+        // A ball of 0.5 m before a wall at 2 m, seen from (x, 0, 0); meters along z, 0 where nothing was measured.
         let (mut depths, mut colors) = (Vec::new(), Vec::new());
         for pixel in 0..320 * 240 {
             let ray = [

@@ -90,7 +90,7 @@ fn nodes_of_the_apartment_are_exact() {
     Errors::of(&esdf, 1, |p| segments.distance(p)).assert_exact("apartment", 0.999);
 }
 
-/// Probes in observed free space, more than 5 cm from the contour; errors in metres against the contour and against the
+/// Probes in observed free space, more than 5 cm from the contour; errors in meters against the contour and against the
 /// true walls, and lengths of gradients, by each method.
 #[test]
 fn distances_of_the_apartment_by_every_method() {

@@ -58,7 +58,7 @@ impl<const D: usize> Probes<'_, D> {
     }
 }
 
-/// Slack of the bounds in millimetres.
+/// Slack of the bounds in millimeters.
 #[derive(Default)]
 struct Slack {
     lower: [Vec<f64>; 3],
@@ -221,7 +221,7 @@ fn unknown_cells_are_bounded<const D: usize>(
         let want = r * unknown.iter().map(to).fold(f64::INFINITY, f64::min).sqrt();
         match esdf.unknown_distance(p) {
             Answer::Known(c) => {
-                // World coordinates of half a million metres in f64.
+                // World coordinates of half a million meters in f64.
                 assert!(c.lower <= want + 1e-9 && want <= c.upper + 1e-9, "{c:?} {want}");
                 assert!(want >= 0.999 * r || c.upper - c.lower < 1e-3 * r);
                 assert!(c.upper - c.lower < 1.8 * r, "{c:?} {want}");

@@ -76,7 +76,7 @@ fn the_expected_gain_is_what_a_scan_adds_and_more() {
     tsdf.integrate(&poses[best], &portolan_sim::scan_at(world, &poses[best], &lidar, 999, 1)).unwrap();
     let new = observed(&tsdf) - before;
     println!("{new} cells are new, {} were hoped for", gains[best].cells);
-    // A metre of the unknown is about what lies behind a door.
+    // A meter of the unknown is about what lies behind a door.
     assert!((0.5..2.0).contains(&(new as f64 / gains[best].cells as f64)));
 }
 

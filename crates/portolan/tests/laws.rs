@@ -101,7 +101,7 @@ fn a_quarter_turn_of_everything_turns_the_contour() {
     assert!(differing * 200 <= asked, "{differing} of {asked} answers differ");
 }
 
-/// A map of space seen by a planar scan is the map of the plane.
+/// A 3-D map seen by a planar scan is the 2-D map.
 #[test]
 fn a_slice_of_space_is_the_plane() {
     let log = &apartment().log[..40];
@@ -133,7 +133,7 @@ fn a_slice_of_space_is_the_plane() {
         }
         assert_eq!(space.store().cell([x, y, 1]), None);
     }
-    // Normalising a direction in space may change its last bit, and with it a cell at a corner.
+    // Normalising a 3-D direction may change its last bit, and with it a cell at a corner.
     assert!(differing <= 20, "{differing} cells differ");
     assert!(off < 1e-3, "{off}");
 }

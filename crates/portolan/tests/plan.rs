@@ -20,7 +20,7 @@ use portolan_sim::building::{BuildingConfig, BuildingSensor, SpinningLidar, buil
 use scenes::{Random, Segments};
 use std::sync::LazyLock;
 
-/// The Apartment at 5 cm, its field up to one metre, and the contour it is about.
+/// The Apartment at 5 cm, its field up to one meter, and the contour it is about.
 static APARTMENT: LazyLock<(Tsdf2, Esdf<2>, Segments)> = LazyLock::new(|| {
     let tsdf = tsdf(BeamSweep::CellCentre, true, &apartment().log);
     let settings = EsdfSettings { unknown: true, ..Default::default() };

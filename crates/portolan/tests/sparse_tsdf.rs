@@ -305,7 +305,7 @@ proptest! {
 
 #[test]
 fn a_map_moves_with_the_scan() {
-    // The lattice of the second map is that of the first, carried along by whole turns of a quarter and whole metres.
+    // The lattice of the second map is that of the first, carried along by whole turns of a quarter and whole meters.
     let camera = Pinhole { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 };
     let frame = Frame::Image(image(Projection::Pinhole(camera), 64, 48, patchy(5, 0.8, 2.5)));
     let at = tilted(0.3, -0.2, 0.1, [0.2, -0.5, 0.1, 0.8]);

@@ -1,4 +1,4 @@
-//! The TSDF in bricks on scenes whose surfaces are known, and on input that is none.
+//! The TSDF in bricks on scenes whose surfaces are known, and on bad input.
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the report")]
 
 use portolan::cell::SignedDistance;
@@ -76,7 +76,7 @@ fn crossings(map: &Tsdf3) -> Vec<[f64; 3]> {
     found
 }
 
-/// Median and 95th percentile (metres).
+/// Median and 95th percentile (meters).
 fn quantiles(mut errors: Vec<f64>) -> (f64, f64) {
     errors.sort_by(f64::total_cmp);
     (errors[errors.len() / 2], errors[errors.len() * 95 / 100])
@@ -332,6 +332,6 @@ fn points_in_one_call_at_utm_coordinates() {
     let stats = map.integrate_points(&points, far).unwrap();
     assert_eq!(stats.beams.hit, 1000);
     let d = map.signed_distance(vector::add(far, [1.97, 0.3, 0.3])).known().unwrap();
-    // The cell's centre lies 2.5 cm before the wall; along the ray it is a little more.
+    // The cell's center lies 2.5 cm before the wall; along the ray it is a little more.
     assert!((d - 0.025).abs() < 0.003, "{d}");
 }

@@ -10,7 +10,7 @@ use portolan::surface::{ContourSettings, marching_squares, thin_walls};
 use portolan_sim::{Lidar, Solid, SolidKind, World, scan_at};
 
 /// A wall of this thickness between two halves of a room, seen from 20 places on either side; returns the
-/// extracted thickness (metres) and the length that is reported as too thin.
+/// extracted thickness (meters) and the length that is reported as too thin.
 fn extracted(thickness: f64, sweep: BeamSweep, truncation: f64) -> (f64, f64) {
     let half = 0.5 * thickness;
     let wall = |name: &str, min, max| Solid::rectangle(name, SolidKind::Wall, min, max);
@@ -51,7 +51,7 @@ fn extracted(thickness: f64, sweep: BeamSweep, truncation: f64) -> (f64, f64) {
 /// from both sides, they do not.) Between tau and 2 tau the claims overlap inside the wall only, and harmlessly.
 #[test]
 fn walls_of_10_20_and_30_cm_seen_from_both_sides() {
-    // tau, thickness, extracted thickness, all in metres; then whether the warning must come.
+    // tau, thickness, extracted thickness, all in meters; then whether the warning must come.
     let table = [
         (0.15, 0.10, 0.111, true),
         (0.15, 0.20, 0.197, true),

@@ -130,7 +130,7 @@ impl Drift {
         seen
     }
 
-    /// Metres and radians.
+    /// Meters and radians.
     pub fn to_json(&self) -> Value {
         let errors = |e: &PoseErrors| json!({ "translation": e.translation, "rotation": e.rotation });
         let relative = |set| errors(&PoseErrors::relative(self.poses(set), &self.truth, 10));

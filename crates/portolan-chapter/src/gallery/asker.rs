@@ -51,7 +51,7 @@ impl Asker<'_> {
     }
 }
 
-/// Centres of cells that were seen free, more than 5 cm from any surface.
+/// Centers of cells that were seen free, more than 5 cm from any surface.
 pub(super) fn observed_free(tsdf: &Tsdf2, min_weight: f32, truth: Option<&dyn Truth<2>>) -> Vec<[f64; 2]> {
     let inside = Aabb::new(tsdf.grid().aabb().min, tsdf.grid().aabb().max).grown(-tsdf.config().resolution);
     let candidates = points(&inside, 16_000).into_iter();

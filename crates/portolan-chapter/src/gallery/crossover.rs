@@ -8,7 +8,7 @@ use portolan::map::{Cloud, MapError, Quadtree};
 use portolan::scan::Scan;
 use serde::Serialize;
 
-/// What the chapter's tree stores a node.
+/// What the textbook's tree stores a node.
 pub(super) const CHAPTER_NODE: &str = "chapter's node, 20 B";
 /// What ours does.
 pub(super) const OUR_NODE: &str = "our node, 9 B an inner one";
@@ -64,7 +64,7 @@ impl Plane {
 }
 
 /// Fuses a log into a tree of leaves of each of these sizes (meters) over a box that holds `surface` meters of surface:
-/// what the chapter's node and ours take of a dense array over the same cells, by the formula and measured.
+/// what the textbook's node and ours take of a dense array over the same cells, by the formula and measured.
 ///
 /// # Errors
 /// Where a size or the model is not possible.

@@ -11,7 +11,7 @@ use portolan_sim::ErrorSummary;
 pub struct MeasuredField {
     /// How it was made.
     pub method: EsdfMethod,
-    /// Distances at the cell centres.
+    /// Distances at the cell centers.
     pub field: EsdfGrid<2>,
     /// Seconds of a full rebuild.
     pub seconds: f64,

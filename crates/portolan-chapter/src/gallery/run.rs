@@ -77,9 +77,9 @@ pub struct Gallery {
     pub contour: Contour,
     /// The cloud, for pictures.
     pub cloud: Cloud<2>,
-    /// The tree with the chapter's leaves.
+    /// The tree with the textbook's leaves.
     pub(super) chapter_tree: Quadtree,
-    /// The TSDF by the chapter's march.
+    /// The TSDF by the textbook's march.
     pub(super) marched: Tsdf2,
     pub(super) contour_settings: ContourSettings,
 }

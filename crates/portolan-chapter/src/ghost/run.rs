@@ -176,7 +176,7 @@ pub fn chair(world: &World) -> Aabb<2> {
     world.solids().iter().filter(|s| s.name == "chair").fold(Aabb::EMPTY, |b, s| b.union(s.aabb()))
 }
 
-/// Cells of the chair's place: centre in the chair or within a cell of it, estimated as behind or near its surface.
+/// Cells of the chair's place: center in the chair or within a cell of it, estimated as behind or near its surface.
 pub(crate) fn old_place(tsdf: &Tsdf2, place: Aabb<2>) -> Vec<[i32; 2]> {
     let near = place.grown(tsdf.grid().lattice.resolution);
     let limit = (0.5 * tsdf.config().truncation) as f32;

@@ -1,4 +1,4 @@
-//! Pictures of a run: every representation of one log, side by side or one by one, in the chapter's colors.
+//! Pictures of a run: every representation of one log, side by side or one by one, in the textbook's colors.
 
 mod drift;
 mod ghost;

@@ -70,7 +70,7 @@ impl Outline {
         let fold =
             |f: fn(f64, f64) -> f64, k: usize| self.points.iter().map(|p| p[k]).reduce(f).unwrap_or(0.0);
         self.corner = [fold(f64::min, 0), fold(f64::min, 1)];
-        // A stray reading at a kilometre must not cost memory: beyond so many cells the last one holds the rest.
+        // A stray reading at a kilometer must not cost memory: beyond so many cells the last one holds the rest.
         let cells = |k: usize| (((fold(f64::max, k) - self.corner[k]) / CELL) as usize).min(1023) + 1;
         self.shape = [cells(0), cells(1)];
         let bucket: Vec<usize> = self.points.iter().map(|p| self.bucket(*p)).collect();

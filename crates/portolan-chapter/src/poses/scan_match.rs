@@ -179,7 +179,7 @@ fn judge(
     if share > settings.max_contradicted_share {
         return Err(MatchRefusal::Contradicted { share });
     }
-    // Residuals smaller than half a centimetre are luck.
+    // Residuals smaller than half a centimeter are luck.
     let sigma = rms.max(0.005);
     let scale = 1.0 / (sigma * sigma * settings.pairs_per_independent);
     let h = system.hessian;

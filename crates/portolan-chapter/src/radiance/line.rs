@@ -91,7 +91,7 @@ impl Line {
         self.density.len()
     }
 
-    /// Centre of a bin, m.
+    /// Center of a bin, m.
     pub fn centre(&self, bin: usize) -> f64 {
         self.origin + (bin as f64 + 0.5) * self.resolution
     }

@@ -34,7 +34,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The scene of the chapter's toy: 80 bins over 8 m, a wall at either end, a pillar between, seven rays
+    /// The scene of the textbook's toy: 80 bins over 8 m, a wall at either end, a pillar between, seven rays
     /// to learn from and three held out, from ten origins, looking either way.
     ///
     /// The room on the left has a dark wall and a bright one, near the ends of what can be reflected: no

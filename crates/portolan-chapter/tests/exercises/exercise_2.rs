@@ -11,7 +11,7 @@ use portolan_sim::{LapConfig, apartment, lap};
 const PLANE: (f64, f64) = (180.6, 108.0);
 const HEIGHT: f64 = 3.0;
 
-/// Crossovers of trees of so many bytes a node in the plane and in space: in the plane, under the ceiling for walls
+/// Crossovers of trees of so many bytes a node in 2-D and 3-D: in 2-D, under the ceiling for walls
 /// alone, and there with floor and ceiling.
 fn crossovers([plane, space]: [f64; 2]) -> [f64; 3] {
     let (s, v) = PLANE;
@@ -22,7 +22,7 @@ fn crossovers([plane, space]: [f64; 2]) -> [f64; 3] {
     ]
 }
 
-/// Exercise 2 (a) and (b): 1.5 cm in the plane, and in space 1.25 cm for walls alone and 0.89 cm with floor and ceiling.
+/// Exercise 2 (a) and (b): 1.5 cm in 2-D, and in 3-D 1.25 cm for walls alone and 0.89 cm with floor and ceiling.
 #[test]
 fn exercise_2_crossovers_of_the_texts_node() {
     let [plane, walls, closed] = crossovers([20.0, 36.0]);
@@ -31,7 +31,7 @@ fn exercise_2_crossovers_of_the_texts_node() {
     assert!((closed - 0.0089).abs() < 5e-5);
 }
 
-/// Exercise 2 (c): a tree of 5 cm leaves first pays at `V / S` of 2.0 m in the plane and 2.4 m in space.
+/// Exercise 2 (c): a tree of 5 cm leaves first pays at `V / S` of 2.0 m in 2-D and 2.4 m in 3-D.
 #[test]
 fn exercise_2_shape_at_which_a_5_cm_tree_first_pays() {
     assert!((memory_ratio::<2>(20.0, 1.0, 2.0, 0.05) - 1.0).abs() < 1e-12);
@@ -55,8 +55,8 @@ fn lap_in_a_tree() -> (Quadtree, usize) {
     (tree, grid.len())
 }
 
-/// Exercise 2 for our node. A leaf is a byte in its parent's record, of 9 bytes in the plane and 13 in space; of the
-/// nodes that the formula counts one in two is inner in the plane and one in four in space.
+/// Exercise 2 for our node. A leaf is a byte in its parent's record, of 9 bytes in 2-D and 13 in 3-D; of the
+/// nodes that the formula counts one in two is inner in 2-D and one in four in 3-D.
 #[test]
 fn exercise_2_crossovers_of_our_node() {
     let (plane_node, space_node) = (9.0 / 2.0, 13.0 / 4.0);

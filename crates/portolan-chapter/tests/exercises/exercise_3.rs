@@ -5,7 +5,7 @@ use portolan::geom::Grid;
 use portolan::map::{Tsdf2, TsdfConfig};
 
 /// What the map of a wall at `y = 0` believes along the normal when beams of these angles (radians) were fused with these
-/// weights, their ranges off by `errors`: cell centres at `(k + 1/2) r`, up to tau on both sides.
+/// weights, their ranges off by `errors`: cell centers at `(k + 1/2) r`, up to tau on both sides.
 fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf2 {
     let half = (tau / r).ceil();
     let grid = Grid::new([0.0, -r * half], r, [1, 2 * half as usize]);
@@ -54,7 +54,7 @@ fn variance(weight: f64) -> f64 {
 /// Exercise 3 (a) and (b): beams at 0 and 60 degrees say `y` and `2 y` about a point `y` in front of a wall. Fused with
 /// equal weights that is `1.5 y`: the slope is wrong, the zero is not. What a map's cells add is the taper: behind
 /// the wall the steeper beam counts less, the slopes on both sides differ, and the straight line between two cells
-/// misses the wall by half a millimetre in 5 cm.
+/// misses the wall by half a millimeter in 5 cm.
 #[test]
 fn exercise_3_zero_crossing_of_beams_at_0_and_60_degrees() {
     let (zero, slope) = two_beams(0.05, 1.0, [0.0; 2]);

@@ -66,7 +66,7 @@ impl Place {
         Ok(Self { name, grid, field, contour, way })
     }
 
-    /// What is certified at a point, where unknown space is an obstacle: at least, and at most (metres).
+    /// What is certified at a point, where unknown space is an obstacle: at least, and at most (meters).
     pub(crate) fn clearance(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         use portolan::Answer::{Known, Saturated};
         match self.field.clearance(p, UnknownSpace::Pessimistic) {
@@ -75,7 +75,7 @@ impl Place {
         }
     }
 
-    /// The largest clearance that a line is certified to keep at every point (metres), to a millimetre; an error says
+    /// The largest clearance that a line is certified to keep at every point (meters), to a millimeter; an error says
     /// where it does not even keep `demanded`.
     pub(crate) fn certified(&self, line: &[[f64; 2]], demanded: f64) -> anyhow::Result<f64> {
         let path = Waypoints::new(line.to_vec())?;
@@ -91,8 +91,8 @@ impl Place {
         Ok(low)
     }
 
-    /// A* over the centres of cells (Hart, Nilsson, Raphael 1968) for a robot of this radius (metres). Where less than
-    /// `comfort` is certified a metre costs up to `dear` times as much. `None`: no way.
+    /// A* over the centers of cells (Hart, Nilsson, Raphael 1968) for a robot of this radius (meters). Where less than
+    /// `comfort` is certified a meter costs up to `dear` times as much. `None`: no way.
     ///
     /// Cells count where the radius and half of a diagonal are certified: then the lines between neighbours are free, all
     /// of them.
@@ -144,7 +144,7 @@ impl Place {
         None
     }
 
-    /// Lower bounds along a line, every 2 cm: arc length, metres.
+    /// Lower bounds along a line, every 2 cm: arc length, meters.
     pub(crate) fn profile(&self, line: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let points = resampled(line, (length(line) / 0.02).ceil() as usize + 2);
         let mut at = 0.0;
@@ -158,7 +158,7 @@ impl Place {
     }
 }
 
-/// Length of a line (metres).
+/// Length of a line (meters).
 pub(crate) fn length(line: &[[f64; 2]]) -> f64 {
     line.windows(2).map(|w| vector::distance(w[0], w[1])).sum()
 }
@@ -186,7 +186,7 @@ pub(crate) struct Drawn<'a> {
     pub(crate) name: &'a str,
     pub(crate) line: &'a [[f64; 2]],
     pub(crate) color: Color,
-    /// The robot is drawn along it, as wide as it is (metres).
+    /// The robot is drawn along it, as wide as it is (meters).
     pub(crate) robot: Option<f64>,
 }
 

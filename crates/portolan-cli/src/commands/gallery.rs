@@ -32,10 +32,10 @@ pub(crate) struct Args {
     /// Log of range scans with poses, or the word demo for the simulated Apartment
     #[arg(value_name = "LOG|demo")]
     log: PathBuf,
-    /// Edge of a cell (metres)
+    /// Edge of a cell (meters)
     #[arg(long, value_name = "R", value_parser = length, default_value = "0.05")]
     resolution: f64,
-    /// Distances are kept within this of a surface (metres); default three cells
+    /// Distances are kept within this of a surface (meters); default three cells
     #[arg(long, value_name = "T", value_parser = length)]
     truncation: Option<f64>,
     /// Probes per question that is answered directly; searches get a fiftieth
@@ -48,7 +48,7 @@ pub(crate) struct Args {
     /// Use every N-th scan of the log only
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     every: Option<u64>,
-    /// Map this box only: x0,y0,x1,y1 (metres)
+    /// Map this box only: x0,y0,x1,y1 (meters)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     bounds: Option<Bounds>,
     /// Memory that may be used, with suffix K, M or G

@@ -73,7 +73,7 @@ fn shown_part(file: &MapFile<2>) -> Option<(Grid<2>, Aabb<2>)> {
     Some((grid, seen.grown(6.0 * grid.lattice.resolution)))
 }
 
-/// The colour of every cell: occupancy in light tones, and over it the signed distance near surfaces.
+/// The color of every cell: occupancy in light tones, and over it the signed distance near surfaces.
 fn cell_colors(file: &MapFile<2>, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<Color> {
     let mut colors = vec![color::UNKNOWN; grid.len()];
     if let Some(map) = &file.grid {

@@ -115,7 +115,7 @@ impl Default for Shape {
 
 /// Clamp of the weight of distances.
 const W_MAX: f32 = 64.0;
-/// Distances of 3-D fields are found up to here (metres).
+/// Distances of 3-D fields are found up to here (meters).
 const MAX_DISTANCE: f64 = 1.0;
 
 impl Default for Settings {
@@ -266,7 +266,7 @@ impl Settings {
     }
 }
 
-/// The library's truncation for cells of this edge (metres).
+/// The library's truncation for cells of this edge (meters).
 fn three_cells(resolution: f64) -> f64 {
     MapperSettings::<3>::new(resolution).truncation()
 }

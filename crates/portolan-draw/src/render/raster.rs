@@ -142,7 +142,7 @@ fn push(
     let (xs, ys) = (corners.map(|c| c.x), corners.map(|c| c.y));
     let (left, right) = (low(xs).max(0), high(xs).min(width as i32 - 1));
     let (top, bottom) = (low(ys).max(0), high(ys).min(height as i32 - 1));
-    // Most triangles of a fine mesh lie between the centres of pixels.
+    // Most triangles of a fine mesh lie between the centers of pixels.
     if left > right || top > bottom {
         return;
     }
@@ -153,12 +153,12 @@ fn push(
     }
 }
 
-/// The first pixel whose centre is not left of a coordinate.
+/// The first pixel whose center is not left of a coordinate.
 fn first_centre(v: i32) -> i32 {
     (v + 127) >> 8
 }
 
-/// The last pixel whose centre is not right of a coordinate.
+/// The last pixel whose center is not right of a coordinate.
 fn last_centre(v: i32) -> i32 {
     (v - 128) >> 8
 }

@@ -26,7 +26,7 @@ pub struct CarmenScan<'a> {
     pub bearings: &'a [f64],
     /// Unit vectors of the bearings.
     pub directions: &'a [[f64; 2]],
-    /// Readings (metres if the log keeps to its format), one per beam: not checked, may be NaN.
+    /// Readings (meters if the log keeps to its format), one per beam: not checked, may be NaN.
     pub readings: &'a [f64],
     /// The stamp (seconds of some clock), if there is one.
     pub time: Option<f64>,

@@ -2,14 +2,14 @@
 
 use super::CarmenLog;
 
-/// Readings of SICK scanners that mean "no echo" whatever else the log holds: 0x1FF7 and above in centimetres,
-/// and 0x7FFF in millimetres (metres; first, last).
+/// Readings of SICK scanners that mean "no echo" whatever else the log holds: 0x1FF7 and above in centimeters,
+/// and 0x7FFF in millimeters (meters; first, last).
 const CODES: [[f64; 2]; 2] = [[81.82, 81.93], [32.755, 32.77]];
 
 /// The fewest readings that make a pile.
 const FEWEST: usize = 10;
 
-/// The reading (metres) at and above which a log means "no echo", for
+/// The reading (meters) at and above which a log means "no echo", for
 /// [`RangeLimits::no_return`](portolan::scan::RangeLimits); `None` where the log has no such readings, so that
 /// every reading is a surface.
 ///
@@ -23,7 +23,7 @@ const FEWEST: usize = 10;
 ///    quarter of the beams and half a percent of all readings.
 ///
 /// A maximum range that the log declares (`ROBOTLASER1`) counts as well, where readings reach it. The returned
-/// value lies slightly below the pile. Unit free: a log in centimetres gives centimetres. Linear in the number
+/// value lies slightly below the pile. Unit free: a log in centimeters gives centimeters. Linear in the number
 /// of readings.
 pub fn detect_no_return(log: &CarmenLog) -> Option<f64> {
     let tail = Tail::of(log);

@@ -118,7 +118,7 @@ pub struct CarmenStats {
     pub refused: RefusedScans,
     /// Lines that carry no scan, by first word; comments under `#`, rare words together under `(other)`.
     pub other_messages: BTreeMap<String, u64>,
-    /// The smallest maximum range that the scans declare (metres); `None` for `FLASER` scans, which declare nothing.
+    /// The smallest maximum range that the scans declare (meters); `None` for `FLASER` scans, which declare nothing.
     pub declared_max_range: Option<f64>,
     /// Whether the stamps ascend.
     pub times: TimeOrder,

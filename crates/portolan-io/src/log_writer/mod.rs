@@ -3,8 +3,8 @@
 //! | layout | holds | files |
 //! |---|---|---|
 //! | [`LogLayout::Kitti`] | end points | `velodyne/NNNNNN.bin` (x, y, z, intensity), `poses.txt`, `calib.txt`, `times.txt` |
-//! | [`LogLayout::TumRgbd`] | images of a camera | `depth/TIME.png` (5000 units a metre), `rgb/TIME.png`, `depth.txt`, `rgb.txt`, `groundtruth.txt`, `calibration.txt` |
-//! | [`LogLayout::SevenScenes`] | images of a camera | `frame-NNNNNN.depth.png` (millimetres), `.color.png`, `.pose.txt`, `camera-intrinsics.txt` |
+//! | [`LogLayout::TumRgbd`] | images of a camera | `depth/TIME.png` (5000 units a meter), `rgb/TIME.png`, `depth.txt`, `rgb.txt`, `groundtruth.txt`, `calibration.txt` |
+//! | [`LogLayout::SevenScenes`] | images of a camera | `frame-NNNNNN.depth.png` (millimeters), `.color.png`, `.pose.txt`, `camera-intrinsics.txt` |
 
 mod kitti;
 mod picture;

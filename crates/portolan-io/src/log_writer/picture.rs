@@ -9,7 +9,7 @@ use portolan::scan::RangeImage;
 
 use crate::{Result, write_atomic};
 
-/// A 16-bit gray picture of so many units per metre; 0 for pixels without a surface, and for values beyond 16 bits.
+/// A 16-bit gray picture of so many units per meter; 0 for pixels without a surface, and for values beyond 16 bits.
 pub(super) fn depth_png(path: &Path, image: &RangeImage, units_per_metre: f64) -> Result<()> {
     let units = |v: &f32| {
         let units = (f64::from(*v) * units_per_metre).round();

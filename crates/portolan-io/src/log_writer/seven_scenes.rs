@@ -7,7 +7,7 @@ use super::picture::{color_png, depth_png};
 use super::{LogWriter, matrix_rows, write_text};
 use crate::Result;
 
-/// Units of a depth image per metre.
+/// Units of a depth image per meter.
 const UNITS: f64 = 1000.0;
 
 impl LogWriter {

@@ -7,7 +7,7 @@ use super::LogWriter;
 use super::picture::{color_png, depth_png, quaternion};
 use crate::Result;
 
-/// Units of a depth image per metre.
+/// Units of a depth image per meter.
 const UNITS: f64 = 5000.0;
 
 pub(super) fn texts() -> Vec<(&'static str, String)> {

@@ -48,7 +48,7 @@ pub struct OccupancyBricks<const D: usize> {
 pub struct TsdfBricks<const D: usize> {
     /// The cells.
     pub store: Bricks<SignedDistance, D>,
-    /// Truncation (metres).
+    /// Truncation (meters).
     pub truncation: f64,
     /// Clamp of the weight; infinity: never forget.
     pub w_max: f32,

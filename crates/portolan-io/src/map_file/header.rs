@@ -52,9 +52,9 @@ pub(super) struct Entry {
 /// Where the cells of a map are.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Place {
-    /// World position of the lower corner of cell 0 (metres).
+    /// World position of the lower corner of cell 0 (meters).
     pub(super) origin: Vec<f64>,
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub(super) resolution: f64,
     /// Cells along each axis, of a dense map.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -21,7 +21,7 @@ const ELEMENTS: u32 = 34963;
 /// them, indices as u32.
 ///
 /// Positions are relative to the mesh's origin, as glTF has only f32. The origin is the node's translation, which
-/// viewers round to f32 too: at UTM coordinates the mesh as a whole is placed to half a metre, its shape stays exact. The
+/// viewers round to f32 too: at UTM coordinates the mesh as a whole is placed to half a meter, its shape stays exact. The
 /// exact origin stands in the node's `extras.origin`. glTF has y up: the node's rotation, -90 degrees about x, turns
 /// the map's z up.
 ///

@@ -11,7 +11,7 @@ use crate::{Result, write_atomic};
 /// Writes a mesh as OBJ text: `v x y z`, with `r g b` in `[0, 1]` after it where the mesh has colors (which most
 /// readers understand), `vn` where it has normals, `f` counted from 1.
 ///
-/// Coordinates are the world's (metres), with as many digits as an f32 needs.
+/// Coordinates are the world's (meters), with as many digits as an f32 needs.
 ///
 /// # Errors
 /// As [`write_ply_mesh`](super::write_ply_mesh).

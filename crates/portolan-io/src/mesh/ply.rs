@@ -8,13 +8,13 @@ use portolan::surface::Mesh;
 use super::check;
 use crate::{IoError, Result, write_atomic};
 
-/// World coordinates beyond this (metres) are written as `double`: up to it an f32 is no coarser than 0.06 mm.
+/// World coordinates beyond this (meters) are written as `double`: up to it an f32 is no coarser than 0.06 mm.
 const NEAR: f64 = 1000.0;
 
 /// Writes a mesh as binary little-endian PLY: `x y z`, then `nx ny nz` and `red green blue` where the mesh has them,
 /// faces as `list uchar uint vertex_indices`.
 ///
-/// Coordinates are the world's (metres). They are `float` where all of the mesh lies within 1 km of the world's zero,
+/// Coordinates are the world's (meters). They are `float` where all of the mesh lies within 1 km of the world's zero,
 /// else `double`, so that a mesh at UTM coordinates loses nothing.
 ///
 /// # Errors

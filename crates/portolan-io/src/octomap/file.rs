@@ -70,7 +70,7 @@ impl OctomapTree {
         &self.header.class
     }
 
-    /// Metres per cell.
+    /// Meters per cell.
     pub fn resolution(&self) -> f64 {
         self.header.resolution
     }

@@ -37,7 +37,7 @@ pub(super) struct Header {
     pub class: String,
     /// Inner nodes and leaves.
     pub size: u64,
-    /// Metres per cell.
+    /// Meters per cell.
     pub resolution: f64,
     /// All lines, the one with `data` included.
     lines: Vec<u8>,

@@ -7,7 +7,7 @@
 //! # ...                             comments
 //! id OcTree                         class of the tree
 //! size 532566                       inner nodes and leaves
-//! res 0.08                          metres per cell
+//! res 0.08                          meters per cell
 //! data
 //! ```
 //!

@@ -11,7 +11,7 @@ use crate::{IoError, Result};
 /// A mesh of triangles. `normals` and `colors` have one entry per vertex, or are empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlyMesh {
-    /// Corners (metres), as the file has them.
+    /// Corners (meters), as the file has them.
     pub vertices: Vec<[f64; 3]>,
     /// Corners of each triangle; polygons are fans about their first corner, strips are taken apart.
     pub triangles: Vec<[u32; 3]>,

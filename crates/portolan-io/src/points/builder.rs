@@ -3,9 +3,9 @@
 use super::{CloudGrid, PointCloudFile};
 use crate::bytes::Scalar;
 
-/// Coordinates beyond this are refused (metres).
+/// Coordinates beyond this are refused (meters).
 const FARTHEST: f64 = 1e8;
-/// From here on points are kept about an offset (metres): an `f32` resolves 0.06 mm there.
+/// From here on points are kept about an offset (meters): an `f32` resolves 0.06 mm there.
 const FAR: f64 = 1024.0;
 /// Times that span more than this many seconds are nanoseconds: no scan lasts eleven days or less than a millisecond.
 const LONGEST_SCAN: f64 = 1e6;

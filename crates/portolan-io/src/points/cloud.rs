@@ -11,10 +11,10 @@ use crate::{IoError, Result};
 /// does not have them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloudFile {
-    /// What is to be added to every point (metres): zero unless the file holds doubles or text far from its zero, where an
-    /// `f32` would lose millimetres. Whole metres.
+    /// What is to be added to every point (meters): zero unless the file holds doubles or text far from its zero, where an
+    /// `f32` would lose millimeters. Whole meters.
     pub offset: [f64; 3],
-    /// Points (metres) in the file's frame less `offset`. All are finite.
+    /// Points (meters) in the file's frame less `offset`. All are finite.
     pub points: Vec<[f32; 3]>,
     /// Strength of the echo, in the sensor's own unit.
     pub intensity: Vec<f32>,
@@ -51,7 +51,7 @@ pub struct CloudGrid {
 /// store points that were moved already, others do not, and the file does not record which.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// Position of the sensor (metres).
+    /// Position of the sensor (meters).
     pub position: [f64; 3],
     /// Orientation, `(x, y, z, w)`.
     pub quaternion: [f64; 4],
@@ -80,7 +80,7 @@ pub struct RefusedPoints {
 }
 
 impl PointCloudFile {
-    /// The cloud as a scan, whose points are about [`PointCloudFile::offset`] and whose rays begin at `origin` (metres, in
+    /// The cloud as a scan, whose points are about [`PointCloudFile::offset`] and whose rays begin at `origin` (meters, in
     /// the file's frame, that is with the offset). A pose for the file's frame is to be moved by
     /// [`PointCloudFile::file_from_points`].
     ///
@@ -130,7 +130,7 @@ impl PointCloudFile {
         Pose { translation: self.offset, ..Pose::IDENTITY }
     }
 
-    /// Point `i` in the file's frame (metres). Panics for an `i` beyond the last.
+    /// Point `i` in the file's frame (meters). Panics for an `i` beyond the last.
     pub fn position(&self, i: usize) -> [f64; 3] {
         std::array::from_fn(|k| f64::from(self.points[i][k]) + self.offset[k])
     }

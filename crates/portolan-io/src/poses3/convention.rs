@@ -81,7 +81,7 @@ impl PoseConvention {
     }
 }
 
-/// No place on Earth has a translation beyond this (metres).
+/// No place on Earth has a translation beyond this (meters).
 const FARTHEST: f64 = 1e9;
 
 /// How far the last element may be from 1: it was written with few digits.

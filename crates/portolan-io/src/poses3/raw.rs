@@ -61,7 +61,7 @@ pub enum PoseFault {
     NotRigid(f64),
     /// The last row is not `0 0 0 1`, and the last element no time stamp (see [`crate::poses3`]).
     LastRow([f64; 4]),
-    /// The translation has an entry of so many metres.
+    /// The translation has an entry of so many meters.
     TooFar(f64),
 }
 

@@ -6,10 +6,10 @@ use portolan::geom::vector::{distance, dot, sub};
 const QUERIES: usize = 64;
 /// See [`QUERIES`].
 const TARGETS: usize = 2000;
-/// Scans from places nearer than this see each other's surfaces whatever their poses mean (metres).
+/// Scans from places nearer than this see each other's surfaces whatever their poses mean (meters).
 const APART: f64 = 0.1;
 
-/// A scan in the world: some of its points, and where the sensor stood (metres).
+/// A scan in the world: some of its points, and where the sensor stood (meters).
 pub(super) struct Placed {
     pub(super) points: Vec<[f64; 3]>,
     pub(super) position: [f64; 3],
@@ -23,7 +23,7 @@ impl Placed {
     }
 }
 
-/// Median distance (metres) from points of each scan to the nearest point of all scans from other places. `None` where no
+/// Median distance (meters) from points of each scan to the nearest point of all scans from other places. `None` where no
 /// two scans are from places apart. O(scans^2) with some 10^5 distances a pair: 20 ms for twelve scans.
 pub(super) fn disagreement(scans: &[Placed]) -> Option<f64> {
     let mut all = Vec::new();

@@ -103,7 +103,7 @@ mod tests {
         }
     }
 
-    /// Median distance (metres) of some points of a view to the nearest point of the view beside it.
+    /// Median distance (meters) of some points of a view to the nearest point of the view beside it.
     fn disagreement(log: &ScanLog, a: usize, b: usize) -> f64 {
         let world = |i: usize| -> Vec<[f64; 3]> {
             image(log, i).points().map(|(_, p)| log.pose(i).transform_point(p)).collect()

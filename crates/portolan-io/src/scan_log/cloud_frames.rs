@@ -12,7 +12,7 @@ use crate::{IoError, Result};
 /// Where the rays of a log's clouds begin.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Rays {
-    /// In one point a scan, in the frame of the files (metres).
+    /// In one point a scan, in the frame of the files (meters).
     From(Vec<[f64; 3]>),
     /// Above each point: a scanner that looks along -z from far away.
     Parallel,
@@ -23,7 +23,7 @@ pub(super) struct CloudFrames {
     files: Vec<PathBuf>,
     format: Option<PointFormat>,
     rays: Rays,
-    /// Whole metres that are taken off every point, so that an `f32` holds clouds far from zero.
+    /// Whole meters that are taken off every point, so that an `f32` holds clouds far from zero.
     base: [f64; 3],
 }
 
@@ -72,7 +72,7 @@ impl FrameSource for CloudFrames {
     }
 }
 
-/// How far the offset of a scan may be from that of the first (metres): beyond, an `f32` is coarser than 4 mm.
+/// How far the offset of a scan may be from that of the first (meters): beyond, an `f32` is coarser than 4 mm.
 const FARTHEST_APART: f64 = 65_536.0;
 
 /// The cloud with another offset.

@@ -17,7 +17,7 @@ const MOST_BYTES: u64 = 256 << 20;
 /// Deflate packs at most so many bytes into one.
 const TIGHTEST: u64 = 1032;
 
-/// A depth image in metres; 0 for pixels without a reading.
+/// A depth image in meters; 0 for pixels without a reading.
 pub(super) struct Depth {
     pub(super) columns: usize,
     pub(super) rows: usize,
@@ -25,7 +25,7 @@ pub(super) struct Depth {
     pub(super) values: Vec<f32>,
 }
 
-/// Reads a depth image of so many units per metre. The values 0 and 65535 are no reading.
+/// Reads a depth image of so many units per meter. The values 0 and 65535 are no reading.
 pub(super) fn read_depth(path: &Path, units_per_metre: f64) -> Result<Depth> {
     decode_depth(path, &read_picture(path)?, units_per_metre)
 }

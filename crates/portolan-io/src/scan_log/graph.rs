@@ -1,6 +1,6 @@
 //! OctoMap's scan graphs as logs: scans and poses in one file.
 //!
-//! Points are doubles. Where they are far from their zero, frames have them about whole metres, which the poses add again.
+//! Points are doubles. Where they are far from their zero, frames have them about whole meters, which the poses add again.
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ pub(super) fn is_it(path: &Path) -> bool {
 struct GraphFrames {
     path: PathBuf,
     nodes: Vec<ScanGraphNode>,
-    /// Whole metres that are taken off every point: the offset of the first scan with points.
+    /// Whole meters that are taken off every point: the offset of the first scan with points.
     base: [f64; 3],
 }
 

@@ -233,7 +233,7 @@ fn an_empty_first_cloud_and_one_elsewhere_do_not_cost_the_others_digits() {
     let log = open(folder.path());
     assert!(points(&log, 0).points.is_empty());
     assert!(distance(world(&log, 1)[0], [500_000.001, 4_000_000.002, 12.003]) < 1e-6);
-    // Two kilometres on: half of an f32's last digit.
+    // Two kilometers on: half of an f32's last digit.
     assert!(distance(world(&log, 2)[0], [500_900.001, 4_002_000.002, 12.003]) < 1e-4);
     says(log.frame(3), "3.pcd: the place of the points is about [0.0, 0.0, 0.0] m; the first scan's");
 }
@@ -349,7 +349,7 @@ fn scans_of_the_real_hall_agree_in_the_world() {
     let (first, last) = log.time_span().unwrap();
     assert!((first - 1_630_577_758.569).abs() < 1e-3 && (last - first - 47.0).abs() < 0.1, "{first} {last}");
     assert!((log.path_length() - 31.2).abs() < 0.1 && log.stats().refused_poses.is_empty());
-    // Points are some centimetres apart, and other ones in every scan.
+    // Points are some centimeters apart, and other ones in every scan.
     let right = median_distance(&world(&log, 20), &world(&log, 21), 200);
     assert!(right < 0.07, "{right}");
     let turned = with_convention(PoseConvention::SensorFromWorld);

@@ -123,7 +123,7 @@ impl ScanLog {
         &self.entries[i].world_from_sensor
     }
 
-    /// Where the sensor stood in the world when it took scan `i` (metres). Not always the pose's translation: clouds that are
+    /// Where the sensor stood in the world when it took scan `i` (meters). Not always the pose's translation: clouds that are
     /// in the world's frame already have the identity as their pose. Panics for an `i` beyond the last.
     pub fn sensor_position(&self, i: usize) -> [f64; 3] {
         let entry = &self.entries[i];
@@ -160,14 +160,14 @@ impl ScanLog {
         self.camera.as_ref()
     }
 
-    /// The box of the sensor's positions (metres).
+    /// The box of the sensor's positions (meters).
     pub fn extent(&self) -> Aabb<3> {
         let mut all = Aabb::EMPTY;
         (0..self.len()).for_each(|i| all.include(self.sensor_position(i)));
         all
     }
 
-    /// The length of the way from scan to scan (metres).
+    /// The length of the way from scan to scan (meters).
     pub fn path_length(&self) -> f64 {
         (1..self.len()).map(|i| distance(self.sensor_position(i - 1), self.sensor_position(i))).sum()
     }

@@ -16,12 +16,12 @@ pub struct ScanLogOptions {
     pub poses: Option<PathBuf>,
     /// What the numbers of the poses mean; default: the format's, and world from sensor for `poses`.
     pub pose_convention: Option<PoseConvention>,
-    /// Where rays begin in the frame of a cloud's points (metres), for lidars whose zero is not the sensor and for single clouds
+    /// Where rays begin in the frame of a cloud's points (meters), for lidars whose zero is not the sensor and for single clouds
     /// in the world's frame; default: the viewpoint of a PCD file where points are in the world's frame, else zero.
     pub origin: Option<[f64; 3]>,
     /// The camera instead of what the layout has.
     pub intrinsics: Option<Intrinsics>,
-    /// Units of a depth image per metre (1000: millimetres); default: the format's.
+    /// Units of a depth image per meter (1000: millimeters); default: the format's.
     pub depth_scale: Option<f64>,
     /// Whether colors are read where the log has them. Default: yes.
     pub color: bool,

@@ -16,7 +16,7 @@ pub(crate) trait FrameSource: Send + Sync {
     /// Scan `i` of those that the format found.
     fn frame(&self, i: usize) -> Result<Frame>;
 
-    /// Where the sensor stood in the frame of scan `i` (metres): not in its zero where clouds are in the world's frame.
+    /// Where the sensor stood in the frame of scan `i` (meters): not in its zero where clouds are in the world's frame.
     fn origin(&self, _i: usize) -> [f64; 3] {
         [0.0; 3]
     }

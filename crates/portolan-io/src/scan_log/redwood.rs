@@ -1,7 +1,7 @@
 //! Redwood *(Choi, Zhou, Koltun 2015)* and Open3D, and ScanNet *(Dai et al. 2017)*, which differs in its poses: pictures in
 //! folders.
 //!
-//! `depth/*.png` in millimetres, colors in `color`, `image` or `rgb`. Poses in `trajectory.log` (else in the only other
+//! `depth/*.png` in millimeters, colors in `color`, `image` or `rgb`. Poses in `trajectory.log` (else in the only other
 //! `.log` that is there), or one per picture in `pose/*.txt`. The camera in Open3D's json or in ScanNet's
 //! `intrinsic/intrinsic_depth.txt`, else Open3D's default for this kind of sensor: 525, 525, 319.5, 239.5.
 //!

@@ -1,6 +1,6 @@
 //! 7-Scenes *(Shotton et al. 2013)* and what was laid out after it (3DMatch, tsdf-fusion): all files in one folder.
 //!
-//! `frame-NNNNNN.depth.png` in millimetres, `frame-NNNNNN.pose.txt` (4x4, world from camera), `frame-NNNNNN.color.jpg` or
+//! `frame-NNNNNN.depth.png` in millimeters, `frame-NNNNNN.pose.txt` (4x4, world from camera), `frame-NNNNNN.color.jpg` or
 //! `.png`, and the camera in `camera-intrinsics.txt` (3x3) there or in the folder above. The data set itself comes without
 //! that file; its camera is published as 585, 585, 320, 240.
 
@@ -63,7 +63,7 @@ mod tests {
     use crate::testing::{bad_bytes, real_data, says};
     use portolan::geom::vector::distance;
 
-    /// Median distance (metres) along the ray between two frames at the same points: pixels of one, moved into the
+    /// Median distance (meters) along the ray between two frames at the same points: pixels of one, moved into the
     /// other and looked up there.
     fn disagreement(log: &ScanLog, a: usize, b: usize) -> f64 {
         let [one, other] = [a, b].map(|i| image(log, i));

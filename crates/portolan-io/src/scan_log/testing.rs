@@ -10,7 +10,7 @@ use portolan::scan::{Frame, RangeImage};
 use super::{ScanLog, ScanLogOptions};
 use crate::poses3::PoseConvention;
 
-/// z of the wall (metres).
+/// z of the wall (meters).
 pub(super) const WALL: f64 = 3.0;
 
 /// Columns and rows of the pictures.

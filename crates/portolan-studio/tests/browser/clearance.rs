@@ -61,7 +61,7 @@ fn keys_alone_make_a_path_and_test_it() {
     page.wait_text("path-length", "1.550 m");
     assert_eq!(page.text("path-certified"), "1.550 m");
     assert!(page.text("path-verdict").contains("Certified"));
-    // No robot of a metre fits into the corridor.
+    // No robot of a meter fits into the corridor.
     page.set_slider("robot-radius", 1.0);
     page.wait_text("path-verdict", "Not certified from 0.00 m");
     page.press("Backspace");

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{Page, Screen, Studio};
 
-/// The Apartment's box (metres), as the canvas shows it before anything is moved.
+/// The Apartment's box (meters), as the canvas shows it before anything is moved.
 const APARTMENT: [f64; 2] = [12.0, 9.0];
 
 /// Where a point of the Apartment is on the canvas (CSS pixels), as `canvas2d.js` puts it.

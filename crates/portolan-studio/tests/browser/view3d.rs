@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{Page, Studio};
 
-/// Metres as the view writes them.
+/// Meters as the view writes them.
 fn metres(value: &Value) -> String {
     match value.as_f64() {
         None => "unknown".into(),
@@ -113,7 +113,7 @@ fn a_link_shows_the_same_and_files_can_be_taken_away() {
         assert!(page.wait_saved(&folder.path().join(name)).len() > 1000);
     }
     page.assert_no_errors();
-    // A colour that nobody can show is passed over.
+    // A color that nobody can show is passed over.
     let strange = studio.open("view=3d&frame=1&color=plaid");
     wait_drawn(&strange, "1 of 40");
     strange.assert_no_errors();

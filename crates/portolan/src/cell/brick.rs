@@ -104,7 +104,7 @@ impl DistanceBrick {
             .then(|| Self(distance.iter().chain(weight).copied().collect()))
     }
 
-    /// `D` of every cell (metres); meaningless where the weight is 0.
+    /// `D` of every cell (meters); meaningless where the weight is 0.
     #[inline(always)]
     pub fn distances(&self) -> &[f32] {
         &self.0[..self.0.len() / 2]

@@ -1,10 +1,10 @@
-//! Colour beside distance: a weighted mean per channel.
+//! Color beside distance: a weighted mean per channel.
 
 use super::brick::ARC_HEADER;
 use super::{Cell, Evidence, Planes};
 use std::sync::Arc;
 
-/// An estimated colour. 16 bits a channel: with 8, a mean of many scans no longer moves.
+/// An estimated color. 16 bits a channel: with 8, a mean of many scans no longer moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Color {
     /// Red, green, blue; 65535 is full.
@@ -20,7 +20,7 @@ pub struct Color {
 const BIAS: u32 = (127 - 24) << 11;
 
 impl Color {
-    /// The colour in bytes, rounded.
+    /// The color in bytes, rounded.
     pub fn rgb8(self) -> [u8; 3] {
         self.rgb.map(|v| ((u32::from(v) + 128) / 257) as u8)
     }
@@ -38,14 +38,14 @@ impl Color {
     }
 }
 
-/// Settings of the colour filter.
+/// Settings of the color filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorRule {
     /// Clamp of the weight, at most 255.
     pub w_max: f32,
 }
 
-/// One scan's colour of one cell.
+/// One scan's color of one cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorObservation {
     /// Red, green, blue in bytes.
@@ -54,7 +54,7 @@ pub struct ColorObservation {
     pub weight: f32,
 }
 
-/// Colours of a block; weight 0: nothing is said about the cell.
+/// Colors of a block; weight 0: nothing is said about the cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colors {
     rgb: Box<[[u8; 3]]>,
@@ -96,7 +96,7 @@ impl Evidence for Colors {
     }
 }
 
-/// Colours of a brick's cells: four words each, red, green, blue, weight; weight 0: never observed.
+/// Colors of a brick's cells: four words each, red, green, blue, weight; weight 0: never observed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorBrick(Arc<[[u16; 4]]>);
 

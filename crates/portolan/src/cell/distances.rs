@@ -5,7 +5,7 @@ use super::Evidence;
 /// One scan's observation of one cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceObservation {
-    /// Signed distance (metres), positive in front of the surface.
+    /// Signed distance (meters), positive in front of the surface.
     pub distance: f32,
     /// Weight: inverse variance up to a common factor. Positive.
     pub weight: f32,
@@ -32,7 +32,7 @@ impl Distances {
         self.weight[i] > 0.0
     }
 
-    /// Distances (metres), one per cell of the block; meaningless where the weight is 0.
+    /// Distances (meters), one per cell of the block; meaningless where the weight is 0.
     #[inline(always)]
     pub fn distances(&self) -> &[f32] {
         &self.distance

@@ -15,7 +15,7 @@ pub struct OccupancyModel {
     pub p_max: f64,
     /// P(occupied) before any evidence, `l_0` in log odds. Not what an unobserved cell answers.
     pub p_prior: f64,
-    /// Depth of what a beam calls occupied (metres), alpha in (Thrun, Burgard & Fox 2005): cells whose centre is
+    /// Depth of what a beam calls occupied (meters), alpha in (Thrun, Burgard & Fox 2005): cells whose center is
     /// within half of it of the range are hit. `None`: one cell edge. The cell that holds the end point is always hit.
     pub wall_depth: Option<f64>,
 }

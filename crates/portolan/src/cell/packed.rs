@@ -3,7 +3,7 @@
 use super::LogOddsValue;
 use std::sync::Arc;
 
-/// Cells of a brick that can be packed: those of space. An 8 x 8 block is too small to be worth it.
+/// Cells of a brick that can be packed: 3-D ones. An 8 x 8 block is too small to be worth it.
 const CELLS: usize = 512;
 
 /// 512 cells as indices of 0, 1, 2 or 4 bits into the values that occur, shared between snapshots.

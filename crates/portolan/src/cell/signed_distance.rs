@@ -6,7 +6,7 @@ use multiversion::multiversion;
 /// Settings of the fusion filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TsdfRule {
-    /// Truncation tau (metres): observations are clamped to +-tau.
+    /// Truncation tau (meters): observations are clamped to +-tau.
     pub truncation: f32,
     /// Clamp of the accumulated weight. Infinity: the batch weighted mean, which never forgets.
     pub w_max: f32,
@@ -76,13 +76,13 @@ impl TsdfRule {
 /// One step of the filter of a cell, made visible.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FusionEvent {
-    /// Prior distance `D` (metres); meaningless where `weight_before` is 0.
+    /// Prior distance `D` (meters); meaningless where `weight_before` is 0.
     pub before: f64,
     /// Prior weight `W`.
     pub weight_before: f64,
-    /// The observation, clamped to the truncation (metres).
+    /// The observation, clamped to the truncation (meters).
     pub observation: f64,
-    /// Posterior distance (metres).
+    /// Posterior distance (meters).
     pub after: f64,
     /// Posterior weight, clamped to `W_max`.
     pub weight_after: f64,
@@ -93,7 +93,7 @@ pub struct FusionEvent {
 /// An estimated truncated signed distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignedDistance {
-    /// `D` (metres), within +-tau, positive in free space.
+    /// `D` (meters), within +-tau, positive in free space.
     pub distance: f32,
     /// `W`: accumulated inverse variance, up to a common factor. Positive.
     pub weight: f32,
@@ -116,7 +116,7 @@ impl DistancePlanes {
             .then_some(Self { distance, weight })
     }
 
-    /// `D` of every cell (metres); meaningless where the weight is 0.
+    /// `D` of every cell (meters); meaningless where the weight is 0.
     pub fn distances(&self) -> &[f32] {
         &self.distance
     }

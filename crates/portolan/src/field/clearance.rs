@@ -2,7 +2,7 @@
 
 use crate::answer::Answer;
 
-/// How far the nearest obstacle is from a point, at least and at most (metres). About the distance without its sign;
+/// How far the nearest obstacle is from a point, at least and at most (meters). About the distance without its sign;
 /// the side is said apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearance {
@@ -34,16 +34,16 @@ pub trait ClearanceField<const D: usize>: Sync {
     /// The interval at a point (world), as narrow as the field can make it. O(1), but where a field looks closer.
     fn clearance(&self, p_world: [f64; D], unknown: UnknownSpace) -> Answer<Clearance>;
 
-    /// An interval that is only as narrow as it takes to tell whether the clearance is at least `enough` (metres):
+    /// An interval that is only as narrow as it takes to tell whether the clearance is at least `enough` (meters):
     /// decides whatever [`ClearanceField::clearance`] decides, and may cost less.
     fn clearance_against(&self, p_world: [f64; D], unknown: UnknownSpace, enough: f64) -> Answer<Clearance> {
         let _ = enough;
         self.clearance(p_world, unknown)
     }
 
-    /// Signed distance (metres) and the exact derivative of the same interpolant, not certified. O(1).
+    /// Signed distance (meters) and the exact derivative of the same interpolant, not certified. O(1).
     fn distance_and_gradient(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])>;
 
-    /// Edge of a cell (metres): the length below which differences of position mean little.
+    /// Edge of a cell (meters): the length below which differences of position mean little.
     fn resolution(&self) -> f64;
 }

@@ -172,7 +172,7 @@ mod tests {
         Filled::new(&grid, &distances, UnknownSpace::Pessimistic, 50.0).unwrap()
     }
 
-    /// Points between the outermost centres, and our own answers there.
+    /// Points between the outermost centers, and our own answers there.
     fn probes<const D: usize>(field: &Filled<D>) -> Vec<([f64; D], f64)> {
         let esdf = EsdfGrid::from_samples(field.grid, field.values.clone()).unwrap();
         let point = |i: usize| {
@@ -245,7 +245,7 @@ mod tests {
         }
     }
 
-    /// As `sample_voxel_sdf_with_grad` finds voxels: from the pose in the middle, centres at half voxels.
+    /// As `sample_voxel_sdf_with_grad` finds voxels: from the pose in the middle, centers at half voxels.
     #[test]
     fn curobo_08_finds_the_same_distances() {
         let field = scene([9, 7, 5]);

@@ -10,8 +10,8 @@
 //! | CasADi, acados `interpolant` | vectors of knots, values with the first axis fastest (Fortran) | any, here + outside | at the knots: the centers | extrapolates the last cells | [`KnotGrid`] |
 //! | cuRobo 0.8 `VoxelGrid` | x slowest (C), `f16` | + outside | at centres, the box `n * voxel` long about its pose | `max_dist`: free (optimistic) | [`CuroboGrid`] |
 //! | cuRobo up to 0.7 | x slowest (C), `f16` or `f32` | **+ inside** | at the ends too: the box is `(n - 1) * voxel` long | free (optimistic) | [`CuroboGrid`] |
-//! | numpy, C or Fortran | any | + outside | at centres | | [`c_order`] |
-//! | Nav2 costmap | a byte, row = y, column = x | cost, not distance | at centres | | [`Inflation`] |
+//! | numpy, C or Fortran | any | + outside | at centers | | [`c_order`] |
+//! | Nav2 costmap | a byte, row = y, column = x | cost, not distance | at centers | | [`Inflation`] |
 //!
 //! A costmap has a value for unknown, 255; for the others see [`Filled`].
 //!

@@ -2,7 +2,7 @@
 
 use crate::geom::Grid;
 
-/// Distance of every cell's centre to the nearest cell of a set, as boxes, in cells, up to `reach`: one pass along each
+/// Distance of every cell's center to the nearest cell of a set, as boxes, in cells, up to `reach`: one pass along each
 /// axis of `min over k of f(q + k) + (max(0, |k| - 1/2))^2`. O(cells x reach) at worst; a search ends where it cannot
 /// find less.
 pub(super) fn distance_to_boxes<const D: usize>(

@@ -55,7 +55,7 @@ mod tests {
     fn a_column_is_its_lowest_cell() {
         let grid = Grid::new([1.0, 2.0, 0.0], 0.5, [2, 1, 4]);
         let n = f32::NAN;
-        // Centres at 0.25, 0.75, 1.25, 1.75.
+        // Centers at 0.25, 0.75, 1.25, 1.75.
         let d = [-1.0, -1.0, 0.5, n, 0.3, 0.2, -0.5, n];
         let of = |heights, unknown| lowest_between(&grid, &d, heights, unknown);
         let (flat, low) = of([0.5, 1.5], UnknownSpace::Optimistic).unwrap();

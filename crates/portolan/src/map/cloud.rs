@@ -18,7 +18,7 @@ impl<const D: usize> Cloud<D> {
         Self { points: Vec::new(), tree: None }
     }
 
-    /// A cloud of these points (world, metres), with its tree built. Points that are not finite are left out.
+    /// A cloud of these points (world, meters), with its tree built. Points that are not finite are left out.
     pub fn from_points(points: impl IntoIterator<Item = [f64; D]>) -> Self {
         let mut cloud = Self::new();
         cloud.points.extend(points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())));
@@ -49,12 +49,12 @@ impl<const D: usize> Cloud<D> {
         self.tree = (!self.points.is_empty()).then(built);
     }
 
-    /// The points (world, metres), in the order in which they came.
+    /// The points (world, meters), in the order in which they came.
     pub fn points(&self) -> &[[f64; D]] {
         &self.points
     }
 
-    /// Distance from a point to the nearest end point (metres), unsigned; `None` without a tree. O(log n) in
+    /// Distance from a point to the nearest end point (meters), unsigned; `None` without a tree. O(log n) in
     /// the mean.
     pub fn nearest_distance(&self, p_world: impl Into<[f64; D]>) -> Option<f64> {
         let p = p_world.into();

@@ -34,17 +34,17 @@ pub enum MapError {
         "ranges from {min} to {max} m are not possible: need 0 <= min < max, and max below {most} m at this resolution"
     )]
     Ranges {
-        /// Smallest range used (metres).
+        /// Smallest range used (meters).
         min: f64,
-        /// Largest range used (metres).
+        /// Largest range used (meters).
         max: f64,
-        /// Limit at this resolution (metres).
+        /// Limit at this resolution (meters).
         most: f64,
     },
     /// A range image contradicts itself.
     #[error("a range image cannot be used: {0}")]
     Image(&'static str),
-    /// Distances and colours lie on different lattices.
+    /// Distances and colors lie on different lattices.
     #[error("the lattices of distances and colours differ")]
     Lattices,
     /// The map would need more memory than it may have.

@@ -218,7 +218,7 @@ impl<const D: usize, V: LogOddsValue, S: Store<V, D>> Occupancy<D, V, S> {
     }
 }
 
-/// The depth of what a beam calls occupied (metres).
+/// The depth of what a beam calls occupied (meters).
 fn wall_depth<const D: usize>(model: &OccupancyModel, lattice: &Lattice<D>) -> f64 {
     model.wall_depth.unwrap_or(lattice.resolution)
 }

@@ -7,7 +7,7 @@ use crate::scan::{ScanStats, SphericalLayout};
 use crate::store::Store;
 
 impl<V: LogOddsValue, S: Store<V, 3>> Occupancy<3, V, S> {
-    /// Fuses surfaces seen from `origin_world` (both world, metres), in one call, with exact rays. Points that are not
+    /// Fuses surfaces seen from `origin_world` (both world, meters), in one call, with exact rays. Points that are not
     /// finite are refused and counted.
     ///
     /// # Errors

@@ -93,7 +93,7 @@ fn frees_only_what_was_seen(image: &RangeImage, pose: &Pose<3>) {
         let (column, row, depth, half) = pixel(image, p);
         let closed = matches!(image.projection, Projection::Spherical(_));
         let (mut seen, mut nearest) = (0, f64::INFINITY);
-        // The four beams about the centre and all within half a cell, less a hundredth of a pixel for rounding.
+        // The four beams about the center and all within half a cell, less a hundredth of a pixel for rounding.
         let reach = |at: f64, half: f64| {
             let low = (at - half + 0.02).ceil().min((at + 0.02).floor());
             low as i64..=(at + half - 0.02).floor().max((at - 0.02).ceil()) as i64

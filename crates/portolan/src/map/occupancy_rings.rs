@@ -6,8 +6,8 @@ use crate::geom::vector::distance;
 use crate::store::Dense;
 
 impl<const D: usize, V: LogOddsValue> Occupancy<D, V, Dense<V, D>> {
-    /// Distance from a point to the centre of the nearest occupied cell (metres), found by **searching** ring
-    /// by ring up to `limit` metres: the cost grows with the square (in space the cube) of the distance, which
+    /// Distance from a point to the center of the nearest occupied cell (meters), found by **searching** ring
+    /// by ring up to `limit` meters: the cost grows with the square (in 3-D the cube) of the distance, which
     /// is why this is not called `distance`. `None` where no occupied cell is within the limit, and outside of the grid.
     pub fn search_distance_by_rings(&self, p_world: impl Into<[f64; D]>, limit: f64) -> Option<f64> {
         let p = p_world.into();
@@ -20,7 +20,7 @@ impl<const D: usize, V: LogOddsValue> Occupancy<D, V, Dense<V, D>> {
         let rings = ((limit / lattice.resolution).ceil().min(1e9) as i32).min(farthest.max().unwrap_or(0));
         let mut best = f64::INFINITY;
         for ring in 0..=rings {
-            // Centres on this ring are at least so far away; nothing nearer can follow.
+            // Centers on this ring are at least so far away; nothing nearer can follow.
             if (f64::from(ring) - 0.5) * lattice.resolution > best.min(limit) {
                 break;
             }

@@ -69,7 +69,7 @@ fn far_from_zero_nothing_changes() {
         let pose = Pose { translation, ..Pose::IDENTITY };
         map.integrate(&pose, &Frame::Points(PointScan::new(shell(3000), [0.0; 3]))).unwrap();
     }
-    // Coordinates of millions of metres are rounded to half a nanometre: a ray through a corner may differ.
+    // Coordinates of millions of meters are rounded to half a nanometre: a ray through a corner may differ.
     let same = cells(near).iter().zip(&cells(far)).filter(|(a, b)| a == b).count();
     assert_eq!(near.store().keys(), far.store().keys());
     assert!(same * 100 >= near.store().len() * 98, "{same} of {}", near.store().len());

@@ -109,7 +109,7 @@ impl<const D: usize> Tsdf<D, Dense<SignedDistance, D>> {
         observed(self.distances.planes().weights(), min_weight)
     }
 
-    /// One step of one cell's filter, as if a scan had observed it: `d` metres with weight `w`. Cells outside of the map
+    /// One step of one cell's filter, as if a scan had observed it: `d` meters with weight `w`. Cells outside of the map
     /// compute the step from nothing and keep nothing.
     pub fn fuse(&mut self, cell: [i32; D], d: f64, w: f64) -> FusionEvent {
         let index = self.distances.grid().index(cell);
@@ -284,7 +284,7 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
         &self.rule
     }
 
-    /// Index to metres.
+    /// Index to meters.
     pub fn lattice(&self) -> &Lattice<D> {
         self.distances.lattice()
     }
@@ -293,7 +293,7 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
 /// The colors of a swept scan, as evidence of its own.
 struct ColorsOf<'a, W> {
     scan: &'a W,
-    /// Only cells so near to a surface have colors (metres).
+    /// Only cells so near to a surface have colors (meters).
     band: f32,
 }
 

@@ -76,7 +76,7 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
         Some(image)
     }
 
-    /// Fuses points (world, metres) seen from `origin_world`, in one call. Points that are not finite or lie on the origin
+    /// Fuses points (world, meters) seen from `origin_world`, in one call. Points that are not finite or lie on the origin
     /// are refused and counted.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
         points_world: &[[f64; 3]],
         origin_world: [f64; 3],
     ) -> Result<ScanStats, MapError> {
-        // Relative to the sensor: far from zero f32 loses millimetres.
+        // Relative to the sensor: far from zero f32 loses millimeters.
         let offset = |p: &[f64; 3]| std::array::from_fn(|k| (p[k] - origin_world[k]) as f32);
         let scan = PointScan::new(points_world.iter().map(offset), [0.0; 3]);
         let at = Pose { translation: origin_world, ..Pose::IDENTITY };

@@ -27,12 +27,12 @@ pub enum PointSweep {
 /// Settings of a [`Tsdf`](super::Tsdf), in 2-D and 3-D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TsdfConfig<const D: usize> {
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub resolution: f64,
-    /// Lower corner of cell 0 (world, metres): near to the map, and a multiple of the resolution, so that the lattices of
+    /// Lower corner of cell 0 (world, meters): near to the map, and a multiple of the resolution, so that the lattices of
     /// two maps coincide.
     pub origin: [f64; D],
-    /// Truncation tau (metres): two to four cells, and less than half of the thinnest wall that is seen from both sides.
+    /// Truncation tau (meters): two to four cells, and less than half of the thinnest wall that is seen from both sides.
     pub truncation: f64,
     /// Clamp of the weight. Infinity: never forget.
     pub w_max: f32,
@@ -49,10 +49,10 @@ pub struct TsdfConfig<const D: usize> {
     pub beams: BeamSweep,
     /// How 3-D scans of points become observations.
     pub points: PointSweep,
-    /// Surfaces of images and points nearer than this are not used (metres along the ray). Beams are limited when their
+    /// Surfaces of images and points nearer than this are not used (meters along the ray). Beams are limited when their
     /// scan is made ([`crate::scan::RangeLimits`]).
     pub min_range: f64,
-    /// Surfaces of images and points farther than this are not used, but the space up to there is free (metres along the
+    /// Surfaces of images and points farther than this are not used, but the space up to there is free (meters along the
     /// ray).
     pub max_range: f64,
     /// Whether colors are fused beside distances, where scans have them.

@@ -102,7 +102,7 @@ fn a_scan_that_reaches_too_far_is_refused_with_a_clear_error() {
     grid.set_bounds(Some(Aabb::new([-2.0; 2], [2.0; 2])));
     assert!(grid.integrate(&Pose::<2>::IDENTITY, &far).unwrap().cells > 1000);
 
-    // Pixels that look almost aside: what they see is a metre deep and a hundred thousand kilometres wide.
+    // Pixels that look almost aside: what they see is a meter deep and a hundred thousand kilometers wide.
     let camera = Pinhole { fx: 1e-8, fy: 1e-8, cx: 0.5, cy: 0.5 };
     let image = RangeImage::from_depth(camera, 2, 2, [1.0; 4]);
     let mut map = Tsdf3::new(TsdfConfig::default()).unwrap();

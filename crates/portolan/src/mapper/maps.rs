@@ -68,7 +68,7 @@ impl Fused {
 }
 
 impl<const D: usize> Mapper<D> {
-    /// A mapper with cells of this edge (metres) and [the usual settings](MapperSettings::new). Maps are made when the
+    /// A mapper with cells of this edge (meters) and [the usual settings](MapperSettings::new). Maps are made when the
     /// first scan comes.
     pub fn new(resolution: f64) -> Self {
         Self::with(MapperSettings::new(resolution))

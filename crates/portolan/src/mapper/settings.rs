@@ -13,12 +13,12 @@ pub const CARVE_WEIGHT: f32 = 0.3;
 /// Settings of a [`Mapper`](super::Mapper).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapperSettings<const D: usize> {
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub resolution: f64,
-    /// Lower corner of cell 0 (world, metres). `None`: zero, or where the first scan is far from zero (a million cells) the
+    /// Lower corner of cell 0 (world, meters). `None`: zero, or where the first scan is far from zero (a million cells) the
     /// multiple of the resolution next to its sensor.
     pub origin: Option<[f64; D]>,
-    /// Truncation of the signed distances (metres); `None`: three cells.
+    /// Truncation of the signed distances (meters); `None`: three cells.
     pub truncation: Option<f64>,
     /// Clamp of the weight of signed distances. Infinity: never forget.
     pub w_max: f32,
@@ -38,17 +38,17 @@ pub struct MapperSettings<const D: usize> {
     pub distances: bool,
     /// Whether colors are fused beside distances, where scans have them.
     pub color: bool,
-    /// Only cells in this box (world, metres) are changed; `None`: everywhere.
+    /// Only cells in this box (world, meters) are changed; `None`: everywhere.
     pub bounds: Option<Aabb<D>>,
     /// Bytes that the maps may take together.
     pub memory: usize,
-    /// Euclidean distances are kept up to here (metres).
+    /// Euclidean distances are kept up to here (meters).
     pub max_distance: f64,
 }
 
 impl<const D: usize> MapperSettings<D> {
-    /// Both maps with cells of this edge (metres): truncation three cells, free space at [`CARVE_WEIGHT`], clamp 64,
-    /// Euclidean distances up to a metre, no limit of memory.
+    /// Both maps with cells of this edge (meters): truncation three cells, free space at [`CARVE_WEIGHT`], clamp 64,
+    /// Euclidean distances up to a meter, no limit of memory.
     pub fn new(resolution: f64) -> Self {
         Self {
             resolution,
@@ -69,7 +69,7 @@ impl<const D: usize> MapperSettings<D> {
         }
     }
 
-    /// The truncation in metres.
+    /// The truncation in meters.
     pub fn truncation(&self) -> f64 {
         self.truncation.unwrap_or_else(|| {
             // Without the rounding error that would show in every file (0.15000000000000002).
@@ -104,7 +104,7 @@ impl<const D: usize> MapperSettings<D> {
         if self.exact { OccupancySweep::Exact } else { OccupancySweep::Auto }
     }
 
-    /// The origin of the lattice, where the first scan was taken at `first` (world, metres).
+    /// The origin of the lattice, where the first scan was taken at `first` (world, meters).
     pub fn origin_near(&self, first: [f64; D]) -> [f64; D] {
         const FAR_CELLS: f64 = 1e6;
         let r = self.resolution;

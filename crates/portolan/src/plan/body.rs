@@ -89,7 +89,7 @@ impl<const D: usize> Body<D> {
         if gaps >= MOST as f64 {
             return Err(PlanError::TooMany { what: "a body", limit: MOST });
         }
-        // With NaN this is 0, and the centre is refused.
+        // With NaN this is 0, and the center is refused.
         let gaps = gaps as usize;
         let half = if gaps > 0 { 0.5 * length / gaps as f64 } else { 0.0 };
         let ab = std::array::from_fn(|k| b[k] - a[k]);

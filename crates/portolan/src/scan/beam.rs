@@ -20,7 +20,7 @@ pub enum BeamKind {
 pub struct Beam<const D: usize> {
     /// Unit vector from the sensor.
     pub direction: [f64; D],
-    /// Metres; its meaning depends on the kind.
+    /// Meters; its meaning depends on the kind.
     pub range: f64,
     /// What the beam measured.
     pub kind: BeamKind,
@@ -33,7 +33,7 @@ impl<const D: usize> Beam<D> {
         self.kind == BeamKind::Hit
     }
 
-    /// Arc length up to which the beam saw free space (metres); 0 where it has no information.
+    /// Arc length up to which the beam saw free space (meters); 0 where it has no information.
     #[inline(always)]
     pub fn free_range(&self) -> f64 {
         match self.kind {

@@ -7,9 +7,9 @@ use crate::geom::vector::{along, distance, norm, sub};
 /// A part of the sensor's frame in which readings show the robot that carries the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Body {
-    /// A box (metres).
+    /// A box (meters).
     Box(Aabb<3>),
-    /// A ball (metres).
+    /// A ball (meters).
     Sphere {
         /// Its center.
         center: [f64; 3],
@@ -34,9 +34,9 @@ impl Body {
 /// apply to them (to an image of parallel rays, and to the points beside one), only the body does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameFilter {
-    /// Readings up to this range are refused (metres).
+    /// Readings up to this range are refused (meters).
     pub min_range: f64,
-    /// Surfaces beyond this are not used; the space up to here is free (metres).
+    /// Surfaces beyond this are not used; the space up to here is free (meters).
     pub max_range: f64,
     /// Readings inside of these say nothing about the world.
     pub body: Vec<Body>,

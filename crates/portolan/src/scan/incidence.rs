@@ -3,7 +3,7 @@
 use super::Scan;
 use crate::geom::vector::{distance, dot, scale, sub, unit};
 
-/// Neighbors nearer than this say more about the noise than about the surface (metres).
+/// Neighbors nearer than this say more about the noise than about the surface (meters).
 const BASELINE: f64 = 0.1;
 /// How many neighbors on either side are looked at for the baseline.
 const REACH: usize = 5;

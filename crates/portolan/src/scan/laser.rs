@@ -5,13 +5,13 @@ use super::{Beam, BeamKind, BeamOrder, RefusedBeams, Scan};
 /// How raw readings become beams.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeLimits {
-    /// Readings nearer than this are refused (metres).
+    /// Readings nearer than this are refused (meters).
     pub min: f64,
     /// Returns beyond this are not used as surfaces: the beam becomes [`BeamKind::MaxRange`] at this range.
     pub max: f64,
-    /// Readings at or above this mean that the sensor got no echo (metres); sensors have different codes.
+    /// Readings at or above this mean that the sensor got no echo (meters); sensors have different codes.
     pub no_return: f64,
-    /// Free length along a beam without an echo (metres), if the caller has a reason to assume one; 0: unknown.
+    /// Free length along a beam without an echo (meters), if the caller has a reason to assume one; 0: unknown.
     pub no_return_free: f64,
 }
 
@@ -55,7 +55,7 @@ impl RangeLimits {
 
 impl Scan<2> {
     /// A planar laser scan: one bearing (radians, counter-clockwise from the sensor's x axis) and one reading
-    /// (metres) per beam. Extra entries of the longer slice are ignored.
+    /// (meters) per beam. Extra entries of the longer slice are ignored.
     ///
     /// Bearings that ascend within one turn make the beams neighbors ([`BeamOrder::Fan`]); any other order
     /// makes a scan without neighborhood.

@@ -12,7 +12,7 @@ const SHARE: f64 = 0.95;
 /// A cloud with rows and columns, about the sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct OrganisedPoints<'a> {
-    /// Points (metres) about the sensor, in its frame.
+    /// Points (meters) about the sensor, in its frame.
     pub points: &'a [[f32; 3]],
     /// The pixel of each point, `row * columns + column`; no two are the same.
     pub pixels: &'a [u32],

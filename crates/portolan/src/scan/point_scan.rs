@@ -5,9 +5,9 @@ use super::{RangeImage, RefusedBeams};
 /// Where the rays of a [`PointScan`] begin, in the frame of its points.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Origin {
-    /// All in one point (metres).
+    /// All in one point (meters).
     Common([f64; 3]),
-    /// Each in its own point (metres): a sensor that moved while it scanned, or parallel rays. Points beyond the end of
+    /// Each in its own point (meters): a sensor that moved while it scanned, or parallel rays. Points beyond the end of
     /// this list have no origin: maps refuse and count them as not finite.
     PerPoint(Vec<[f32; 3]>),
 }
@@ -15,14 +15,14 @@ pub enum Origin {
 /// End points of rays in one frame, as `f32`, which is what sensors deliver.
 ///
 /// The frame is the sensor's or any other that is near (for points in the world's frame give the identity as the pose and
-/// the sensor's position as the origin): far from its zero an `f32` loses millimetres.
+/// the sensor's position as the origin): far from its zero an `f32` loses millimeters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointScan {
     /// Where rays begin.
     pub origin: Origin,
-    /// Surfaces (metres).
+    /// Surfaces (meters).
     pub points: Vec<[f32; 3]>,
-    /// Ends of rays that met no surface up to there (metres); their origin is the common one.
+    /// Ends of rays that met no surface up to there (meters); their origin is the common one.
     pub free_ends: Vec<[f32; 3]>,
     /// Seconds since the scan began, one per point, if the sensor gives them. Empty: it does not.
     pub times: Vec<f32>,

@@ -30,9 +30,9 @@ pub struct Spherical {
 /// Parallel rays along -z of the sensor's frame: a scanner whose origin is at infinity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orthographic {
-    /// x and y of the center of pixel `(0, 0)` (metres).
+    /// x and y of the center of pixel `(0, 0)` (meters).
     pub first: [f64; 2],
-    /// From one column to the next along x, from one row to the next along y (metres).
+    /// From one column to the next along x, from one row to the next along y (meters).
     pub step: [f64; 2],
 }
 
@@ -47,14 +47,14 @@ pub enum Projection {
     Orthographic {
         /// The rays.
         rays: Orthographic,
-        /// z of the plane from which values are measured downwards (metres); everything lies below it.
+        /// z of the plane from which values are measured downwards (meters); everything lies below it.
         top: f64,
     },
 }
 
 /// An organised scan: one value per pixel, row by row, in the sensor's frame.
 ///
-/// A positive value is a surface (metres, of what the projection says). 0: nothing is known. A negative value: no
+/// A positive value is a surface (meters, of what the projection says). 0: nothing is known. A negative value: no
 /// surface up to so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RangeImage {
@@ -64,7 +64,7 @@ pub struct RangeImage {
     pub columns: usize,
     /// Rows.
     pub rows: usize,
-    /// `columns * rows` values (metres), row by row.
+    /// `columns * rows` values (meters), row by row.
     pub values: Vec<f32>,
     /// Red, green, blue of each pixel, if the sensor sees color. Empty: it does not.
     pub colors: Vec<[u8; 3]>,
@@ -73,7 +73,7 @@ pub struct RangeImage {
 }
 
 impl RangeImage {
-    /// An image of one value per pixel, row by row (metres, of what the projection says), without colors. Nothing is checked
+    /// An image of one value per pixel, row by row (meters, of what the projection says), without colors. Nothing is checked
     /// here: see [`RangeImage::check`]. For cameras and lidars see [`RangeImage::from_depth`] and
     /// [`RangeImage::from_ranges`].
     pub fn new(projection: Projection, columns: usize, rows: usize, values: impl Into<Vec<f32>>) -> Self {
@@ -81,7 +81,7 @@ impl RangeImage {
         Self { projection, columns, rows, values, colors, refused }
     }
 
-    /// The image of a depth camera: depths along its axis (metres), row by row; 0 where there is no reading.
+    /// The image of a depth camera: depths along its axis (meters), row by row; 0 where there is no reading.
     ///
     /// ```
     /// use portolan::scan::{Pinhole, RangeImage};
@@ -95,7 +95,7 @@ impl RangeImage {
         Self::new(Projection::Pinhole(camera), columns, rows, depths)
     }
 
-    /// The image of a turning lidar: ranges (metres), ring by ring, the highest first; 0 where there is no reading.
+    /// The image of a turning lidar: ranges (meters), ring by ring, the highest first; 0 where there is no reading.
     pub fn from_ranges(lidar: Spherical, columns: usize, ranges: impl Into<Vec<f32>>) -> Self {
         let rows = lidar.elevations.len();
         Self::new(Projection::Spherical(lidar), columns, rows, ranges)

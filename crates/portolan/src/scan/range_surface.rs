@@ -13,7 +13,7 @@ const NONE: u32 = u32::MAX;
 
 /// The image of a range scan along parallel rays that look down -z.
 ///
-/// `points` are in the scan's frame (metres), `pixels[i] = row * columns + column` is where point `i` was seen; columns run
+/// `points` are in the scan's frame (meters), `pixels[i] = row * columns + column` is where point `i` was seen; columns run
 /// along x and rows along y, both roughly. Scanners of triangulation do not look along exactly parallel rays: a Cyberware
 /// moves every other row by half a pixel in x, and its camera sees y in perspective. So the points are joined to a surface of
 /// triangles between neighboring pixels, and the surface is sampled at the middle of every pixel of a regular image

@@ -47,7 +47,7 @@ impl<const D: usize> Scan<D> {
         scan
     }
 
-    /// A scan of end points in the sensor's frame (metres), each a hit: the one call for point clouds.
+    /// A scan of end points in the sensor's frame (meters), each a hit: the one call for point clouds.
     pub fn from_points(points_sensor: &[impl Into<[f64; D]> + Copy]) -> Self {
         Self::from_beams(points_sensor.iter().map(|&p| {
             let p: [f64; D] = p.into();
@@ -161,7 +161,7 @@ impl<const D: usize> Scan<D> {
             .map(|b| world_from_sensor.transform_point(vector::scale(b.direction, b.range)))
     }
 
-    /// The largest arc length that any beam has something to say about (metres), hits included.
+    /// The largest arc length that any beam has something to say about (meters), hits included.
     pub fn reach(&self) -> f64 {
         self.beams().map(|b| b.free_range()).fold(0.0, f64::max)
     }

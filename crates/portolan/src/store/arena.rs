@@ -15,7 +15,7 @@ pub(super) struct Record<V> {
 }
 
 /// Inner records in structure-of-arrays form: `2^D` values, `first_child`, `mask` each; with bytes as values
-/// that is 9 bytes a record in the plane and 13 in space. A leaf has no record: it is a value in its parent.
+/// that is 9 bytes a record in 2-D and 13 in 3-D. A leaf has no record: it is a value in its parent.
 ///
 /// The records of a parent's inner children stand side by side, in child order, behind one `first_child`, as
 /// many as the mask has bits. Groups that are given back are threaded by size into free lists through their

@@ -26,7 +26,7 @@ use crate::sweep::Swept;
 
 /// A map's memory: cells addressed by lattice index, changed by blocks of evidence.
 pub trait Store<C: Cell, const D: usize> {
-    /// Index to metres.
+    /// Index to meters.
     fn lattice(&self) -> &Lattice<D>;
 
     /// A cell; `None`: never observed, or outside.

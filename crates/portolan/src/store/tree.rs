@@ -10,7 +10,7 @@ use crate::geom::{Aabb, BlockKey, Grid, Lattice, block_cells};
 pub(super) const BLOCK_HEIGHT: u32 = 3;
 
 /// A pruned tree of log odds over `2^depth` cells along each axis (Hornung et al. 2013; here inner records
-/// only: 9 bytes each in the plane, 13 in space, with one-byte values).
+/// only: 9 bytes each in 2-D, 13 in 3-D, with one-byte values).
 ///
 /// Equal sibling leaves are always merged, bottom-up, which changes no answer; a later observation splits the
 /// leaf again and copies its value. The value of an inner node is the largest of its children's. Space that
@@ -41,7 +41,7 @@ pub struct Leaf<V, const D: usize> {
 }
 
 impl<V: LogOddsValue, const D: usize> Tree<V, D> {
-    /// An empty tree whose root covers `2^depth` cells of `resolution` metres along each axis, from `origin`
+    /// An empty tree whose root covers `2^depth` cells of `resolution` meters along each axis, from `origin`
     /// (world) upwards. `None` unless 3 <= depth <= 28.
     pub fn new(origin: [f64; D], resolution: f64, depth: u32) -> Option<Self> {
         (BLOCK_HEIGHT..=28).contains(&depth).then(|| Self::empty(origin, resolution, depth))

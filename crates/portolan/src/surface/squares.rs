@@ -37,7 +37,7 @@ const NONE: u32 = u32::MAX;
 
 /// Vertices on the lattice edges around one row of squares; each crossing is made once and shared.
 struct RowEdges {
-    /// Along x, at the row's lower centres and at its upper ones.
+    /// Along x, at the row's lower centers and at its upper ones.
     below: Vec<u32>,
     above: Vec<u32>,
     /// Along y, between the two.
@@ -226,7 +226,7 @@ mod tests {
     use crate::store::Bricks;
     use proptest::prelude::*;
 
-    /// A field with these values at the centres, observed where the value is not NaN.
+    /// A field with these values at the centers, observed where the value is not NaN.
     pub(crate) fn field(shape: [usize; 2], value: impl Fn([f64; 2]) -> f64) -> Tsdf2 {
         crate::testing::tsdf(Grid::new([0.0; 2], 1.0, shape), 1e6, value)
     }

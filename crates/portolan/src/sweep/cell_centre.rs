@@ -1,4 +1,4 @@
-//! The default sweep for distances: at cell centres, with the range interpolated between beams.
+//! The default sweep for distances: at cell centers, with the range interpolated between beams.
 
 use super::fan::{Fan, Spoke};
 use super::fan_plan::{BlockBitmap, Outline, Stretch};
@@ -8,13 +8,13 @@ use crate::cell::{Distances, Evidence};
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose, block_cells};
 use crate::scan::{BeamOrder, Scan, ScanStats, connected};
 
-/// Gives every cell the distance at its **centre**.
+/// Gives every cell the distance at its **center**.
 ///
-/// Where the scan knows its neighbours (a planar fan), a centre lies between two beams. If both end on one
-/// surface, the range at the centre's bearing is that of the chord between their end points; else the nearer
+/// Where the scan knows its neighbours (a planar fan), a center lies between two beams. If both end on one
+/// surface, the range at the center's bearing is that of the chord between their end points; else the nearer
 /// beam speaks for the cells that it passes within half a cell, and between the two there is free space up to
 /// the shorter one, less the truncation. The cost is that of the cells, not of the beams: no cell is looked at
-/// twice. Scans without neighbourhood give each cell the beam that passes nearest to its centre.
+/// twice. Scans without neighbourhood give each cell the beam that passes nearest to its center.
 ///
 /// Against [`super::March`] this removes a bias of about a quarter of a cell away from the sensor.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ pub struct CellCentre<const D: usize> {
     bitmap: BlockBitmap,
     outline: Outline,
     keys: Vec<BlockKey<D>>,
-    /// Centre of the first cell of the lattice, relative to the sensor.
+    /// Center of the first cell of the lattice, relative to the sensor.
     first_centre: [f64; D],
     resolution: f64,
     rays: NearestRay<D>,
@@ -37,7 +37,7 @@ pub struct CellCentre<const D: usize> {
 }
 
 impl<const D: usize> CellCentre<D> {
-    /// A sweep that says something within `truncation` metres of the surface, and about all free space up to
+    /// A sweep that says something within `truncation` meters of the surface, and about all free space up to
     /// there with `carve_weight` times the weight of a beam; 0: nothing.
     pub fn new(truncation: f64, carve_weight: f32, model: WeightModel) -> Self {
         Self {
@@ -88,7 +88,7 @@ impl<const D: usize> CellCentre<D> {
         const TOGETHER: usize = 6;
         let inverse = 1.0 / (lattice.resolution * BLOCK_EDGE as f64);
         let zero: [f64; 2] = [0, 1].map(|k| (origin[k] - lattice.origin[k]) * inverse);
-        // A cell around every beam: centres are seen, not corners, and torn beams speak half a cell aside.
+        // A cell around every beam: centers are seen, not corners, and torn beams speak half a cell aside.
         self.outline.reset(&self.bitmap, lattice.resolution * inverse);
         let mut last: Option<(Stretch, [[f64; 2]; 2])> = None;
         let mut together = 0;
@@ -194,7 +194,7 @@ impl<const D: usize> Swept<D> for CellCentre<D> {
             std::array::from_fn(|k| (self.first_centre[k] + f64::from(cell[k]) * self.resolution) as f32);
         let step = self.resolution as f32;
         let (distance, weight) = scratch.planes_mut();
-        // Fans exist in the plane only, where a block has exactly so many cells.
+        // Fans exist in 2-D only, where a block has exactly so many cells.
         if let (Ok(distance), Ok(weight)) = (distance.try_into(), weight.try_into()) {
             self.fan.observe_block([corner[0], corner[1]], step, distance, weight);
         }

@@ -6,14 +6,14 @@ use crate::geom::{BLOCK_EDGE, Pose};
 use crate::scan::{BeamKind, MAX_OPENING, Scan, connected};
 use crate::sets::bits;
 
-/// Cells of a block of the plane.
+/// Cells of a 2-D block.
 pub(super) const CELLS: usize = BLOCK_EDGE * BLOCK_EDGE;
 
 /// One beam in the world's axes, relative to the sensor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Spoke {
     pub direction: [f32; 2],
-    /// Free up to here (metres).
+    /// Free up to here (meters).
     pub range: f32,
     pub weight: f32,
     pub hit: bool,
@@ -24,7 +24,7 @@ pub(super) struct Spoke {
 struct Wedge {
     a: Spoke,
     b: Spoke,
-    /// Free up to here between the beams (metres).
+    /// Free up to here between the beams (meters).
     free: f32,
 }
 
@@ -44,7 +44,7 @@ struct Chord {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fan {
     wedges: Vec<Wedge>,
-    /// Per wedge, up to where everything is free whatever the bearing (metres); 0 where that is not known.
+    /// Per wedge, up to where everything is free whatever the bearing (meters); 0 where that is not known.
     clear: Vec<f32>,
     /// The weight that all beams share, if they do.
     common_weight: Option<f32>,
@@ -56,7 +56,7 @@ pub(super) struct Fan {
     truncation: f32,
     /// Weight of an observation of free space beyond the truncation, times the beam's; 0: none is made.
     carve_weight: f32,
-    /// A beam speaks for cells whose centres it passes within this distance (metres).
+    /// A beam speaks for cells whose centers it passes within this distance (meters).
     reach_aside: f32,
 }
 
@@ -189,7 +189,7 @@ impl Fan {
         clear.then_some(weight)
     }
 
-    /// What the scan says about the 64 cells of a block whose first centre lies at `corner` relative to the
+    /// What the scan says about the 64 cells of a block whose first center lies at `corner` relative to the
     /// sensor, in the world's axes, `step` apart; weight 0: nothing.
     ///
     /// In passes over the block, so that all but the search for the wedge runs in vectors: cells between joined

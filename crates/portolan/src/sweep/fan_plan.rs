@@ -71,7 +71,7 @@ impl BlockBitmap {
     }
 }
 
-/// The stretch of a beam that says something, arc lengths in metres.
+/// The stretch of a beam that says something, arc lengths in meters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
     pub from: f64,

@@ -13,7 +13,7 @@ use crate::scan::{Scan, ScanStats};
 /// that falls into it. The weight tapers linearly to 0 at `-truncation` behind the surface. The textbook's
 /// `tsdf_integrate` (section 3.3; which textbook: docs/REFERENCES.md).
 ///
-/// The sample is nearer to the sensor than the cell's centre, on average, which puts surfaces about a quarter
+/// The sample is nearer to the sensor than the cell's center, on average, which puts surfaces about a quarter
 /// of a cell too far away; [`super::CellCentre`] does not do that.
 #[derive(Clone, Debug)]
 pub struct March<const D: usize> {
@@ -26,7 +26,7 @@ pub struct March<const D: usize> {
 }
 
 impl<const D: usize> March<D> {
-    /// A march that says something within `truncation` metres of the surface, and about all free space up to
+    /// A march that says something within `truncation` meters of the surface, and about all free space up to
     /// there with `carve_weight` times the weight of a beam; 0: nothing.
     pub fn new(truncation: f64, carve_weight: f32, model: WeightModel) -> Self {
         Self {

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`Rays`] | hits and misses | every cell that a beam passes through, exactly |
 //! | [`March`] | distances | samples along every beam, as the textbook does it |
-//! | [`CellCentre`] | distances | the centre of every cell, against the range interpolated between beams |
+//! | [`CellCentre`] | distances | the center of every cell, against the range interpolated between beams |
 //! | [`Projective`] | distances | the center of every 3-D cell, against a range image |
 //! | [`PointRays`] | distances | every 3-D cell that a ray to a point passes through; the nearest ray counts |
 //! | [`HitMissSweep`] | hits and misses | 3-D cells that rays pass through, exactly or through a range image |
@@ -77,7 +77,7 @@ pub trait Sweep<const D: usize>: Swept<D> {
 
 /// A swept scan of distances that may have colors, too.
 pub trait SweptColors<const D: usize>: Swept<D, Evidence = Distances> {
-    /// The colors of the `i`-th planned block, for cells within `band` metres of the surface, with the weight of their
+    /// The colors of the `i`-th planned block, for cells within `band` meters of the surface, with the weight of their
     /// distances; `distances` is the block's evidence. Without colors `colors` is cleared.
     fn colors(&self, _i: usize, _distances: &Distances, _band: f32, colors: &mut Colors) {
         colors.clear();

@@ -1,4 +1,4 @@
-//! Cell centres against the nearest beam, for scans that do not know which beams are neighbours.
+//! Cell centers against the nearest beam, for scans that do not know which beams are neighbours.
 
 use super::clip;
 use super::touched::Touched;
@@ -12,13 +12,13 @@ pub(super) struct Ray<const D: usize> {
     pub origin: [f64; D],
     /// Unit vector.
     pub direction: [f64; D],
-    /// Metres: to the surface, or up to where there is none.
+    /// Meters: to the surface, or up to where there is none.
     pub range: f64,
     pub hit: bool,
     pub weight: f32,
 }
 
-/// Distances, and how far aside of each cell's centre the beam passed that they come from, and which it was.
+/// Distances, and how far aside of each cell's center the beam passed that they come from, and which it was.
 #[derive(Clone, Debug)]
 pub(super) struct NearestBeam {
     pub distances: Distances,
@@ -57,8 +57,8 @@ impl Evidence for NearestBeam {
     }
 }
 
-/// Walks every beam through the cells exactly; a cell listens to the beam that passes nearest to its centre,
-/// and gets that beam's distance at the centre. Ties go to the earlier beam.
+/// Walks every beam through the cells exactly; a cell listens to the beam that passes nearest to its center,
+/// and gets that beam's distance at the center. Ties go to the earlier beam.
 pub(super) type NearestRay<const D: usize> = Touched<NearestBeam, D>;
 
 impl<const D: usize> NearestRay<D> {

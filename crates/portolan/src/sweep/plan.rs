@@ -9,7 +9,7 @@ pub const LONGEST_RAY_CELLS: f64 = (1u32 << 20) as f64;
 /// How far a sweep follows beams.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanLimits<const D: usize> {
-    /// Beams are followed only inside this box (world, metres); `None`: everywhere.
+    /// Beams are followed only inside this box (world, meters); `None`: everywhere.
     pub bounds: Option<Aabb<D>>,
     /// No scan may touch more blocks than this.
     pub most_blocks: usize,
@@ -22,7 +22,7 @@ impl<const D: usize> Default for PlanLimits<D> {
 }
 
 impl<const D: usize> PlanLimits<D> {
-    /// Limits that follow beams only inside a box (world, metres).
+    /// Limits that follow beams only inside a box (world, meters).
     pub fn inside(bounds: Aabb<D>) -> Self {
         Self { bounds: Some(bounds), ..Self::default() }
     }

@@ -7,8 +7,8 @@ use crate::geom::vector::{norm, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
 use crate::scan::{BeamCounts, PointScan, RefusedBeams, ScanStats};
 
-/// Walks the ray of every point through the cells exactly. A cell listens to the ray that passes nearest to its centre, and
-/// gets that ray's distance at the centre; ties go to the earlier ray.
+/// Walks the ray of every point through the cells exactly. A cell listens to the ray that passes nearest to its center, and
+/// gets that ray's distance at the center; ties go to the earlier ray.
 ///
 /// The cost is that of rays times their length in cells: where the scan has rows and columns, [`super::Projective`] says
 /// the same sooner, and better between rays. Weights by incidence need neighbours; here every ray counts as head-on.

@@ -20,7 +20,7 @@ pub struct Rays<const D: usize> {
 }
 
 impl<const D: usize> Rays<D> {
-    /// A sweep that calls a depth of `wall_depth` metres around each end point occupied.
+    /// A sweep that calls a depth of `wall_depth` meters around each end point occupied.
     pub fn new(wall_depth: f64) -> Self {
         Self { wall_depth, touched: Touched::new() }
     }
@@ -44,7 +44,7 @@ impl<const D: usize> Rays<D> {
         }
         let start = if near > 0.0 { along(origin, direction, near) } else { origin };
         let Some(mut walk) = RayWalk::new(lattice, start, direction) else { return Ok(true) };
-        // Up to here every centre is nearer than z - half, whatever the angle: no square root needed.
+        // Up to here every center is nearer than z - half, whatever the angle: no square root needed.
         let diagonal = 0.5 * lattice.resolution * (D as f64).sqrt();
         let surely_missed = z - half - diagonal;
         while near + walk.exit() < surely_missed.min(far) {

@@ -28,7 +28,7 @@ impl Random {
     }
 }
 
-/// Bricks of `n^D` cells from cell `first` on; not observed where the value (metres, at the centre in cells from
+/// Bricks of `n^D` cells from cell `first` on; not observed where the value (meters, at the center in cells from
 /// `first`) is NaN.
 pub(crate) fn bricks<const D: usize>(
     lattice: Lattice<D>,
@@ -68,7 +68,7 @@ pub(crate) enum Spoiled {
 }
 
 /// A room of `n^3` cells of 5 cm: floor, rotated boxes, balls, a rotated wall of 8 cm with a door, and a box in a corner
-/// that was never observed. Values in metres; truncated at three cells.
+/// that was never observed. Values in meters; truncated at three cells.
 pub(crate) fn room(
     n: i32,
     first: [i32; 3],

@@ -16,30 +16,30 @@ pub(in crate::engine) enum Ask {
     Rings {
         /// Of which field.
         field: Which,
-        /// From ring to ring (metres).
+        /// From ring to ring (meters).
         spacing: f64,
     },
     /// Gradients on a raster.
     Arrows {
         /// Of which field.
         field: Which,
-        /// Where: lower left, upper right (world, metres).
+        /// Where: lower left, upper right (world, meters).
         bounds: [[f64; 2]; 2],
-        /// From arrow to arrow (metres).
+        /// From arrow to arrow (meters).
         spacing: f64,
     },
     /// Distance, bounds and gradient of both fields at a point.
     Probe {
-        /// World (metres).
+        /// World (meters).
         at: [f64; 2],
         /// What the bounds are about.
         unknown: Unknown,
     },
     /// Where a path of straight legs is certified, and its profile.
     Path {
-        /// World (metres).
+        /// World (meters).
         points: Vec<[f64; 2]>,
-        /// Clearance that is demanded (metres): the robot's radius.
+        /// Clearance that is demanded (meters): the robot's radius.
         clearance: f64,
         /// Whether unknown space is an obstacle.
         unknown: Unknown,

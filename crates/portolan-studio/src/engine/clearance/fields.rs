@@ -21,7 +21,7 @@ pub(super) struct Fields {
     /// What the filter keeps, read as if it were a distance field: bilinear between the centers of the same cells that the
     /// Euclidean field knows.
     truncated: EsdfGrid<2>,
-    /// From here on (metres) the truncated field is a constant.
+    /// From here on (meters) the truncated field is a constant.
     pub(super) limit: f64,
 }
 
@@ -89,7 +89,7 @@ impl Fields {
         gradient.into_iter().zip(status).map(|(g, s)| s.has_value().then_some(g)).collect()
     }
 
-    /// The length (metres) that all but the longest hundredth of the known distances stay within, the sign aside: what a
+    /// The length (meters) that all but the longest hundredth of the known distances stay within, the sign aside: what a
     /// ramp should show, though some beam saw far through a window. 0 where nothing is known.
     pub(super) fn usual_length(&self) -> f32 {
         let known =

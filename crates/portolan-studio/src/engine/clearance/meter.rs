@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::ask::Which;
 use super::fields::Fields;
 
-/// Width of a bin (per metre of distance: none).
+/// Width of a bin (per meter of distance: none).
 const BIN: f64 = 0.05;
 /// Bins; the last holds everything beyond.
 const BINS: usize = 31;

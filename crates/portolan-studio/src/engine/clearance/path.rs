@@ -17,7 +17,7 @@ const STEPS: f64 = 20_000.0;
 /// Parts of a path with verdicts of their own, at most; what comes after them is undecided.
 const MOST_PIECES: usize = 400;
 
-/// A part of a path, from and to an arc length (metres).
+/// A part of a path, from and to an arc length (meters).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece {
     pub(super) from: f64,

@@ -27,7 +27,7 @@ pub(in crate::engine) enum Ask {
     },
     /// Puts the middle of the chair there; it has stood there since the scan that was fused last.
     MoveChair {
-        /// World (metres).
+        /// World (meters).
         to: [f64; 2],
     },
     /// Follows this cell's filter from now on, and answers what it did from the beginning; `null`: follows no cell.

@@ -12,13 +12,13 @@ use portolan::mapper::CARVE_WEIGHT;
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::engine) struct Settings {
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub(in crate::engine) resolution: f64,
-    /// Truncation (metres).
+    /// Truncation (meters).
     pub(in crate::engine) truncation: f64,
     /// Clamp of the weight; `null`: never forget.
     pub(in crate::engine) w_max: Option<f64>,
-    /// Standard deviation of simulated ranges (metres); does nothing to recorded logs.
+    /// Standard deviation of simulated ranges (meters); does nothing to recorded logs.
     pub(in crate::engine) noise: f64,
     /// Whether free space is fused, too.
     pub(in crate::engine) carve: bool,

@@ -21,7 +21,7 @@ pub(in crate::engine) enum Ask {
     },
     /// What every representation answers there.
     Answers {
-        /// World (metres).
+        /// World (meters).
         at: [f64; 2],
     },
     /// Fuses trees over leaves of other sizes: the formula's line and what is measured.

@@ -16,7 +16,7 @@ use crate::engine::{Refusal, Reply};
 const MOST_POINTS: usize = 200_000;
 /// Level rings of the Euclidean field that are drawn, at most.
 const MOST_RINGS: f64 = 24.0;
-/// Spacing of the rings (metres) where that many are enough.
+/// Spacing of the rings (meters) where that many are enough.
 const RING: f64 = 0.25;
 /// Where the chance of being occupied would be, of what was never observed.
 const UNOBSERVED: u8 = 255;
@@ -93,7 +93,7 @@ fn tsdf(built: &Built) -> Vec<f32> {
     (0..map.grid().len()).map(|i| map.store().at(i).map_or(f32::NAN, |cell| cell.distance)).collect()
 }
 
-/// Lines of equal distance in free space, and their spacing (metres).
+/// Lines of equal distance in free space, and their spacing (meters).
 fn rings(built: &Built) -> (Lines, f64) {
     let field = built.measured.distance();
     let samples = field.samples();

@@ -1,4 +1,4 @@
-//! The numbers: metres, seconds, bytes; `null` where a representation cannot answer.
+//! The numbers: meters, seconds, bytes; `null` where a representation cannot answer.
 
 use portolan_chapter::gallery::{MeasuredField, Row, Winner};
 use serde_json::{Value, json};
@@ -42,7 +42,7 @@ pub(super) fn constants(built: &Built) -> Value {
     })
 }
 
-/// The length of surface that the crossover's formula takes (metres).
+/// The length of surface that the crossover's formula takes (meters).
 pub(super) fn surface_length(built: &Built) -> f64 {
     built.settings.surface_length.unwrap_or_else(|| built.measured.contour.length())
 }

@@ -21,7 +21,7 @@ const PROBES: std::ops::RangeInclusive<usize> = 100..=300_000;
 const BYTES_PER_CELL: f64 = 160.0;
 /// Bytes of a beam in the cloud and its tree, while they are built.
 const BYTES_PER_BEAM: f64 = 120.0;
-/// Edges of the leaves that trees are fused with to follow the formula (metres).
+/// Edges of the leaves that trees are fused with to follow the formula (meters).
 const LEAVES: [f64; 6] = [0.10, 0.075, 0.05, 0.0375, 0.025, 0.0175];
 /// Bytes that a tree may take for a cell of the dense array that it is held against.
 const BYTES_PER_LEAF_CELL: f64 = 16.0;

@@ -7,7 +7,7 @@ use super::run::Run;
 use super::state::Selection;
 use crate::engine::{Refusal, Reply};
 
-/// Surfaces nearer than this do not count as empty space (metres).
+/// Surfaces nearer than this do not count as empty space (meters).
 const MARGIN: f64 = 0.3;
 /// Densities that the axis of the picture has marks at (1/m).
 const MARKS: [f64; 7] = [0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
@@ -90,7 +90,7 @@ pub(super) fn frame(
     })
 }
 
-/// Where on the line something at a distance lies (metres).
+/// Where on the line something at a distance lies (meters).
 fn place(m: &Measurement, depth: f64) -> f64 {
     if m.ray.ascending { m.ray.origin + depth } else { m.ray.origin - depth }
 }
@@ -109,7 +109,7 @@ fn rendered(fit: &Fit, m: &Measurement) -> Value {
 
 /// A ray's light on its way.
 struct Light {
-    /// Where on the line: the beginning of the ray, and the far border of every bin that it crosses (metres).
+    /// Where on the line: the beginning of the ray, and the far border of every bin that it crosses (meters).
     at: Vec<f32>,
     /// The share of the light that comes so far.
     share: Vec<f32>,

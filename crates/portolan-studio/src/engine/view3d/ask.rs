@@ -6,7 +6,7 @@ use super::settings::Settings;
 
 /// A question. `open`, `step`, `seek`, `set`, `color` and `mesh` are answered with what is new of the mesh.
 ///
-/// Places are metres from the origin that the answer to `open` has, so that a map far from the world's zero is drawn as finely as one
+/// Places are meters from the origin that the answer to `open` has, so that a map far from the world's zero is drawn as finely as one
 /// near it.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case", deny_unknown_fields)]
@@ -86,7 +86,7 @@ pub(in crate::engine) struct Slice {
     pub(super) field: Field,
     /// Across which axis: 0, 1 or 2.
     pub(super) axis: usize,
-    /// Where on it (metres from the origin).
+    /// Where on it (meters from the origin).
     pub(super) at: f64,
 }
 

@@ -46,7 +46,7 @@ pub(super) struct Maps {
     pub(super) watched: Option<Watched>,
     /// The page counts places from its lower corner.
     pub(super) first: BlockKey<3>,
-    /// The same in the world (metres).
+    /// The same in the world (meters).
     pub(super) origin: [f64; 3],
     /// Of the frame that was fused last.
     pub(super) stats: ScanStats,
@@ -202,7 +202,7 @@ impl Maps {
         self.watched = watched;
     }
 
-    /// Some points of the last frame (metres from the origin).
+    /// Some points of the last frame (meters from the origin).
     pub(super) fn points(&self) -> Vec<f32> {
         let Some((pose, frame)) = &self.last else { return Vec::new() };
         let place = |p: [f64; 3]| sub(pose.transform_point(p), self.origin).map(|v| v as f32);

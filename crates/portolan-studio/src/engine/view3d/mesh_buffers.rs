@@ -47,7 +47,7 @@ pub(super) struct Delta {
     pub(super) holes: Vec<u32>,
     /// Per piece: first vertex, vertices, first index, indices, room for indices, of which the rest becomes 0.
     pub(super) runs: Vec<u32>,
-    /// Of all pieces, one after the other: metres from the origin.
+    /// Of all pieces, one after the other: meters from the origin.
     pub(super) positions: Vec<f32>,
     /// Four per vertex: 127 times a unit normal, and 0.
     pub(super) normals: Vec<i8>,
@@ -202,7 +202,7 @@ impl MeshBuffers {
     }
 }
 
-/// How low and how high the vertices lie (metres from the origin).
+/// How low and how high the vertices lie (meters from the origin).
 fn heights(piece: &Mesh, up: [f32; 3]) -> Option<[f32; 2]> {
     let up = up.map(f64::from);
     let all = piece.vertices.iter().map(|v| dot(v.map(f64::from), up) as f32);

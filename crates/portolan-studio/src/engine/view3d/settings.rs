@@ -11,9 +11,9 @@ use crate::engine::recipe::within;
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::engine) struct Settings {
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     pub(super) resolution: f64,
-    /// Truncation (metres).
+    /// Truncation (meters).
     pub(super) truncation: f64,
     /// Clamp of the weight.
     pub(super) w_max: f64,

@@ -30,7 +30,7 @@ impl Extent {
         })
     }
 
-    /// In the world (metres).
+    /// In the world (meters).
     pub(super) fn aabb(&self, lattice: &Lattice<3>) -> Aabb<3> {
         lattice.aabb(self.first, self.end)
     }
@@ -40,13 +40,13 @@ impl Extent {
 pub(super) struct Layer {
     /// The layer's index along its axis.
     pub(super) cell: i32,
-    /// Its middle on the axis (world, metres).
+    /// Its middle on the axis (world, meters).
     pub(super) at: f64,
     /// Values to the right, and up.
     pub(super) shape: [usize; 2],
     /// Cells from one value to the next.
     pub(super) step: usize,
-    /// The lower corner of the first cell (world, metres).
+    /// The lower corner of the first cell (world, meters).
     pub(super) corner: [f64; 3],
     /// First to the right, then up; NaN where nothing is known.
     pub(super) values: Vec<f32>,

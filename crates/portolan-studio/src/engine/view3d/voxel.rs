@@ -12,13 +12,13 @@ use super::slice::{AXES, Extent, layer_index, value_of};
 use super::source::Source;
 use crate::engine::Refusal;
 
-/// Rays are followed so far (metres).
+/// Rays are followed so far (meters).
 const FARTHEST: f64 = 10_000.0;
 
 /// What a ray meets first, and where.
 pub(super) struct Met {
     pub(super) cell: [i32; 3],
-    /// World (metres).
+    /// World (meters).
     pub(super) point: [f64; 3],
     pub(super) on_slice: bool,
 }

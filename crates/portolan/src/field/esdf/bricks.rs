@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 /// Planes of a brick's cells, x fastest, shared with snapshots until they are made anew.
 #[derive(Clone, Debug)]
 pub(crate) struct EsdfBrick {
-    /// Signed distance (metres); infinite, with the side's sign, beyond the largest distance; NaN: unknown. By the
+    /// Signed distance (meters); infinite, with the side's sign, beyond the largest distance; NaN: unknown. By the
     /// accurate method it is measured when it is read for the first time, by whichever snapshot:
     /// [`super::Esdf::brick`] is the way to it.
     pub(super) distance: Arc<OnceLock<Box<[f32]>>>,

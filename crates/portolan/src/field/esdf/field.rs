@@ -13,7 +13,7 @@ use crate::store::{Bricks, Store};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// Signed Euclidean distances (metres) at the centres of the cells of a map in bricks, positive in free space, up to a
+/// Signed Euclidean distances (meters) at the centers of the cells of a map in bricks, positive in free space, up to a
 /// largest distance.
 ///
 /// Every cell that the map observed is known or saturated; all others are unknown. Outside begins where no brick is
@@ -111,12 +111,12 @@ impl<const D: usize> Esdf<D> {
         &self.settings
     }
 
-    /// Index to metres.
+    /// Index to meters.
     pub fn lattice(&self) -> &Lattice<D> {
         &self.lattice
     }
 
-    /// Distances are maintained up to here (metres).
+    /// Distances are maintained up to here (meters).
     pub fn max_distance(&self) -> f32 {
         self.max_distance
     }

@@ -111,7 +111,7 @@ fn is_the_dense_field<const D: usize>() {
             Answer::Known((value, gradient)) => {
                 let (got, slope) = far.distance_and_gradient(p).known().unwrap();
                 assert!((got - value).abs() < 2e-6, "{got} {value}");
-                // Values to 1e-6 m, a tenth of a metre apart.
+                // Values to 1e-6 m, a tenth of a meter apart.
                 assert!(vector::distance(gradient, slope) < 1e-4);
                 match near.distance(p) {
                     Answer::Known(got) => assert!((got - value).abs() < 2e-6),

@@ -6,7 +6,7 @@ use crate::answer::Answer;
 use crate::geom::{BLOCK_EDGE, BlockKey, interpolate, vector};
 
 impl<const D: usize> Esdf<D> {
-    /// Signed distance at the centre of a cell (metres).
+    /// Signed distance at the center of a cell (meters).
     pub fn cell(&self, cell: [i32; D]) -> Answer<f32> {
         match self.value(cell) {
             Some(v) if v.is_nan() => Answer::Unknown,
@@ -16,14 +16,14 @@ impl<const D: usize> Esdf<D> {
         }
     }
 
-    /// Signed distance (metres) at a point, interpolated between the centres around it; its status is the worst of
+    /// Signed distance (meters) at a point, interpolated between the centers around it; its status is the worst of
     /// theirs. Saturated: at least so far, on the side of the sign. O(1).
     #[inline]
     pub fn distance(&self, p_world: impl Into<[f64; D]>) -> Answer<f64> {
         self.distance_and_gradient(p_world).map(|(value, _)| value)
     }
 
-    /// The exact derivative of [`Esdf::distance`] (per metre): the direction away from the nearest surface. 0
+    /// The exact derivative of [`Esdf::distance`] (per meter): the direction away from the nearest surface. 0
     /// where all around is saturated. O(1).
     #[inline]
     pub fn gradient(&self, p_world: impl Into<[f64; D]>) -> Answer<[f64; D]> {
@@ -31,7 +31,7 @@ impl<const D: usize> Esdf<D> {
     }
 
     /// Value and gradient of one interpolant in one call. O(1): a look into one brick, or into up to `2^D` where the
-    /// centres around the point lie in several.
+    /// centers around the point lie in several.
     pub fn distance_and_gradient(&self, p_world: impl Into<[f64; D]>) -> Answer<(f64, [f64; D])> {
         let p = p_world.into();
         let Some((base, fraction)) = self.place(p) else { return Answer::Outside };

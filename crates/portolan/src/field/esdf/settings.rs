@@ -16,7 +16,7 @@ pub enum EsdfMethod {
         /// Cells whose estimate is within this many cells of zero seed the transform; 1.5 in the textbook.
         band_cells: f32,
     },
-    /// The centre of the nearest observed cell of the other sign, less half a cell: what a map that only knows occupied
+    /// The center of the nearest observed cell of the other sign, less half a cell: what a map that only knows occupied
     /// and free can give (see [`crate::field::EsdfGrid::from_mask`]).
     Mask,
 }
@@ -32,7 +32,7 @@ pub struct EsdfSettings {
     /// Cells of smaller weight count as never observed. `None`: what fits the map
     /// ([`Thresholds::observed`](crate::map::Thresholds::observed)), and any weight above 0 where cells alone are given.
     pub min_weight: Option<f32>,
-    /// Distances are maintained up to here (metres); beyond it answers are saturated. Positive.
+    /// Distances are maintained up to here (meters); beyond it answers are saturated. Positive.
     pub max_distance: f64,
     /// What distances are measured to.
     pub method: EsdfMethod,
@@ -41,7 +41,7 @@ pub struct EsdfSettings {
 }
 
 impl Default for EsdfSettings {
-    /// The weight that fits the map; one metre; the accurate method.
+    /// The weight that fits the map; one meter; the accurate method.
     fn default() -> Self {
         Self { min_weight: None, max_distance: 1.0, method: EsdfMethod::Accurate, unknown: false }
     }

@@ -35,7 +35,7 @@ fn observed(weight: f32, min_weight: f32) -> bool {
 }
 
 impl<const D: usize> Esdf<D> {
-    /// Distances to the nearest unknown cell of bricks (ascending): squared cells, to the cell as a box, from centres; 0 in
+    /// Distances to the nearest unknown cell of bricks (ascending): squared cells, to the cell as a box, from centers; 0 in
     /// unknown cells, infinite beyond the largest distance. Cells without a brick are unknown.
     ///
     /// The cost of a way is separable, `max(0, |k| - 1/2)^2` per axis, so that the passes are those of any other transform.
@@ -48,7 +48,7 @@ impl<const D: usize> Esdf<D> {
         let witnesses = parallel::map(&around, TOGETHER, |&key| self.unknown_near(store, key, &farthest));
         let mut wanted = dirty.iter().peekable();
         let outputs = around.iter().zip(bounds(&around, witnesses, limit));
-        // Ways are half a cell shorter along each axis than those from centre to centre, of which bricks know.
+        // Ways are half a cell shorter along each axis than those from center to center, of which bricks know.
         let outputs = outputs
             .filter(|(key, _)| wanted.next_if_eq(key).is_some())
             .map(|(&key, bound)| Output { key, budget: (bound.sqrt() + 1.0).powi(2) })

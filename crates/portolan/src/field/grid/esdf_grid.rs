@@ -18,7 +18,7 @@ pub enum EsdfError {
     },
 }
 
-/// Signed Euclidean distances at the centers of a box of cells (metres), positive in free space, x fastest.
+/// Signed Euclidean distances at the centers of a box of cells (meters), positive in free space, x fastest.
 ///
 /// NaN marks cells of which nothing is known, and stays inside: answers are typed. A saturated cell holds the largest
 /// maintained distance, with the side's sign. 4 bytes a cell, 5 where some cell is saturated.
@@ -73,8 +73,8 @@ impl<const D: usize> EsdfGrid<D> {
         Self { grid, distances, status }
     }
 
-    /// A field from cells that are known to be occupied or free, from a mask: distance from each centre to the
-    /// nearest centre of the other kind, less half a cell, negative in occupied cells. `None` cells are unknown
+    /// A field from cells that are known to be occupied or free, from a mask: distance from each center to the
+    /// nearest center of the other kind, less half a cell, negative in occupied cells. `None` cells are unknown
     /// and count as neither. Quantised to cells: what a map without distances can give.
     pub fn from_mask(grid: Grid<D>, occupied: impl Fn(usize) -> Option<bool>) -> Self {
         let seeds = |kind: bool| {
@@ -102,7 +102,7 @@ impl<const D: usize> EsdfGrid<D> {
         &self.grid
     }
 
-    /// Samples at the cell centers (metres), x fastest; NaN where nothing is known.
+    /// Samples at the cell centers (meters), x fastest; NaN where nothing is known.
     pub fn samples(&self) -> &[f32] {
         &self.distances
     }
@@ -138,14 +138,14 @@ impl<const D: usize> EsdfGrid<D> {
         self.distances.capacity() * size_of::<f32>() + status + size_of::<Self>()
     }
 
-    /// Signed distance (metres) at a point, interpolated between the centres around it. Unknown where one of
+    /// Signed distance (meters) at a point, interpolated between the centers around it. Unknown where one of
     /// them is. O(1).
     #[inline]
     pub fn distance(&self, p_world: impl Into<[f64; D]>) -> Answer<f64> {
         self.sample(p_world.into()).map(|(value, _)| value)
     }
 
-    /// The exact derivative of [`EsdfGrid::distance`] (per metre): the direction away from the nearest surface, of
+    /// The exact derivative of [`EsdfGrid::distance`] (per meter): the direction away from the nearest surface, of
     /// length 1 but for the cells' size and near the medial axis. O(1).
     #[inline]
     pub fn gradient(&self, p_world: impl Into<[f64; D]>) -> Answer<[f64; D]> {

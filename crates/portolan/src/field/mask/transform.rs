@@ -48,8 +48,8 @@ pub enum MaskError {
 /// Squares up to this one's stay below 2^31.
 const LARGEST_DIAGONAL: usize = 46_340;
 
-/// The exact Euclidean distance transform of masks of one shape, in cells: from the centre of every cell to the
-/// nearest centre of a cell that is set.
+/// The exact Euclidean distance transform of masks of one shape, in cells: from the center of every cell to the
+/// nearest center of a cell that is set.
 ///
 /// Cells are x fastest. Computed in whole numbers: squared distances are exact, up to 2^24 as they are returned, and
 /// correctly rounded to `f32` beyond. Where no cell is set, or none within the bound, distances are infinite. In parallel

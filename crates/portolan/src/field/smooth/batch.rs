@@ -10,7 +10,7 @@ use multiversion::multiversion;
 /// Which interpolant a batch of points is answered from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Interpolation {
-    /// From the `2^D` centres around a point: the gradient jumps where a point crosses a plane of centres.
+    /// From the `2^D` centers around a point: the gradient jumps where a point crosses a plane of centers.
     #[default]
     Linear,
     /// From `4^D` centres, as [`EsdfGrid::smooth`]: the gradient is continuous.
@@ -21,9 +21,9 @@ pub enum Interpolation {
 /// gradient are NaN.
 #[derive(Debug)]
 pub struct FieldSlots<'a, const D: usize> {
-    /// Signed distances (metres).
+    /// Signed distances (meters).
     pub distance: &'a mut [f64],
-    /// Exact derivatives of the interpolant that the distances come from (per metre).
+    /// Exact derivatives of the interpolant that the distances come from (per meter).
     pub gradient: &'a mut [[f64; D]],
     /// What each answer is.
     pub status: &'a mut [Status],
@@ -39,7 +39,7 @@ const TASK: usize = 2048;
 trait Samples<const D: usize>: Sync {
     fn resolution(&self) -> f64;
 
-    /// The lower one of the two centres beside a point and its place between them; `None`: nowhere near.
+    /// The lower one of the two centers beside a point and its place between them; `None`: nowhere near.
     fn place(&self, p_world: [f64; D]) -> Option<([i32; D], [f64; D])>;
 
     /// The `2^D` centres from `base` on, and whether one stands for more; `None` where one is unknown. `last` is the brick

@@ -138,7 +138,7 @@ fn bricks_are_the_array_2d_and_3d() {
     bricks_are_the_array::<3>();
 }
 
-/// Off its centre a ball's distance has a gradient of length one and curvatures of one over the radius: the spline has
+/// Off its center a ball's distance has a gradient of length one and curvatures of one over the radius: the spline has
 /// them to the square of the cell, and its gradient is nearer to the truth than the linear one's.
 #[test]
 fn a_ball_bends_as_it_should() {

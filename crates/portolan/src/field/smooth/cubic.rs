@@ -3,11 +3,11 @@
 /// A signed distance with its derivatives, all of one interpolant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smooth<const D: usize> {
-    /// Signed distance (metres), positive in free space.
+    /// Signed distance (meters), positive in free space.
     pub distance: f64,
-    /// Its exact first derivatives (per metre): continuous.
+    /// Its exact first derivatives (per meter): continuous.
     pub gradient: [f64; D],
-    /// Its exact second derivatives (per square metre), symmetric. They jump where a point crosses a plane of centres.
+    /// Its exact second derivatives (per square meter), symmetric. They jump where a point crosses a plane of centers.
     pub hessian: [[f64; D]; D],
 }
 
@@ -33,7 +33,7 @@ fn weights(t: f64) -> [[f64; 4]; 3] {
     ]
 }
 
-/// Value, gradient and, with `HESSIAN`, second derivatives (0 otherwise), per cell and not per metre.
+/// Value, gradient and, with `HESSIAN`, second derivatives (0 otherwise), per cell and not per meter.
 ///
 /// The slowest axis first, so that sums run over samples that lie side by side: what is left is a plane of values, one of
 /// slopes and one of second derivatives along it.

@@ -6,11 +6,11 @@ use crate::field::{Esdf, EsdfGrid};
 use crate::geom::{BLOCK_EDGE, BlockKey, vector};
 
 impl<const D: usize> EsdfGrid<D> {
-    /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centres around a point, for
+    /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centers around a point, for
     /// optimisers that take the jumps of [`EsdfGrid::gradient`] ill. O(1).
     ///
     /// Cubic through the samples; linear and quadratic fields are reproduced, and between samples it may pass them by an
-    /// eighth of their second difference. Unknown where [`EsdfGrid::distance`] is: where one of the `2^D` centres next to the
+    /// eighth of their second difference. Unknown where [`EsdfGrid::distance`] is: where one of the `2^D` centers next to the
     /// point is. Others that are missing, at the border of the map or of what is known, are replaced by the straight line
     /// through the two next to them: within a cell of what is unknown, and only there, value and gradient may jump, by
     /// less than the second difference of the samples.
@@ -74,7 +74,7 @@ impl<const D: usize> EsdfGrid<D> {
 }
 
 impl<const D: usize> Esdf<D> {
-    /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centres around a point, for
+    /// Signed distance with continuous gradient, and its second derivatives, from the `4^D` centers around a point, for
     /// optimisers that take the jumps of [`Esdf::gradient`] ill. O(1): a look into up to `2^D` bricks.
     ///
     /// As [`EsdfGrid::smooth`]. Saturated where one of the `4^D` is beyond the largest distance, which it then stands for.
@@ -139,7 +139,7 @@ impl<const D: usize> Esdf<D> {
     }
 }
 
-/// The answer at a place in a neighbourhood, in metres; `None`: unknown. Samples beyond `largest` stand for it.
+/// The answer at a place in a neighbourhood, in meters; `None`: unknown. Samples beyond `largest` stand for it.
 #[inline(always)]
 fn smooth<const D: usize, const HESSIAN: bool>(
     samples: &Neighbourhood,
@@ -170,7 +170,7 @@ fn mended<const D: usize>(samples: &Neighbourhood, largest: Option<f32>) -> Opti
     complete::<D>(&mut samples).then_some((samples, saturated))
 }
 
-/// Per cell to per metre.
+/// Per cell to per meter.
 #[inline(always)]
 fn metric<const D: usize>(cells: Smooth<D>, resolution: f64) -> Smooth<D> {
     let scale = 1.0 / resolution;

@@ -23,7 +23,7 @@ pub(super) fn place_of(code: EdgeCode) -> (usize, u32) {
 /// What one brick adds to a [`Part`]: how many entries, and where they start.
 ///
 /// The vertices of a piece are numbered: crossings of its own edges (those that start at its nodes) in the order of the
-/// words, then crossings of its upper neighbors' edges that its cubes use, then centres of cubes.
+/// words, then crossings of its upper neighbors' edges that its cubes use, then centers of cubes.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
     pub(super) key: BlockKey<3>,
@@ -47,7 +47,7 @@ pub(super) struct Piece {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Part {
     pub(super) pieces: Vec<Piece>,
-    /// Own crossings, then centres, of each piece: in cells from the brick's lowest node.
+    /// Own crossings, then centers, of each piece: in cells from the brick's lowest node.
     pub(super) vertices: Vec<[f32; 3]>,
     /// Gradients of the field there, not normalized; empty if not requested.
     pub(super) gradients: Vec<[f32; 3]>,

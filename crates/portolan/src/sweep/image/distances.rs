@@ -15,15 +15,15 @@ use crate::sweep::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel
 /// How a range image becomes distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectiveSettings {
-    /// Truncation tau (metres): cells further behind a surface get nothing.
+    /// Truncation tau (meters): cells further behind a surface get nothing.
     pub truncation: f64,
     /// Weight of free space before the truncation, times that of its ray; 0: free space gets nothing.
     pub carve_weight: f32,
     /// How much each ray is trusted.
     pub weights: WeightModel,
-    /// Surfaces nearer than this are not used (metres along the ray).
+    /// Surfaces nearer than this are not used (meters along the ray).
     pub min_range: f64,
-    /// Surfaces further than this are not used; the space up to there is free (metres along the ray).
+    /// Surfaces further than this are not used; the space up to there is free (meters along the ray).
     pub max_range: f64,
     /// Whether colors are looked up too, where the scan has them.
     pub color: bool,
@@ -33,7 +33,7 @@ pub struct ProjectiveSettings {
 ///
 /// The center is projected into the image. If the four pixels around it are of one surface, the range there is
 /// interpolated between them: `1 / z` linearly, which is exact on a plane. (Along a steep surface linear depths would be
-/// off by centimetres.) Else the nearest pixel counts, with its surface no further aside than half a cell, so that nothing is
+/// off by centimeters.) Else the nearest pixel counts, with its surface no further aside than half a cell, so that nothing is
 /// drawn across gaps and thin things stay. Depths become distances along the ray, so that weights and truncation mean the
 /// same in the image's corners as in its middle.
 ///

@@ -22,11 +22,11 @@ pub(super) struct ImageLookup<'a> {
     pub carve_weight: f32,
     /// Weights fall with the square of the range beyond 1 m.
     pub inverse_square: bool,
-    /// A ray counts for surfaces this far aside, where it has no neighbors on the same surface (metres).
+    /// A ray counts for surfaces this far aside, where it has no neighbors on the same surface (meters).
     pub aside: f32,
 }
 
-/// The centers of a block's cells in the sensor's frame: the first one, and steps along the block's axes (metres).
+/// The centers of a block's cells in the sensor's frame: the first one, and steps along the block's axes (meters).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlockCenters {
     pub first: [f32; 3],

@@ -7,9 +7,9 @@ use crate::scan::{BeamCounts, MAX_OPENING, MAX_SLOPE, RangeImage, RefusedBeams};
 use crate::sweep::{ScanStats, WeightModel};
 use multiversion::multiversion;
 
-/// Neighbors nearer than this say more about the noise than about the surface (metres).
+/// Neighbors nearer than this say more about the noise than about the surface (meters).
 const BASELINE: f64 = 0.05;
-/// Surfaces nearer than this are not used: their inverse would not be finite (metres).
+/// Surfaces nearer than this are not used: their inverse would not be finite (meters).
 const NEAREST: f64 = 1e-6;
 /// How many pixels aside neighbors are looked for.
 const REACH: usize = 8;
@@ -39,7 +39,7 @@ pub(super) struct PaddedImage {
 pub(super) struct Cleaning {
     pub min_range: f64,
     pub max_range: f64,
-    /// Neighbors that are not further apart than this are of one surface, however steep (metres).
+    /// Neighbors that are not further apart than this are of one surface, however steep (meters).
     pub step: f64,
     pub weights: WeightModel,
     pub colors: bool,

@@ -30,7 +30,7 @@ pub(super) struct PlacedImage {
     readings: Vec<u8>,
     columns: usize,
     rows: usize,
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     resolution: f32,
     lattice: Lattice<3>,
     sensor_from_world: Pose<3>,
@@ -219,7 +219,7 @@ struct FreeTest<'a> {
     windows: &'a WindowMinima,
     columns: i32,
     rows: i32,
-    /// How far beyond a cell's center beams must have seen (metres).
+    /// How far beyond a cell's center beams must have seen (meters).
     margin: f32,
     /// Cells must be nearer than this.
     nearest_of_all: f32,

@@ -12,7 +12,7 @@ pub(super) type Lanes = [f32; LANES];
 pub(super) struct Projected {
     pub u: Lanes,
     pub v: Lanes,
-    /// Length of the ray up to the point (metres).
+    /// Length of the ray up to the point (meters).
     pub length: Lanes,
     /// What a pixel's value is multiplied with for the length of the ray up to its surface.
     pub scale: Lanes,
@@ -65,7 +65,7 @@ impl Projector {
         out
     }
 
-    /// Distances between points and the rays of pixels near them (metres).
+    /// Distances between points and the rays of pixels near them (meters).
     #[inline(always)]
     pub(super) fn aside(&self, steps: &Steps, projected: &Projected) -> Lanes {
         let mut aside = [0.0; LANES];

@@ -80,7 +80,7 @@ impl Projector {
         matches!(self.kind, Kind::Parallel { .. })
     }
 
-    /// How far neighboring rays are apart: columns, and row `row` from the next; radians, metres where rays are parallel.
+    /// How far neighboring rays are apart: columns, and row `row` from the next; radians, meters where rays are parallel.
     #[inline(always)]
     pub(super) fn openings(&self, row: usize) -> [f32; 2] {
         self.openings[row.min(self.rows - 1)]
@@ -103,7 +103,7 @@ impl Projector {
     }
 
     /// A box that holds everything with values up to `depth`, in the sensor's frame; where rays are parallel from `front`
-    /// metres before the plane that values are measured from.
+    /// meters before the plane that values are measured from.
     pub(super) fn reach(&self, depth: f64, front: f64) -> ([f64; 3], [f64; 3]) {
         let (w, h) = (self.columns as f64, self.rows as f64);
         match &self.kind {

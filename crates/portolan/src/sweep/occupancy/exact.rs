@@ -8,7 +8,7 @@ use crate::parallel;
 use crate::scan::RefusedBeams;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, clip};
 
-/// One beam in the world's frame (metres).
+/// One beam in the world's frame (meters).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
     pub(crate) origin: [f64; 3],

@@ -265,7 +265,7 @@ impl<S: ?Sized> Swept<3> for HitMissSweep<S> {
 }
 
 /// The box around a sensor in which pixels without a surface mean that space is free, as its diagonal. Not those of more
-/// than `longest` metres, which are refused.
+/// than `longest` meters, which are refused.
 fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Option<Ray> {
     let used = |v: &f32| f64::from(-v) <= longest;
     let farthest = image.values.iter().copied().filter(used).fold(0.0f32, f32::min);

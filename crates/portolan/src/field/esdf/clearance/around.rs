@@ -7,7 +7,7 @@ use crate::field::esdf::surface::{cells_around, simplex_distance_sq};
 use crate::field::esdf::transform::Feature;
 use crate::geom::BlockKey;
 
-/// A point between `2^D` nodes (the centres of cells).
+/// A point between `2^D` nodes (the centers of cells).
 pub(super) struct QueryPoint<const D: usize> {
     /// The lowest of the nodes.
     pub(super) base: [i32; D],
@@ -71,7 +71,7 @@ impl<const D: usize> QueryPoint<D> {
         self.base[k] + (self.t[k] + off).floor() as i32
     }
 
-    /// The point in cells from a cell's centre.
+    /// The point in cells from a cell's center.
     pub(super) fn relative(&self, cell: [i32; D]) -> [f64; D] {
         std::array::from_fn(|k| self.t[k] + f64::from(self.base[k] - cell[k]))
     }
@@ -131,7 +131,7 @@ impl<'f, const D: usize> NodesAround<'f, D> {
         Some((sq * (1.0 - 1e-6) - 1e-6).max(0.0))
     }
 
-    /// Signed distance (metres) between the nodes that know one: of the side where the point lies.
+    /// Signed distance (meters) between the nodes that know one: of the side where the point lies.
     pub(super) fn signed(&self, point: &QueryPoint<D>, max_distance: f64) -> f64 {
         let known = (0..1 << D).filter_map(|i| {
             let value = f64::from(*self.distances[i].get(self.places[i])?);

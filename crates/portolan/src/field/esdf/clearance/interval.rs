@@ -73,7 +73,7 @@ impl<const D: usize> Esdf<D> {
         self.answer(&point, interval, signed < 0.0)
     }
 
-    /// How far the nearest cell is that was not observed, at least and at most (metres); cells of bricks that were never
+    /// How far the nearest cell is that was not observed, at least and at most (meters); cells of bricks that were never
     /// made are among them. 0 in such a cell; saturated beyond the largest distance, and beyond a cell where
     /// [`EsdfSettings::unknown`](crate::field::EsdfSettings::unknown) did not ask for these distances. `inside` is false. O(1).
     pub fn unknown_distance(&self, p_world: impl Into<[f64; D]>) -> Answer<Clearance> {
@@ -88,7 +88,7 @@ impl<const D: usize> Esdf<D> {
         self.answer(&point, self.to_unknown(&point, &nodes), false)
     }
 
-    /// In metres, and less and more by what rounding may have done.
+    /// In meters, and less and more by what rounding may have done.
     fn answer(&self, point: &QueryPoint<D>, interval: Interval, inside: bool) -> Answer<Clearance> {
         let resolution = self.lattice.resolution;
         let lower = (interval.lower - point.margin).max(0.0) * resolution;

@@ -11,12 +11,12 @@ use crate::store::{Bricks, Store};
 pub struct SurfaceNoise {
     /// So many standard deviations; not negative.
     pub sigmas: f64,
-    /// Standard deviation of one observation of weight 1 (metres); not negative.
+    /// Standard deviation of one observation of weight 1 (meters); not negative.
     pub sigma_of_one: f64,
 }
 
 impl SurfaceNoise {
-    /// What is taken off where the filter holds a weight: `sigmas * sigma_of_one / sqrt(W)` (metres), the fused estimate's
+    /// What is taken off where the filter holds a weight: `sigmas * sigma_of_one / sqrt(W)` (meters), the fused estimate's
     /// deviation if observations err independently. What they have in common (poses, grazing looks) is not in it.
     pub fn margin(&self, weight: f32) -> f64 {
         self.sigmas * self.sigma_of_one / f64::from(weight).sqrt()
@@ -48,7 +48,7 @@ impl<const D: usize> Esdf<D> {
     }
 }
 
-/// The least weight among the cells beside which the surface runs, in the bricks within `reach` (metres) of a point.
+/// The least weight among the cells beside which the surface runs, in the bricks within `reach` (meters) of a point.
 fn least_weight<const D: usize>(
     map: &Bricks<SignedDistance, D>,
     p_world: [f64; D],

@@ -1,6 +1,6 @@
 //! The surface's crossings of the lattice's edges, as the seeds of the accurate transform.
 
-/// Crossings on the edges that start at the cells of one brick (which join the cell's centre to that of the next cell
+/// Crossings on the edges that start at the cells of one brick (which join the cell's center to that of the next cell
 /// along an axis).
 ///
 /// One plane per axis, cells x fastest.

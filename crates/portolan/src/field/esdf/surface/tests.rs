@@ -41,7 +41,7 @@ fn crossings_are_those_of_the_simplices<const D: usize>(elements: &SurfaceElemen
     for key in elements.element_keys() {
         for cell in (0..block_cells::<D>()).map(|i| key.cell(i)) {
             let simplices = elements.cell(cell);
-            // A corner with two coordinates away from the nodes is the centre of a patch.
+            // A corner with two coordinates away from the nodes is the center of a patch.
             let on_edge = |p: &[f32; D]| p.iter().filter(|v| **v != 0.0 && **v != 1.0).count() <= 1;
             let centres = !simplices.as_flattened().iter().all(on_edge);
             for s in simplices {

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Witness<const D: usize> {
     pub(crate) cell: [i32; D],
-    /// Where it is, in cells from the cell's centre.
+    /// Where it is, in cells from the cell's center.
     pub(crate) offset: [f32; D],
     /// Of the seed, or the height of the crossing.
     pub(crate) value: f32,

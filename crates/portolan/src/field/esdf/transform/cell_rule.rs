@@ -11,7 +11,7 @@ pub(crate) struct CellRule {
     offsets: [f32; 2],
     /// The most that `f` of a seed is.
     most: f32,
-    /// Edge of a cell (metres).
+    /// Edge of a cell (meters).
     resolution: f32,
     /// Squared distances (cells) beyond this are saturated.
     pub(crate) limit: f32,
@@ -81,7 +81,7 @@ pub(crate) fn seeds(distances: &[f32], weights: &[f32], rule: &CellRule, out: &m
     }
 }
 
-/// Squared distances (cells) become signed ones (metres): infinite, with the side's sign, beyond the limit; NaN where
+/// Squared distances (cells) become signed ones (meters): infinite, with the side's sign, beyond the limit; NaN where
 /// nothing was observed. Zero counts as free, whatever its sign.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
 pub(crate) fn sign(values: &mut [f32], distances: &[f32], weights: &[f32], rule: &CellRule) {
@@ -92,7 +92,7 @@ pub(crate) fn sign(values: &mut [f32], distances: &[f32], weights: &[f32], rule:
     }
 }
 
-/// The squared distances of both sides become signed ones (metres), from the centre to half a cell before that of the
+/// The squared distances of both sides become signed ones (meters), from the center to half a cell before that of the
 /// nearest cell of the other side; as [`sign`] does where there is none.
 pub(crate) fn mask(
     to_free: &mut [f32],
