@@ -128,5 +128,7 @@ pub(super) fn cloud_crossover(
             ((n0 as f64).ln() * (1.0 - t) + (n1 as f64).ln() * t).exp().round() as usize
         }
     });
+    // From one point on is from the first on.
+    let crossing = crossing.map(|n| if n == 1 { 0 } else { n });
     CloudCrossover { measured, points: crossing }
 }
