@@ -40,8 +40,9 @@ impl Ours<'_> {
 
 pub(super) fn section(facts: &Facts) -> Section {
     let ours = Ours(&facts.scene);
-    let rows: Vec<Vec<String>> = lines(&ours)
+    let rows: Vec<Vec<String>> = costs(&ours)
         .into_iter()
+        .chain(accuracy(&ours))
         .map(|(what, text, ours, why)| vec![what.into(), text.into(), ours, why.into()])
         .collect();
     let body = format!(
@@ -53,19 +54,9 @@ pub(super) fn section(facts: &Facts) -> Section {
     Section { title: "Against the text's numbers", body, command: "portolan demo --out out" }
 }
 
-fn lines(ours: &Ours) -> Vec<Line> {
+/// What maps weigh and what scans and questions cost.
+fn costs(ours: &Ours) -> Vec<Line> {
     let banded = ours.note("TSDF").split(',').next().unwrap_or_default().to_owned();
-    let cm = |e: Option<ErrorSummary>, of: fn(&ErrorSummary) -> f64| {
-        e.map_or("–".into(), |e| format!("{:.1} cm", 100.0 * of(&e)))
-    };
-    let field = ours.seeded();
-    let both = |of: fn(&ErrorSummary) -> f64| {
-        format!(
-            "{}<small>{} against the world</small>",
-            cm(field.against_contour, of),
-            cm(field.against_truth, of)
-        )
-    };
     vec![
         (
             "grid, memory",
@@ -131,6 +122,23 @@ fn lines(ours: &Ours) -> Vec<Line> {
             ours.time("extracted contour", |r| r.distance),
             "The same brute force over all segments, a few more of them, compiled.",
         ),
+    ]
+}
+
+/// How true the answers are.
+fn accuracy(ours: &Ours) -> Vec<Line> {
+    let cm = |e: Option<ErrorSummary>, of: fn(&ErrorSummary) -> f64| {
+        e.map_or("–".into(), |e| format!("{:.1} cm", 100.0 * of(&e)))
+    };
+    let field = ours.seeded();
+    let both = |of: fn(&ErrorSummary) -> f64| {
+        format!(
+            "{}<small>{} against the world</small>",
+            cm(field.against_contour, of),
+            cm(field.against_truth, of)
+        )
+    };
+    vec![
         (
             "‖∇d‖, ESDF",
             "0.93",

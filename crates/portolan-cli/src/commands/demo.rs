@@ -90,9 +90,7 @@ fn seed(text: &str) -> Result<u64, String> {
 
 /// Simulates the lap, builds every representation, writes everything.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    if args.out.exists() && !args.out.is_dir() {
-        bail!("{}: is a file, not a folder; name a folder for the results", args.out.display());
-    }
+    super::check_is_folder(&args.out)?;
     let mut run = Run::start();
     let config =
         LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };

@@ -142,9 +142,7 @@ impl Args {
         if self.append {
             return SavedMap::read_to_append(&self.map_path(), self.memory, dimension).map(Some);
         }
-        if self.out.exists() && !self.out.is_dir() {
-            bail!("{}: is a file, not a folder; name a folder for the results", self.out.display());
-        }
+        super::check_is_folder(&self.out)?;
         if let (Ok(out), Ok(log)) = (self.out.canonicalize(), self.log.canonicalize())
             && out == log
         {

@@ -51,3 +51,11 @@ impl Command {
         }
     }
 }
+
+/// Refuses a file where results are to go into a folder.
+fn check_is_folder(out: &std::path::Path) -> anyhow::Result<()> {
+    if out.exists() && !out.is_dir() {
+        anyhow::bail!("{}: is a file, not a folder; name a folder for the results", out.display());
+    }
+    Ok(())
+}
