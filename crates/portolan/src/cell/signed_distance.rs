@@ -17,7 +17,7 @@ pub struct TsdfRule {
 #[non_exhaustive]
 pub enum TsdfRuleError {
     /// The truncation is not a positive length.
-    #[error("truncation must be a positive, finite length in metres, got {0}")]
+    #[error("truncation must be a positive, finite length in meters, got {0}")]
     Truncation(f32),
     /// The weight clamp is not positive.
     #[error("w_max must be positive (infinity: never forget), got {0}")]

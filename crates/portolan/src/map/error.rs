@@ -10,7 +10,7 @@ use crate::sweep::PlanError;
 #[non_exhaustive]
 pub enum MapError {
     /// The resolution is no length.
-    #[error("resolution must be a positive, finite length in metres, got {0}")]
+    #[error("resolution must be a positive, finite length in meters, got {0}")]
     Resolution(f64),
     /// The origin is no point.
     #[error("origin must be finite, got {0}")]
@@ -41,11 +41,14 @@ pub enum MapError {
         /// Limit at this resolution (meters).
         most: f64,
     },
+    /// The largest Euclidean distance is no length.
+    #[error("max_distance must be a positive, finite length in meters, got {0}")]
+    MaxDistance(f64),
     /// A range image contradicts itself.
     #[error("a range image cannot be used: {0}")]
     Image(&'static str),
     /// Distances and colors lie on different lattices.
-    #[error("the lattices of distances and colours differ")]
+    #[error("the lattices of distances and colors differ")]
     Lattices,
     /// The map would need more memory than it may have.
     #[error(transparent)]

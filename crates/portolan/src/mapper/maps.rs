@@ -88,6 +88,7 @@ impl<const D: usize> Mapper<D> {
         occupancy: Option<Occupancy<D>>,
         tsdf: Option<Tsdf<D>>,
     ) -> Result<Self, MapError> {
+        settings.check()?;
         let mut mapper = Self::with(settings);
         let occupancy = occupancy.map(|map| map.with_sweep(settings.occupancy_sweep()));
         let tsdf = tsdf.map(|map| {
@@ -143,6 +144,7 @@ impl<const D: usize> Mapper<D> {
             return Ok(());
         }
         let settings = &self.settings;
+        settings.check()?;
         let origin = settings.origin_near(first);
         let lattice = Lattice::new(origin, settings.resolution);
         let occupancy = settings.occupancy.map(|model| {

@@ -2,7 +2,7 @@
 
 use crate::cell::OccupancyModel;
 use crate::geom::Aabb;
-use crate::map::{BeamSweep, PointSweep, TsdfConfig};
+use crate::map::{BeamSweep, MapError, PointSweep, TsdfConfig};
 use crate::sweep::{LONGEST_RAY_CELLS, OccupancySweep, WeightModel};
 
 /// Weight of free space against a surface's 1: on real logs, full of table legs, surfaces that weigh as much as the beams
@@ -76,6 +76,12 @@ impl<const D: usize> MapperSettings<D> {
             let exact = 3.0 * self.resolution;
             format!("{exact:.9e}").parse().unwrap_or(exact)
         })
+    }
+
+    /// What the maps do not check themselves.
+    pub(super) fn check(&self) -> Result<(), MapError> {
+        let possible = self.max_distance > 0.0 && self.max_distance.is_finite();
+        if possible { Ok(()) } else { Err(MapError::MaxDistance(self.max_distance)) }
     }
 
     /// Settings of the signed distances, on a lattice with this origin.

@@ -176,3 +176,20 @@ fn all_at_once_is_one_by_one_2d_and_3d() {
     all_at_once_is_one_by_one::<2>();
     all_at_once_is_one_by_one::<3>();
 }
+
+#[test]
+fn settings_that_are_not_possible_are_refused_before_anything_is_made() {
+    let usual = MapperSettings::<2>::new(0.1);
+    let (pose, scan) = scan::<2>(0);
+    for max_distance in [f64::NAN, -1.0, 0.0, f64::INFINITY] {
+        let mut mapper = Mapper::with(MapperSettings { max_distance, ..usual });
+        let refused = mapper.integrate(&pose, &scan);
+        assert!(matches!(refused, Err(MapError::MaxDistance(_))), "{max_distance}: {refused:?}");
+        assert!(mapper.esdf().is_none() && mapper.tsdf().is_none());
+        assert!(Mapper::of_maps(*mapper.settings(), None, None).is_err());
+    }
+    for resolution in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let refused = Mapper::<2>::new(resolution).integrate(&pose, &scan);
+        assert!(matches!(refused, Err(MapError::Resolution(_))), "{resolution}: {refused:?}");
+    }
+}
