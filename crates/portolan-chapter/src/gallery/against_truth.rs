@@ -3,7 +3,7 @@
 use super::asker::{Asker, gradient, median};
 use super::costs::{contour_of_grid, contour_of_tree, sign_of, zero_of};
 use super::fields::against_contour;
-use super::run::Gallery;
+use super::measured::Gallery;
 use portolan::geom::vector;
 use portolan::surface::marching_squares;
 

@@ -2,9 +2,9 @@
 
 use super::crossover::{CHAPTER_NODE, CloudCrossover, OUR_NODE, Plane, TreeCrossover};
 use super::fields::{MeasuredField, fields_of};
+use super::measured::{Gallery, GallerySettings};
 use super::probes::{Clock, seconds_of};
 use super::row::{Cost, Row};
-use super::run::{Gallery, GallerySettings};
 use crate::memory::inner_only_node_bytes;
 use portolan::cell::OccupancyModel;
 use portolan::geom::{Grid, Lattice, Pose};

@@ -1,9 +1,9 @@
 //! What the three questions cost each representation.
 
 use super::crossover::cloud_crossover;
+use super::measured::Gallery;
 use super::probes::{Clock, points, seconds_of, seconds_per_probe};
 use super::row::{Cost, Workload, winners};
-use super::run::Gallery;
 use crate::MapRepr;
 use portolan::field::EsdfGrid;
 use portolan::geom::{Grid, vector};

@@ -2,7 +2,7 @@
 
 use super::Cost;
 use super::build::format_ms;
-use super::run::Gallery;
+use super::measured::Gallery;
 use portolan_sim::ErrorSummary;
 use std::fmt::{self, Display, Formatter, Write};
 

@@ -1,7 +1,6 @@
 //! What forgetting costs: a map that forgets never comes to rest.
 
-use super::GhostSettings;
-use super::run::{chair, lap_config, map_config};
+use super::settings::{GhostSettings, chair, lap_config, map_config};
 use portolan::geom::Grid;
 use portolan::map::{MapError, Tsdf2};
 use portolan_sim::{apartment, lap};

@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use portolan::geom::Pose;
 use portolan::scan::{RangeLimits, Scan};
 
-use super::reading::Reading;
 use super::stats::CarmenStats;
-use crate::bytes::{Input, Lines, open};
 use crate::{IoError, Result};
 
 /// Bearings that scans share, with their unit vectors.
@@ -76,23 +74,6 @@ pub struct CarmenLog {
 }
 
 impl CarmenLog {
-    /// Reads a log file. Linear in its length.
-    ///
-    /// # Errors
-    /// See [`CarmenLog::parse`] and [`open`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        Self::parse(open(path)?)
-    }
-
-    /// Reads a log.
-    ///
-    /// # Errors
-    /// [`IoError::NoScans`] where no line is a usable scan, [`IoError::Text`] for a line longer than 4 MiB or
-    /// a log that would need gigabytes, and the errors of reading.
-    pub fn parse(input: Input) -> Result<Self> {
-        Reading::default().run(Lines::of(input))
-    }
-
     /// The file that the log comes from.
     pub fn path(&self) -> &Path {
         &self.path

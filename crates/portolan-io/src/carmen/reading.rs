@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::BufRead;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 
 use super::log::{CarmenLog, Entry, Fan};
 use super::message::{FanShape, ScanHead, parse_scan};
 use super::stats::{CarmenStats, RefusedScan, RefusedScans, ScanMessage, TimeOrder};
-use crate::bytes::Lines;
+use crate::bytes::{Input, Lines, open};
 use crate::{IoError, Result, error::shown};
 
 /// The most readings that a log may hold: half a gigabyte of them.
@@ -20,6 +20,25 @@ const MOST_SCANS: usize = 1 << 22;
 const MOST_FAN_BEAMS: usize = 1 << 23;
 /// The most message names that are counted apart.
 const MOST_NAMES: usize = 64;
+
+impl CarmenLog {
+    /// Reads a log file. Linear in its length.
+    ///
+    /// # Errors
+    /// See [`CarmenLog::parse`] and [`open`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Self::parse(open(path)?)
+    }
+
+    /// Reads a log.
+    ///
+    /// # Errors
+    /// [`IoError::NoScans`] where no line is a usable scan, [`IoError::Text`] for a line longer than 4 MiB or
+    /// a log that would need gigabytes, and the errors of reading.
+    pub fn parse(input: Input) -> Result<Self> {
+        Reading::default().run(Lines::of(input))
+    }
+}
 
 /// Scans of one kind of message.
 #[derive(Default)]

@@ -1,6 +1,6 @@
 //! The planes of one brick, shared between snapshots until one of them changes it.
 
-use super::packed::Packed;
+use super::packed::{ARC_HEADER, Packed};
 use super::{LogOddsValue, Planes, SignedDistance};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -151,9 +151,6 @@ impl Planes<SignedDistance> for DistanceBrick {
         size_of_val(&*self.0) + ARC_HEADER
     }
 }
-
-/// The two counters that an `Arc` keeps before its content.
-pub(super) const ARC_HEADER: usize = 2 * size_of::<usize>();
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,6 @@
 //! Color beside distance: a weighted mean per channel.
 
-use super::brick::ARC_HEADER;
+use super::packed::ARC_HEADER;
 use super::{Cell, Evidence, Planes};
 use std::sync::Arc;
 

@@ -3,6 +3,9 @@
 use super::LogOddsValue;
 use std::sync::Arc;
 
+/// The two counters that an `Arc` keeps before its content.
+pub(super) const ARC_HEADER: usize = 2 * size_of::<usize>();
+
 /// Cells of a brick that can be packed: 3-D ones. An 8 x 8 block is too small to be worth it.
 const CELLS: usize = 512;
 
@@ -63,7 +66,7 @@ impl<V: LogOddsValue> Packed<V> {
 
     /// Bytes on the heap.
     pub(super) fn bytes(&self) -> usize {
-        let header = super::brick::ARC_HEADER;
+        let header = ARC_HEADER;
         match self {
             Self::Uniform(_) => 0,
             Self::One(p) => size_of_val(&**p) + header,

@@ -5,7 +5,7 @@ use portolan_chapter::MapRepr;
 use portolan_sim::World;
 use serde_json::{Value, json};
 
-use super::state::Built;
+use super::built::Built;
 
 /// What each answers at a point; `null` where it does not know.
 pub(super) fn at(built: &Built, p: [f64; 2]) -> Value {

@@ -2,6 +2,7 @@
 
 mod answers;
 mod ask;
+mod built;
 mod picture;
 mod report;
 mod state;

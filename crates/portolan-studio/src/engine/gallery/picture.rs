@@ -7,8 +7,8 @@ use portolan::surface::{Ambiguity, level_set};
 use portolan_chapter::MapRepr;
 use serde_json::json;
 
+use super::built::Built;
 use super::report;
-use super::state::Built;
 use crate::engine::fusion::frame::{self, Lines};
 use crate::engine::{Refusal, Reply};
 

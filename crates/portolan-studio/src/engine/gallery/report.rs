@@ -3,7 +3,7 @@
 use portolan_chapter::gallery::{MeasuredField, Row, Winner};
 use serde_json::{Value, json};
 
-use super::state::Built;
+use super::built::Built;
 
 /// Names by which rows are known, as they begin, and the panels that show them: the first of a panel is the one drawn.
 const PANELS: [(&str, &str); 6] = [

@@ -2,13 +2,12 @@
 
 use portolan::field::EsdfSettings;
 use portolan::surface::ContourSettings;
-use portolan_chapter::gallery::{
-    Gallery as Measured, GallerySettings, TreeCrossover, run, tree_crossovers_at,
-};
+use portolan_chapter::gallery::{GallerySettings, run, tree_crossovers_at};
 use portolan_sim::{Truth, World};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::ask::Ask;
+use super::built::Built;
 use super::{answers, picture, report};
 use crate::engine::fusion::Fusion;
 use crate::engine::{Clock, Limits, Refusal, Reply};
@@ -33,21 +32,6 @@ pub(in crate::engine) struct Gallery {
     limits: Limits,
     clock: Clock,
     built: Option<Built>,
-}
-
-/// What was built and measured, and of what.
-pub(super) struct Built {
-    /// Of the map of fusion.
-    pub(super) revision: u64,
-    pub(super) settings: GallerySettings,
-    pub(super) measured: Measured,
-    /// Where and of what it is, for people.
-    pub(super) of: Value,
-    /// Seconds that building and measuring took.
-    pub(super) seconds: f64,
-    pub(super) truth: Option<World>,
-    /// The textbook's node and ours over leaves of each size.
-    trees: Option<Vec<[TreeCrossover; 2]>>,
 }
 
 impl Gallery {

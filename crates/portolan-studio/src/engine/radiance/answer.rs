@@ -4,7 +4,7 @@ use portolan_chapter::radiance::{Fit, Measurement, NAMED_SEEDS, Scene, Terms, op
 use serde_json::{Value, json};
 
 use super::run::Run;
-use super::state::Selection;
+use super::selection::Selection;
 use crate::engine::{Refusal, Reply};
 
 /// Surfaces nearer than this do not count as empty space (meters).

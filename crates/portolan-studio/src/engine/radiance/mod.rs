@@ -4,6 +4,7 @@ mod answer;
 mod ask;
 mod curve;
 mod run;
+mod selection;
 mod state;
 #[cfg(test)]
 mod tests;

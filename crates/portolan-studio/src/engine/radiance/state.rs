@@ -5,6 +5,7 @@ use portolan_chapter::radiance::{PARKED, Scene};
 use super::answer;
 use super::ask::{Ask, ChannelsChoice, OptimizerChoice};
 use super::run::Run;
+use super::selection::Selection;
 use crate::engine::{Clock, Refusal, Reply};
 
 /// Steps that one question may make: more would keep the page waiting for its picture.
@@ -18,14 +19,6 @@ pub(in crate::engine) struct Radiance {
     scene: Scene,
     run: Option<Run>,
     pub(super) look: Selection,
-}
-
-/// A ray and a bin.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Selection {
-    /// The rays to learn from, then those held out.
-    pub(super) ray: Option<usize>,
-    pub(super) bin: Option<usize>,
 }
 
 impl Radiance {

@@ -7,6 +7,7 @@
 //! neighbours found: minima of parabolas of one width are ordered as the rows are *(the total monotonicity of Aggarwal
 //! et al. 1987)*.
 
+mod cell;
 mod integer;
 mod panel;
 mod passes;
@@ -14,4 +15,5 @@ mod scan;
 mod search;
 mod transform;
 
-pub use transform::{MaskCell, MaskError, MaskTransform};
+pub use cell::MaskCell;
+pub use transform::{MaskError, MaskTransform};

@@ -1,9 +1,9 @@
 //! The passes along the axes, slab by slab.
 
+use super::cell::MaskCell;
 use super::integer::Integer;
 use super::panel::{Panel, solve};
 use super::scan::scan;
-use super::transform::MaskCell;
 use crate::parallel;
 
 /// Columns that one task of the last pass solves.

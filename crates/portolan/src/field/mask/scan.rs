@@ -1,7 +1,7 @@
 //! The pass along x, straight from the mask.
 
+use super::cell::MaskCell;
 use super::integer::Integer;
-use super::transform::MaskCell;
 
 /// Squared distances along one line to its nearest cell that is set, and where that one is (the lower of two).
 ///

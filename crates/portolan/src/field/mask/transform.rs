@@ -1,29 +1,9 @@
 //! What is asked for, and the choice of the numbers to compute it with.
 
+use super::cell::MaskCell;
 use super::integer::Integer;
 use super::panel::PLAIN;
 use super::passes::Plan;
-
-/// A cell of a mask: set or not.
-pub trait MaskCell: Copy + Send + Sync {
-    /// Whether distances are measured to this cell.
-    fn is_set(self) -> bool;
-}
-
-impl MaskCell for bool {
-    #[inline(always)]
-    fn is_set(self) -> bool {
-        self
-    }
-}
-
-/// Any value but 0 is set.
-impl MaskCell for u8 {
-    #[inline(always)]
-    fn is_set(self) -> bool {
-        self != 0
-    }
-}
 
 /// Why a mask has no transform.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

@@ -1,8 +1,9 @@
 //! Pixels that balls may fall on, eight at a time.
 
-use super::pixels::{PixelProjector, STEPS, nearest_integer};
+use super::pixels::PixelProjector;
 use super::projector::Kind;
 use super::sine_rows::sine_spread;
+use super::steps::{STEPS, nearest_integer};
 use crate::scan::atan2;
 
 /// The pixels around `(column, row)` up to the halves that a ball may fall on, and its depths. A ball that is too near to

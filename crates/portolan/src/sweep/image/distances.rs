@@ -1,9 +1,9 @@
 //! The sweep for distances through a range image: every cell's center is looked up in it.
 
 use super::depth_bounds::DepthBounds;
+use super::lanes::LANES;
 use super::observe::{BlockCenters, ImageLookup, cell_of, nearest, observe_block, places};
 use super::padded_image::{Cleaning, PaddedImage};
-use super::project::LANES;
 use super::projector::Projector;
 use super::range_pyramid::RangePyramid;
 use super::search::{BlockBox, LONGEST_EDGE, Octants, find_blocks};

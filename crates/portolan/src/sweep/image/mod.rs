@@ -3,7 +3,7 @@
 //! | step | for distances | for misses |
 //! |---|---|---|
 //! | the image fits together | [`crate::scan::RangeImage::check`] | the same |
-//! | its projection | `projector`, `rings`, and `project` | the same, and `pixels`, `sine_rows` |
+//! | its projection | `projector`, `rings`, and `project` (`lanes` of 64 points) | the same, and `pixels`, `sine_rows` (in `steps`) |
 //! | readings made ready | `padded_image`: cleaned, torn where surfaces end | `window_minima`: the nearest within any window |
 //! | nearest and farthest reading that a cube of cells may fall on | `window` of its box, in `range_pyramid` | `balls` around it, in `window_minima` |
 //! | cubes of cells against them | `depth_bounds` | `placed_image` |
@@ -18,6 +18,7 @@ mod balls;
 mod bands;
 mod depth_bounds;
 mod distances;
+mod lanes;
 mod misses;
 mod observe;
 mod padded_image;
@@ -29,6 +30,7 @@ mod range_pyramid;
 mod rings;
 mod search;
 mod sine_rows;
+mod steps;
 mod window;
 mod window_minima;
 

@@ -3,8 +3,8 @@
 //! Every loop runs over the 64 lanes of an octant without calls and without branches, so that it stands in the widest vectors that the
 //! processor has; no operation depends on the width, so that all versions give the same bits.
 
+use super::lanes::{LANES, Lanes, Projected, Steps};
 use super::padded_image::PaddedImage;
-use super::project::{LANES, Lanes, Projected, Steps};
 use super::projector::Projector;
 use super::search::Octants;
 use crate::geom::block_cells;

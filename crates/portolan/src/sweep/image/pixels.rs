@@ -3,16 +3,12 @@
 //! Nothing is interpolated there, so rows come from a table over the sine of the elevation, which saves every second arc
 //! tangent of [`Projector::project`].
 
-use super::project::LANES;
+use super::lanes::LANES;
 use super::projector::{Kind, Projector};
 use super::rings::Rings;
 use super::sine_rows::{SineRows, sine_spread};
+use super::steps::{NOWHERE, STEPS, nearest_integer, steps};
 use crate::scan::{Projection, RangeImage, atan2};
-
-/// Pixels have this many steps.
-pub(super) const STEPS: i32 = 1 << STEP_BITS;
-/// Bits of a step.
-pub(super) const STEP_BITS: u32 = 6;
 
 /// Pixel coordinates (in steps of a pixel) and depths (what the image's values measure) of points.
 #[derive(Clone, Debug)]
@@ -29,9 +25,6 @@ pub(super) struct PixelProjector {
     /// Empty where the sensor is no lidar.
     pub sine_rows: SineRows,
 }
-
-/// A coordinate that is in no image (pixels).
-const NOWHERE: f32 = 60_000.0;
 
 impl PixelProjector {
     /// The projector of an image that fits together ([`RangeImage::check`]).
@@ -132,18 +125,4 @@ impl PixelProjector {
             }
         }
     }
-}
-
-/// Pixels to steps of a pixel.
-#[inline(always)]
-pub(super) fn steps(pixels: f32) -> i32 {
-    nearest_integer(pixels.clamp(-NOWHERE, NOWHERE) * STEPS as f32)
-}
-
-/// Rounds numbers up to 2^22, by the bits of a sum: `as` checks for numbers too large, which keeps it from being
-/// vectorised.
-#[inline(always)]
-pub(super) fn nearest_integer(v: f32) -> i32 {
-    const SHIFT: f32 = 12_582_912.0; // 1.5 * 2^23
-    (v + SHIFT).to_bits().wrapping_sub(SHIFT.to_bits()) as i32
 }

@@ -1,9 +1,10 @@
 //! A range image with its tables, at the pose at which it was taken: which cells beams saw beyond.
 
 use super::balls::BallWindows;
-use super::pixels::{PixelProjector, Pixels, STEP_BITS, STEPS};
-use super::project::LANES;
+use super::lanes::LANES;
+use super::pixels::{PixelProjector, Pixels};
 use super::search::{Class, Classify, Cube};
+use super::steps::{STEP_BITS, STEPS};
 use super::window_minima::{RangeTables, WindowMinima, WindowSizes};
 use crate::geom::{BLOCK_EDGE, Lattice, Pose};
 use crate::scan::RangeImage;

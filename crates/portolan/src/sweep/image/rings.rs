@@ -1,6 +1,6 @@
 //! The projection of a turning lidar.
 
-use super::project::{LANES, Lanes, Projected};
+use super::lanes::{LANES, Lanes, Projected};
 use crate::scan::{Spherical, atan2};
 use std::f64::consts::TAU;
 

@@ -1,6 +1,6 @@
 //! Rows of a lidar by the sine of the elevation.
 
-use super::pixels::{STEPS, steps};
+use super::steps::{STEPS, steps};
 
 /// Sections of the sine of the elevation.
 const SECTIONS: usize = 64;

@@ -30,6 +30,7 @@ mod layout;
 mod min_plus;
 mod outputs;
 mod pass;
+mod planes_mut;
 mod roots;
 mod search;
 mod seeds;

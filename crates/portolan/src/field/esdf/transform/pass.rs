@@ -3,6 +3,7 @@
 use super::layout::Layout;
 use super::min_plus::{Found, LANES, Row};
 use super::outputs::{Output, bricks_within};
+use super::planes_mut::PlanesMut;
 use super::search::{LineSearch, Planes};
 use super::stage::{Input, lines};
 use crate::geom::{BLOCK_EDGE, BlockKey, block_cells};
@@ -18,29 +19,6 @@ pub(super) struct Pass<'a, B, const D: usize> {
     pub(super) known: &'a [Option<Planes<'a>>],
     /// Axis of the layout of the outputs.
     pub(super) to: usize,
-}
-
-/// Where the values and features of outputs go, brick by brick; `features` is empty where none are carried.
-#[derive(Default)]
-pub(super) struct PlanesMut<'a> {
-    pub(super) values: &'a mut [f32],
-    pub(super) features: &'a mut [u32],
-}
-
-impl<'a> PlanesMut<'a> {
-    /// The planes of the first `cells`, and the rest.
-    fn split(self, cells: usize) -> (Self, Self) {
-        let (values, values_behind) = self.values.split_at_mut(cells);
-        let (features, features_behind) = self.features.split_at_mut(cells.min(self.features.len()));
-        (Self { values, features }, Self { values: values_behind, features: features_behind })
-    }
-
-    /// The planes of brick `n`.
-    fn brick(&mut self, n: usize, cells: usize) -> PlanesMut<'_> {
-        let cells = n * cells..(n + 1) * cells;
-        let features = self.features.get_mut(cells.clone()).unwrap_or_default();
-        PlanesMut { features, values: &mut self.values[cells] }
-    }
 }
 
 impl<B: Sync, const D: usize> Pass<'_, B, D> {

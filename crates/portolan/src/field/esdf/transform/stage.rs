@@ -1,7 +1,7 @@
 //! The bricks between two passes.
 
 use super::outputs::{Output, bricks_within, line_order, same_line};
-use super::pass::PlanesMut;
+use super::planes_mut::PlanesMut;
 use super::search::Planes;
 use crate::geom::{BlockKey, block_cells};
 
