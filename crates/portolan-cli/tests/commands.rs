@@ -408,3 +408,32 @@ fn append_makes_the_maps_of_the_file() {
     succeed(["map", arg(&log), "--append", "--out", arg(&out)]);
     assert_eq!(files_in(&out), before);
 }
+
+/// Whatever is asked for, a map goes on in all that its file holds.
+#[test]
+fn append_keeps_maps_that_are_not_asked_for() {
+    let (folder, log) = room();
+    let all = folder.path().join("all");
+    map(&log, &all, &["--every", "2"]);
+    succeed(["map", arg(&log), "--append", "--out", arg(&all)]);
+    let maps = |folder: &std::path::Path| json(["info", arg(folder), "--json"])["maps"].clone();
+    for kind in ["grid", "tree", "tsdf", "contour"] {
+        let out = folder.path().join(kind);
+        map(&log, &out, &["--every", "2"]);
+        succeed(["map", arg(&log), "--append", "--out", arg(&out), "--maps", kind]);
+        assert_eq!(maps(&out), maps(&all), "--maps {kind}");
+    }
+}
+
+/// A box means the same cells to every map.
+#[test]
+fn maps_agree_on_what_lies_outside_of_bounds() {
+    let (folder, log) = room();
+    let counts = ["grid", "tree", "tsdf"].map(|kind| {
+        let out = folder.path().join(kind);
+        let bounds = ["--resolution", "0.1", "--bounds", "1,1,3,3", "--maps", kind];
+        json([&["map", arg(&log), "--out", arg(&out), "--json"][..], &bounds].concat())["beams"].clone()
+    });
+    assert!(counts[0]["hits_outside"].as_u64().unwrap() > 100);
+    assert!(counts.iter().all(|beams| *beams == counts[0]), "{counts:?}");
+}

@@ -23,7 +23,9 @@ use crate::arguments::ForgettingArgs;
 use crate::dimension::Dimension;
 use crate::json;
 use crate::log::RangeArgs;
-use crate::mapping::{Artifacts, Derived, FusionReport, Limits, Settings, fuse_2d, mapper_2d, store_2d};
+use crate::mapping::{
+    Artifacts, Derived, FusionReport, Limits, OccupancyKinds, Settings, fuse_2d, mapper_2d, store_2d,
+};
 use crate::output::Output;
 use crate::progress::Progress;
 use crate::saved::SavedMap;
@@ -256,12 +258,13 @@ fn fused(
 ) -> anyhow::Result<(SavedMap, FusionReport)> {
     let limits = Limits { memory: usize::MAX, log: "the Apartment", map: "" };
     let mut file = MapFile::<2>::default();
+    let kinds = OccupancyKinds::of(settings, &file);
     let mut mapper = mapper_2d(&mut file, settings, grid, &limits)?;
     let progress = Progress::new(scans.len(), "fusing", output);
     let mut fusion = fuse_2d(&mut mapper, scans, limits.log, &mut file.poses, &progress);
-    fusion.name_occupancy(settings);
+    fusion.name_occupancy(kinds);
     file.poses = scans.iter().map(|(pose, _)| *pose).collect();
-    store_2d(mapper, settings, grid, &mut file)?;
+    store_2d(mapper, kinds, grid, &mut file)?;
     Ok((SavedMap::Two(Box::new(file)), fusion))
 }
 

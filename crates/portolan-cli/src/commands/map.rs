@@ -68,14 +68,14 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     stages.end("prepare");
 
     let progress = Progress::new(run.scans(), "fusing", args.output);
-    let fusion = run.fuse(&settings, threads, &progress);
+    let fusion = run.fuse(threads, &progress);
     drop(progress);
     stages.end("fuse");
     if let (0, (_, Some(error))) = (fusion.stats.scans, &fusion.unreadable) {
         // Not one scan could be used: the first error is of more use than an empty map.
         bail!("{error}");
     }
-    let (mut file, extent) = run.finish(&settings)?;
+    let (mut file, extent) = run.finish()?;
     stages.end("store");
     let mut bytes = file.bytes();
     describe(&mut file, &settings, &log, &fusion.stats);

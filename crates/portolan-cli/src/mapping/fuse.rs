@@ -12,7 +12,7 @@ use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
 use portolan_io::IoError;
 use portolan_io::scan_log::ScanLog;
 
-use super::{MapKind, Settings};
+use super::OccupancyKinds;
 use crate::progress::Progress;
 
 /// Frames that are read ahead.
@@ -62,12 +62,12 @@ impl FusionReport {
     }
 
     /// Grid and tree of a 2-D run are made of one map: both have had its observations.
-    pub(crate) fn name_occupancy(&mut self, settings: &Settings) {
+    pub(crate) fn name_occupancy(&mut self, kinds: OccupancyKinds) {
         let Some(&cells) = self.observations.get("grid") else { return };
-        if settings.wants(MapKind::Tree) {
+        if kinds.tree {
             self.observations.insert("tree", cells);
         }
-        if !settings.wants(MapKind::Grid) {
+        if !kinds.grid {
             self.observations.remove("grid");
             let seconds = self.seconds.remove("grid");
             self.seconds.extend(seconds.map(|seconds| ("tree", seconds)));

@@ -34,6 +34,7 @@ pub(crate) enum Run<'a> {
         log: String,
         scans: Vec<(Pose<2>, Scan<2>)>,
         grid: Grid<2>,
+        kinds: OccupancyKinds,
         mapper: Box<Mapper<2>>,
         file: Box<MapFile<2>>,
     },
@@ -75,8 +76,9 @@ impl<'a> Run<'a> {
             })
             .map_err(|error| with_outlier(error, &scans))?;
         let mut file = before.unwrap_or_default();
+        let kinds = OccupancyKinds::of(settings, &file);
         let mapper = Box::new(mapper_2d(&mut file, settings, &grid, limits)?);
-        Ok(Self::Two { log: limits.log.to_owned(), scans, grid, mapper, file })
+        Ok(Self::Two { log: limits.log.to_owned(), scans, grid, kinds, mapper, file })
     }
 
     /// Maps in bricks, which grow with what is seen: frames are read while they are fused.
@@ -103,11 +105,11 @@ impl<'a> Run<'a> {
     }
 
     /// Fuses all scans, in order.
-    pub(crate) fn fuse(&mut self, settings: &Settings, threads: usize, progress: &Progress) -> FusionReport {
+    pub(crate) fn fuse(&mut self, threads: usize, progress: &Progress) -> FusionReport {
         match self {
-            Self::Two { log, scans, mapper, file, .. } => {
+            Self::Two { log, scans, kinds, mapper, file, .. } => {
                 let mut report = fuse_2d(mapper, scans, log, &mut file.poses, progress);
-                report.name_occupancy(settings);
+                report.name_occupancy(*kinds);
                 report
             }
             Self::Three { frames, mapper, file } => {
@@ -120,10 +122,10 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// Where 2-D maps do not fit the grid that they were made for.
-    pub(crate) fn finish(self, settings: &Settings) -> anyhow::Result<(SavedMap, Extent)> {
+    pub(crate) fn finish(self) -> anyhow::Result<(SavedMap, Extent)> {
         match self {
-            Self::Two { grid, mapper, mut file, .. } => {
-                store_2d(*mapper, settings, &grid, &mut file)?;
+            Self::Two { grid, kinds, mapper, mut file, .. } => {
+                store_2d(*mapper, kinds, &grid, &mut file)?;
                 Ok((SavedMap::Two(file), Extent::Two(grid)))
             }
             Self::Three { mapper, mut file, .. } => {
@@ -131,6 +133,23 @@ impl<'a> Run<'a> {
                 let extent = Extent::of_bricks(&file);
                 Ok((SavedMap::Three(file), extent))
             }
+        }
+    }
+}
+
+/// What the occupancy of a 2-D run becomes in the file: what is asked for, and what the file held before.
+#[derive(Clone, Copy)]
+pub(crate) struct OccupancyKinds {
+    pub(super) grid: bool,
+    pub(super) tree: bool,
+}
+
+impl OccupancyKinds {
+    /// Before maps are taken out of the file.
+    pub(crate) fn of(settings: &Settings, file: &MapFile<2>) -> Self {
+        Self {
+            grid: settings.wants(MapKind::Grid) || file.grid.is_some(),
+            tree: settings.wants(MapKind::Tree) || file.tree.is_some(),
         }
     }
 }
@@ -153,7 +172,10 @@ pub(crate) fn mapper_2d(
     grid: &Grid<2>,
     limits: &Limits,
 ) -> anyhow::Result<Mapper<2>> {
-    let how = recipe::mapper_settings(settings, Some(grid.lattice.origin), Some(grid.aabb()), limits.memory);
+    // A box that ends at a face of cells touches the next ones, too.
+    let mut bounds = grid.aabb();
+    bounds.max = bounds.max.map(|v| v - 1e-6 * grid.lattice.resolution);
+    let how = recipe::mapper_settings(settings, Some(grid.lattice.origin), Some(bounds), limits.memory);
     let held = [
         (MapKind::Grid, file.grid.is_some()),
         (MapKind::Tree, file.tree.is_some()),
@@ -189,7 +211,7 @@ pub(crate) fn mapper_2d(
 /// Puts the maps into a file, as arrays over the grid and as a tree over it.
 pub(crate) fn store_2d(
     mapper: Mapper<2>,
-    settings: &Settings,
+    kinds: OccupancyKinds,
     grid: &Grid<2>,
     file: &mut MapFile<2>,
 ) -> anyhow::Result<()> {
@@ -198,11 +220,11 @@ pub(crate) fn store_2d(
     if let Some(map) = occupancy {
         let model = *map.model();
         let store = map.into_store();
-        if settings.wants(MapKind::Tree) {
+        if kinds.tree {
             let tree = Tree::covering(grid).and_then(|tree| tree.with_bricks(&store)).ok_or_else(lost)?;
             file.tree = Some(OccupancyTree::from_store(tree, model)?);
         }
-        if settings.wants(MapKind::Grid) {
+        if kinds.grid {
             let dense = Dense::of_bricks(&store, *grid).ok_or_else(lost)?;
             file.grid = Some(OccupancyGrid::from_store(dense, model)?);
         }

@@ -32,7 +32,7 @@ pub(crate) use extent::{brick_extent, check_memory, grid_over, seen, with_outlie
 pub(crate) use files::{dense_esdf, polylines, write_contour, write_mesh};
 pub(crate) use fuse::{FusionReport, fuse_2d};
 pub(crate) use map_server::cells_for_map_server;
-pub(crate) use mapper::{Limits, Run, mapper_2d, store_2d};
+pub(crate) use mapper::{Limits, OccupancyKinds, Run, mapper_2d, store_2d};
 pub(crate) use memory::available_memory;
 pub(crate) use recipe::{esdf_settings, mesh_settings};
 pub(crate) use settings::Settings;
