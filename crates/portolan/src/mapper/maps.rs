@@ -6,6 +6,7 @@ use crate::geom::{Lattice, Pose};
 use crate::map::{MapError, Occupancy, ScanKind, Tsdf};
 use crate::parallel;
 use crate::scan::ScanStats;
+use crate::store::Store;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// An occupancy map and signed distances of the same scans, and what is derived from them.
@@ -79,7 +80,8 @@ impl<const D: usize> Mapper<D> {
         Self { settings, maps: Maps::default(), stats: ScanStats::default(), derived: Derived::default() }
     }
 
-    /// A mapper that goes on with these maps, which keep their lattices and filters; missing ones are not made.
+    /// A mapper that goes on with these maps; missing ones are not made. The maps keep their lattices and filters: resolution,
+    /// truncation, weights and clamp of the signed distances are theirs, whatever `settings` say.
     ///
     /// # Errors
     /// Where a setting is not possible.
@@ -89,6 +91,9 @@ impl<const D: usize> Mapper<D> {
         tsdf: Option<Tsdf<D>>,
     ) -> Result<Self, MapError> {
         settings.check()?;
+        let resolution = occupancy.as_ref().map(|map| map.store().lattice().resolution);
+        let settings = MapperSettings { resolution: resolution.unwrap_or(settings.resolution), ..settings };
+        let settings = tsdf.as_ref().map_or(settings, |map| settings.with_filter(map.config()));
         let mut mapper = Self::with(settings);
         let occupancy = occupancy.map(|map| map.with_sweep(settings.occupancy_sweep()));
         let tsdf = tsdf.map(|map| {

@@ -105,6 +105,12 @@ impl<const D: usize> MapperSettings<D> {
         }
     }
 
+    /// With the filter of signed distances that are there already.
+    pub(super) fn with_filter(self, config: &TsdfConfig<D>) -> Self {
+        let TsdfConfig { resolution, truncation, w_max, carve_weight, weights, .. } = *config;
+        Self { resolution, truncation: Some(truncation), w_max, carve_weight, weights, ..self }
+    }
+
     /// How the occupancy map reads 3-D scans.
     pub fn occupancy_sweep(&self) -> OccupancySweep {
         if self.exact { OccupancySweep::Exact } else { OccupancySweep::Auto }

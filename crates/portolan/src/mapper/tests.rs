@@ -193,3 +193,31 @@ fn settings_that_are_not_possible_are_refused_before_anything_is_made() {
         assert!(matches!(refused, Err(MapError::Resolution(_))), "{resolution}: {refused:?}");
     }
 }
+
+/// Maps of other settings go on as they were made, and what is derived fits their weights.
+fn maps_keep_their_filters<const D: usize>()
+where
+    Scan<D>: ScanKind<D>,
+{
+    let weights = WeightModel::InverseSquare;
+    let made_with =
+        MapperSettings { weights, w_max: 9.0, truncation: Some(0.4), ..MapperSettings::<D>::new(0.1) };
+    let mut expected = fused(made_with);
+    let (occupancy, tsdf) = expected.clone().into_maps();
+    let mut mapper = Mapper::of_maps(MapperSettings::new(0.05), occupancy, tsdf).unwrap();
+    let (pose, scan) = scan::<D>(POSES);
+    let stats = [&mut mapper, &mut expected].map(|mapper| mapper.integrate(&pose, &scan).unwrap());
+    assert_eq!(stats[0], stats[1]);
+    let [ours, theirs] = [&mapper, &expected].map(|mapper| mapper.tsdf().unwrap().store());
+    assert!(
+        ours.keys() == theirs.keys() && ours.keys().iter().all(|&key| ours.brick(key) == theirs.brick(key))
+    );
+    assert_eq!(mapper.esdf_settings(), expected.esdf_settings());
+    assert_eq!(mapper.settings().resolution, 0.1);
+}
+
+#[test]
+fn maps_keep_their_filters_2d_and_3d() {
+    maps_keep_their_filters::<2>();
+    maps_keep_their_filters::<3>();
+}
