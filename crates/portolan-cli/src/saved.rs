@@ -19,13 +19,24 @@ impl SavedMap {
     /// Reads a map that may take `memory` bytes.
     ///
     /// # Errors
-    /// A file that is not a map, or needs more.
-    pub(crate) fn read(path: &Path, memory: u64) -> Result<Self, IoError> {
+    /// A file that is not a map, or needs more, or holds maps that no command would look at.
+    pub(crate) fn read(path: &Path, memory: u64) -> anyhow::Result<Self> {
         let container = Container::read(path)?;
-        Ok(match map_dimension(&container)? {
+        let map = match map_dimension(&container)? {
             3 => Self::Three(Box::new(MapFile::from_container(&container, memory)?)),
             _ => Self::Two(Box::new(MapFile::from_container(&container, memory)?)),
-        })
+        };
+        let (held, has, wanted) = match &map {
+            Self::Two(file) => ("2-D", file.has_bricks(), "an array (Dense::of_bricks)"),
+            Self::Three(file) => ("3-D", file.has_arrays(), "bricks (Bricks::of_dense)"),
+        };
+        if has {
+            bail!(
+                "{}: a {held} map of a kind that only the library works with; save its cells in {wanted}",
+                path.display()
+            );
+        }
+        Ok(map)
     }
 
     /// Reads a map to go on with.

@@ -437,3 +437,39 @@ fn maps_agree_on_what_lies_outside_of_bounds() {
     assert!(counts[0]["hits_outside"].as_u64().unwrap() > 100);
     assert!(counts.iter().all(|beams| *beams == counts[0]), "{counts:?}");
 }
+
+/// Maps that the library alone works with are refused, not passed over: all answers would be "outside".
+#[test]
+fn maps_of_a_kind_that_no_command_reads_are_refused() {
+    use portolan::geom::Lattice;
+    use portolan::map::{OccupancyGrid, Tsdf, TsdfConfig};
+    use portolan_io::{MapFile, TsdfBricks};
+    let folder = tempfile::tempdir().unwrap();
+    let (in_2d, in_3d) = (folder.path().join("2d.portolan"), folder.path().join("3d.portolan"));
+    let map = Tsdf::<2>::new(TsdfConfig::default()).unwrap();
+    let config = *map.config();
+    let bricks = TsdfBricks {
+        store: map.into_stores().0,
+        truncation: config.truncation,
+        w_max: config.w_max,
+        carve_weight: config.carve_weight,
+        weights: config.weights,
+        more: Default::default(),
+    };
+    let mut file = MapFile::<2>::default();
+    file.tsdf_bricks = Some(bricks);
+    file.write(&in_2d).unwrap();
+    let grid = portolan::geom::Grid { lattice: Lattice::new([0.0; 3], 0.1), shape: [8; 3] };
+    let grid = OccupancyGrid::covering(&grid, Default::default()).unwrap();
+    let mut file = MapFile::<3>::default();
+    file.grid = Some(grid);
+    file.write(&in_3d).unwrap();
+    let points = folder.path().join("p.csv");
+    std::fs::write(&points, "0,0\n").unwrap();
+    for file in [&in_2d, &in_3d] {
+        for call in [&["info", arg(file)][..], &["query", arg(file), "--points", arg(&points)]] {
+            let error = support::fail(1, call.to_vec());
+            assert!(error.contains(arg(file)) && error.contains("only the library works with"), "{error}");
+        }
+    }
+}

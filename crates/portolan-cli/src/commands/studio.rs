@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use portolan::map::{Tsdf3, TsdfConfig};
-use portolan_io::{Container, FileKind, MapFile, detect, map_dimension};
+use portolan_io::{FileKind, detect};
 use portolan_studio::engine::{Limits, Logs, Source2d, Source3d, check};
 use portolan_studio::server::{Server, Settings};
 use serde_json::json;
@@ -18,6 +18,7 @@ use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
 use crate::mapping::with_outlier;
 use crate::output::Output;
+use crate::saved::SavedMap;
 
 #[derive(clap::Args)]
 #[command(
@@ -103,11 +104,9 @@ impl Args {
         }
         let shown = path.display();
         let file = if path.is_dir() { path.join("map.portolan") } else { path.into() };
-        let container = Container::read(file)?;
-        if map_dimension(&container)? != 3 {
+        let Some(file) = SavedMap::read(&file, self.memory)?.in_3d() else {
             bail!("{shown}: a 2-D map; give the log that it was made of, and the studio makes the map again");
-        }
-        let file = MapFile::<3>::from_container(&container, self.memory)?;
+        };
         let Some(held) = file.tsdf_bricks else {
             bail!("{shown}: the map has no tsdf, and so no surface; make it with --maps tsdf");
         };

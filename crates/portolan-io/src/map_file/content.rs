@@ -32,6 +32,18 @@ pub struct MapFile<const D: usize> {
     pub(super) unknown_chunks: Vec<UnknownChunk>,
 }
 
+impl<const D: usize> MapFile<D> {
+    /// Whether a map of it is an array or a tree over a box.
+    pub fn has_arrays(&self) -> bool {
+        self.grid.is_some() || self.tree.is_some() || self.tsdf.is_some()
+    }
+
+    /// Whether a map of it is in bricks.
+    pub fn has_bricks(&self) -> bool {
+        self.occupancy_bricks.is_some() || self.tsdf_bricks.is_some() || self.color_bricks.is_some()
+    }
+}
+
 /// Occupancy in bricks, and how it was fused.
 #[derive(Clone, Debug)]
 pub struct OccupancyBricks<const D: usize> {
