@@ -163,8 +163,10 @@ fn is_the_nearest_crossing<const D: usize>(steps: &[Vec<Change>], settings: &Esd
                 (Answer::Known(d), Some(cell)) => {
                     assert!(d == 0.0 || (d < 0.0) == (cell.distance < 0.0));
                     // The nearest surface is no further than a crossing, and what certifies it holds.
+                    // Distances are f32: held against the bound as f32 has it.
+                    assert!(d.abs() <= ((got + 1e-5).sqrt() * R) as f32);
                     let d = f64::from(d.abs()) / R;
-                    assert!(d * d <= got + 1e-5 && d * d >= got - 0.25 * D as f64 - 1e-5 * (1.0 + got));
+                    assert!(d * d >= got - 0.25 * D as f64 - 1e-5 * (1.0 + got));
                 }
                 (Answer::Saturated(d), Some(_)) => {
                     assert!((f64::from(d.abs()) - settings.max_distance).abs() < 1e-6);
@@ -186,6 +188,14 @@ proptest! {
         is_the_nearest_crossing::<2>(&steps, &EsdfSettings { max_distance: far, ..Default::default() });
         is_the_nearest_crossing::<3>(&steps, &EsdfSettings { max_distance, ..Default::default() });
     }
+}
+
+#[test]
+fn is_the_nearest_crossing_of_two_bricks_that_meet_at_a_corner() {
+    let steps = [vec![([0, 0, 0], Seen::Plane, 3_223_972_374), ([1, 1, 0], Seen::Free, 0)]];
+    let settings = EsdfSettings { max_distance: 1.5083469574675716, ..Default::default() };
+    is_the_nearest_crossing::<2>(&steps, &settings);
+    is_the_nearest_crossing::<3>(&steps, &settings);
 }
 
 fn is_the_nearest_unknown_box<const D: usize>(steps: &[Vec<Change>], settings: &EsdfSettings) {
