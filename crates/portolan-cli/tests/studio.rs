@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use portolan_io::read_ply_mesh;
 use serde_json::{Value, json};
-use support::space_logs::{camera_log, lidar_log};
+use support::logs_3d::{camera_log, lidar_log};
 use support::{arg, fail, json as document, log_lines, map, room, succeed};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};

@@ -2,7 +2,7 @@
 #![allow(dead_code)] // every test file uses another part
 #![allow(clippy::unwrap_used)] // what cannot be set up ends the test
 
-pub(crate) mod space_logs;
+pub(crate) mod logs_3d;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -6,7 +6,7 @@ mod support;
 
 use std::path::Path;
 
-use support::space_logs::{camera_log, lidar_log};
+use support::logs_3d::{camera_log, lidar_log};
 use support::{arg, fail, json, succeed};
 
 fn map(log: &Path, out: &Path, more: &[&str]) -> String {
