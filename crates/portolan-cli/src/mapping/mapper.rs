@@ -4,6 +4,7 @@ use anyhow::{anyhow, bail};
 use portolan::Mapper;
 use portolan::geom::{Grid, Pose};
 use portolan::map::{Occupancy, OccupancyGrid, OccupancyTree, Tsdf, Tsdf2};
+use portolan::mapper::MapperMaps;
 use portolan::scan::Scan;
 use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan_io::scan_log::ScanLog;
@@ -205,7 +206,8 @@ pub(crate) fn mapper_2d(
         let store = Bricks::of_dense(map.store(), grid.lattice).ok_or_else(lost)?;
         anyhow::Ok(Tsdf::<2>::from_stores(store, None, *map.config())?)
     });
-    Ok(Mapper::of_maps(how, occupancy, tsdf.transpose()?)?)
+    let attenuation = None;
+    Ok(Mapper::of_maps(how, MapperMaps { occupancy, tsdf: tsdf.transpose()?, attenuation })?)
 }
 
 /// Puts the maps into a file, as arrays over the grid and as a tree over it.
@@ -216,7 +218,7 @@ pub(crate) fn store_2d(
     file: &mut MapFile<2>,
 ) -> anyhow::Result<()> {
     let lost = || anyhow!("the maps do not fit their grid");
-    let (occupancy, tsdf) = mapper.into_maps();
+    let MapperMaps { occupancy, tsdf, .. } = mapper.into_maps();
     if let Some(map) = occupancy {
         let model = *map.model();
         let store = map.into_store();
@@ -260,12 +262,16 @@ fn mapper_3d(
         let config = how.tsdf(t.store.lattice().origin);
         Tsdf::<3>::from_stores(t.store, file.color_bricks.take().map(|c| c.store), config)
     });
-    Ok(Mapper::of_maps(how, occupancy.transpose()?, tsdf.transpose()?)?)
+    let attenuation = None;
+    Ok(Mapper::of_maps(
+        how,
+        MapperMaps { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()?, attenuation },
+    )?)
 }
 
 /// Puts the maps into a file.
 fn store_3d(mapper: Mapper<3>, file: &mut MapFile<3>) {
-    let (occupancy, tsdf) = mapper.into_maps();
+    let MapperMaps { occupancy, tsdf, .. } = mapper.into_maps();
     file.occupancy_bricks = occupancy.map(|map| {
         let model = *map.model();
         OccupancyBricks { store: map.into_store(), model, more: Map::new() }

@@ -32,6 +32,7 @@ pub(super) fn mapper_settings<const D: usize>(
         beams: settings.sweep().beams(),
         exact: settings.sweep() == SweepArg::Exact,
         occupancy: occupancy.then(OccupancyModel::default),
+        attenuation: None,
         distances: settings.wants(MapKind::Tsdf),
         color: settings.shape.color,
         bounds,

@@ -1,5 +1,6 @@
 //! The maps: named combinations of sweep, cell and store, and the thin view that compares them.
 
+mod attenuation;
 mod cloud;
 mod error;
 mod integrate;
@@ -20,6 +21,7 @@ mod tsdf_config;
 mod tsdf_tests;
 mod watch;
 
+pub use attenuation::Attenuation;
 pub use cloud::Cloud;
 pub use error::MapError;
 pub use integrate::integrate;

@@ -9,5 +9,5 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use maps::{Fused, Mapper};
+pub use maps::{Fused, Mapper, MapperMaps};
 pub use settings::{CARVE_WEIGHT, MapperSettings};

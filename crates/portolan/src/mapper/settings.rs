@@ -1,6 +1,6 @@
 //! What maps a mapper makes, and how.
 
-use crate::cell::OccupancyModel;
+use crate::cell::{AttenuationRule, OccupancyModel};
 use crate::geom::Aabb;
 use crate::map::{BeamSweep, MapError, PointSweep, TsdfConfig};
 use crate::sweep::{LONGEST_RAY_CELLS, OccupancySweep, WeightModel};
@@ -34,6 +34,8 @@ pub struct MapperSettings<const D: usize> {
     pub exact: bool,
     /// The occupancy map to make; `None`: no such map.
     pub occupancy: Option<OccupancyModel>,
+    /// The map of hits per meter to make, and how it forgets; `None`: no such map.
+    pub attenuation: Option<AttenuationRule>,
     /// Whether signed distances are made: surface and Euclidean distances are derived from them.
     pub distances: bool,
     /// Whether colors are fused beside distances, where scans have them.
@@ -47,7 +49,7 @@ pub struct MapperSettings<const D: usize> {
 }
 
 impl<const D: usize> MapperSettings<D> {
-    /// Both maps with cells of this edge (meters): truncation three cells, free space at [`CARVE_WEIGHT`], clamp 64,
+    /// All maps with cells of this edge (meters): truncation three cells, free space at [`CARVE_WEIGHT`], clamp 64,
     /// Euclidean distances up to a meter, no limit of memory.
     pub fn new(resolution: f64) -> Self {
         Self {
@@ -61,6 +63,7 @@ impl<const D: usize> MapperSettings<D> {
             beams: BeamSweep::default(),
             exact: false,
             occupancy: Some(OccupancyModel::default()),
+            attenuation: Some(AttenuationRule::default()),
             distances: true,
             color: false,
             bounds: None,
@@ -111,7 +114,7 @@ impl<const D: usize> MapperSettings<D> {
         Self { resolution, truncation: Some(truncation), w_max, carve_weight, weights, ..self }
     }
 
-    /// How the occupancy map reads 3-D scans.
+    /// How the maps of occupancy and of hits per meter read 3-D scans.
     pub fn occupancy_sweep(&self) -> OccupancySweep {
         if self.exact { OccupancySweep::Exact } else { OccupancySweep::Auto }
     }

@@ -7,6 +7,7 @@ use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::vector::sub;
 use portolan::geom::{BlockKey, Pose};
 use portolan::map::{MapError, Occupancy, Tsdf3};
+use portolan::mapper::MapperMaps;
 use portolan::scan::{Frame, ScanStats};
 use portolan::surface::{IncrementalMesh, Mesh, MeshSettings};
 
@@ -64,7 +65,8 @@ impl Maps {
         let start = source.pose(0).map_or([0.0; 3], |pose| pose.translation);
         let mut mapper = Mapper::with(settings.mapper(source.has_color())?);
         if let Some(map) = source.map() {
-            mapper = Mapper::of_maps(*mapper.settings(), None, Some(map.clone())).map_err(Refusal::new)?;
+            let maps = MapperMaps { tsdf: Some(map.clone()), ..Default::default() };
+            mapper = Mapper::of_maps(*mapper.settings(), maps).map_err(Refusal::new)?;
         }
         mapper.prepare(start).map_err(Refusal::new)?;
         let Some(tsdf) = mapper.tsdf() else { return Err(Refusal::new("there are no distances")) };

@@ -65,6 +65,7 @@ impl Settings {
             w_max: w_max as f32,
             carve: self.carve,
             occupancy: self.occupancy.then(OccupancyModel::default),
+            attenuation: None,
             color,
             ..MapperSettings::new(resolution)
         })

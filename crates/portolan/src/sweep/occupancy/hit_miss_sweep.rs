@@ -278,7 +278,8 @@ fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Optio
     Some(Ray { origin: o.map(|v| v - r), end: o.map(|v| v + r), hit: false, passes: false })
 }
 
-fn stats(hits: usize, count: usize, tally: Tally) -> ScanStats {
+/// What became of `count` rays, of which the first so many were to hit.
+pub(in crate::sweep) fn stats(hits: usize, count: usize, tally: Tally) -> ScanStats {
     let dropped = tally.refused.total();
     let hit = (hits as u64).saturating_sub(tally.refused_hits);
     let max_range = (count as u64).saturating_sub(hit + dropped);
