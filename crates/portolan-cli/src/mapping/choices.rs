@@ -18,6 +18,8 @@ pub(crate) enum MapKind {
     Tree,
     /// Truncated signed distance field
     Tsdf,
+    /// Hits per meter: how many beams end in each cell, over the length of all
+    Attenuation,
     /// Euclidean signed distance field, derived from the tsdf
     Esdf,
     /// Contour, derived from the tsdf (2-D)
@@ -37,7 +39,7 @@ impl MapKind {
         match self {
             Self::Grid | Self::Contour => Some(Dimension::Two),
             Self::Mesh => Some(Dimension::Three),
-            Self::Tree | Self::Tsdf | Self::Esdf => None,
+            Self::Tree | Self::Tsdf | Self::Attenuation | Self::Esdf => None,
         }
     }
 }

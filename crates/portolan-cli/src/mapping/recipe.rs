@@ -1,6 +1,6 @@
 //! The settings of `map` as the library's recipe, and what a recipe alone does not say.
 
-use portolan::cell::OccupancyModel;
+use portolan::cell::{AttenuationRule, OccupancyModel, TsdfRule};
 use portolan::field::EsdfSettings;
 use portolan::geom::Aabb;
 use portolan::map::Thresholds;
@@ -32,7 +32,7 @@ pub(super) fn mapper_settings<const D: usize>(
         beams: settings.sweep().beams(),
         exact: settings.sweep() == SweepArg::Exact,
         occupancy: occupancy.then(OccupancyModel::default),
-        attenuation: None,
+        attenuation: settings.wants(MapKind::Attenuation).then(|| attenuation_rule(settings)),
         distances: settings.wants(MapKind::Tsdf),
         color: settings.shape.color,
         bounds,
@@ -40,6 +40,12 @@ pub(super) fn mapper_settings<const D: usize>(
         max_distance: settings.max_distance,
         ..MapperSettings::new(settings.resolution())
     }
+}
+
+/// Counts forget as the filter of distances does: the same half-life, for beams of weight 1.
+pub(super) fn attenuation_rule(settings: &Settings) -> AttenuationRule {
+    let filter = TsdfRule { truncation: settings.truncation() as f32, w_max: settings.w_max() };
+    AttenuationRule::of_half_life(filter.half_life(1.0))
 }
 
 /// A mesh of signed distances with these weights.

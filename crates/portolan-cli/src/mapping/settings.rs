@@ -84,7 +84,7 @@ pub(crate) struct Settings {
     #[serde(skip_deserializing)]
     pub(crate) bounds: Option<Bounds>,
     /// Maps to make, separated by commas; esdf, contour and mesh are derived from the tsdf, which is then made too
-    /// [default: grid,tree,tsdf,esdf,contour in 2-D; tree,tsdf,esdf,mesh in 3-D]
+    /// [default: all: grid,tree,tsdf,attenuation,esdf,contour in 2-D; tree,tsdf,attenuation,esdf,mesh in 3-D]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub(crate) maps: Vec<MapKind>,
     /// Method of the esdf [default: accurate]

@@ -66,6 +66,26 @@ impl AttenuationRule {
     /// The longest half-life (scans).
     pub const LONGEST: u16 = u16::MAX / 2;
 
+    /// A half-life of so many scans, to the nearest that is possible: at least 1, at most [`AttenuationRule::LONGEST`]; without
+    /// end where it is infinite or not a number.
+    pub fn of_half_life(scans: f64) -> Self {
+        let possible = scans.clamp(1.0, f64::from(Self::LONGEST)).round() as u16;
+        Self { half_life: scans.is_finite().then_some(possible) }
+    }
+
+    /// Refuses half-lives that are not possible.
+    ///
+    /// # Errors
+    /// In words.
+    pub fn validate(&self) -> Result<(), String> {
+        match self.half_life {
+            Some(h) if !(1..=Self::LONGEST).contains(&h) => {
+                Err(format!("half_life must be between 1 and {} scans, got {h}", Self::LONGEST))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Looks at which a cell is halved.
     #[inline(always)]
     fn due(self) -> Option<u16> {

@@ -18,9 +18,10 @@ const PRIOR_LENGTH: f64 = 1.0;
 /// How many beams ended in each cell, over the length of all beams inside of it: hits per meter
 /// *(Schaefer, Luft, Burgard 2017, "decay rates")*.
 ///
-/// It is the density that a volume renderer descends to, in closed form, and a model of beams. Those that pass do not wipe
-/// out those that end, they are counted beside them; so thin things stay, as the share that they stop. Every beam counts,
-/// however many pass a cell in one scan: lengths are what was observed, once a beam.
+/// It is the density that a volume renderer descends to, in closed form, and a model of beams: what a sensor would read
+/// along a ray is a [`RangeDistribution`](crate::beam_model::RangeDistribution). Beams that pass do not wipe out those that
+/// end, they are counted beside them; so thin things stay, as the share that they stop. Every beam counts, however many pass
+/// a cell in one scan: lengths are what was observed, once a beam.
 ///
 /// Cells lie in bricks, which exist only where beams were (the default), or in a dense array. A clone is a snapshot: bricks
 /// are shared until one side changes them, arrays are copied.
@@ -178,7 +179,7 @@ impl<const D: usize, S: Store<HitLength, D>> Attenuation<D, S> {
     /// (3-D). O(1).
     #[inline]
     pub fn hit_probability(&self, cell: [i32; D]) -> f64 {
-        -(-expected_per_cell(self.store.cell(cell)) * mean_chord::<D>()).exp_m1()
+        -(-hits_per_cell(self.store.cell(cell)) * mean_chord::<D>()).exp_m1()
     }
 
     /// Whether a cell had at least `least_hits` hits and stops more than `share` of the beams through it
@@ -211,7 +212,7 @@ impl<const D: usize, S: Store<HitLength, D>> Attenuation<D, S> {
 
 /// Hits per cell's length with what is believed beforehand; also of a cell that was never observed.
 #[inline(always)]
-pub(crate) fn expected_per_cell(cell: Option<HitLength>) -> f64 {
+pub(crate) fn hits_per_cell(cell: Option<HitLength>) -> f64 {
     let HitLength { hits, length, .. } = cell.unwrap_or_default();
     (f64::from(hits) + PRIOR_HITS) / (f64::from(length) / f64::from(LENGTH_UNITS) + PRIOR_LENGTH)
 }

@@ -22,6 +22,7 @@ mod tsdf_tests;
 mod watch;
 
 pub use attenuation::Attenuation;
+pub(crate) use attenuation::hits_per_cell;
 pub use cloud::Cloud;
 pub use error::MapError;
 pub use integrate::integrate;

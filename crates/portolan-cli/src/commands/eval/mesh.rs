@@ -25,7 +25,7 @@ pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Par
         text: format!("surface: {area:.1} square meters in {triangles} triangles\n"),
     }];
     if let Some(path) = &args.scans {
-        parts.push(predict::in_3d(args, path, &file.header, tsdf)?);
+        parts.push(predict::in_3d(args, path, file, tsdf)?);
     }
     if let Some(path) = &args.reference {
         parts.push(compare(args, &mesh, tsdf, settings.min_weight, path)?);

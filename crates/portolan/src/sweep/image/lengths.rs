@@ -234,7 +234,7 @@ fn octant_lengths(
         // Rounded up or down by chance, so that thin beams are not lost; the low bits are chance enough, and the same ones
         // every time.
         let chance = (length.to_bits().wrapping_mul(0x9e37_79b9) >> 9) as f32 * (1.0 / (1u32 << 23) as f32);
-        let sane = length.min(16_000_000.0).max(0.0);
+        let sane = length.clamp(0.0, 16_000_000.0);
         units[l] = (sane + chance) as u32;
     }
     units
@@ -288,7 +288,7 @@ fn shares(
                 & (seen.v[l] >= 0.5)
                 & (seen.v[l] < rows + 0.5);
             let ahead = (reading > 0.0) & inside & (seen.length[l] >= 0.0) & (seen.scale[l] > 0.0);
-            share[l] += if ahead { past.max(0.0).min(1.0) } else { 0.0 };
+            share[l] += if ahead { past.clamp(0.0, 1.0) } else { 0.0 };
         }
     }
     share.map(|s| 0.25 * s)
