@@ -55,7 +55,19 @@ fn stores_and_orders_agree<const D: usize>() {
         backwards.integrate(pose, scan).unwrap();
     });
     let known = cells(bricks.store());
-    assert!(known.len() > 300 && known == cells(backwards.store()));
+    assert!(known.len() > 300);
+    let other = cells(backwards.store());
+    if D == 2 {
+        assert!(known == other);
+    } else {
+        // What was spread over a block before it was hit depends on the order, no hit and no length does.
+        let hits = |all: &HashMap<[i32; D], HitLength>| -> HashMap<[i32; D], u32> {
+            all.iter().filter(|c| c.1.hits > 0).map(|(k, c)| (*k, c.hits)).collect()
+        };
+        assert!(hits(&known) == hits(&other));
+        let total = |all: &HashMap<[i32; D], HitLength>| all.values().map(|c| c.cells()).sum::<f64>();
+        assert!((total(&known) / total(&other) - 1.0).abs() < 0.05);
+    }
     assert_eq!(dense.observed_cells(), known.len());
     assert_eq!(bricks.observed_cells(), known.len());
     assert!((0..grid.len()).all(|i| dense.store().at(i) == known.get(&grid.cell(i)).copied()));
@@ -140,7 +152,8 @@ fn closed_form_agrees(image: &RangeImage, resolution: f64, bound: f64) {
     let total: f64 = a.iter().sum();
     let sum: f64 = b.iter().sum();
     println!("total {total:.0} cells, closed form {:+.2} %", 100.0 * (sum / total - 1.0));
-    for (k, (a, b)) in a.iter().zip(&b).enumerate().skip(1) {
+    // Blocks about the sensor are spread over themselves, so that its own cell shows in the first two.
+    for (k, (a, b)) in a.iter().zip(&b).enumerate().skip(2) {
         if *a > 0.0 {
             println!("shell {k}: {:+.2} % of {:.3}", 100.0 * (b / a - 1.0), a / total);
         }
@@ -194,7 +207,7 @@ fn points_without_rows_are_exact_rays() {
     let length: f64 = all.values().map(|c| c.cells()).sum();
     let sent: f64 =
         scan.points.iter().map(|p| f64::from(p[0].hypot(p[1]).hypot(p[2]))).sum::<f64>() / 0.1 + 10.0;
-    assert!((length - sent).abs() < 1.0, "{length} {sent}");
+    assert!((length / sent - 1.0).abs() < 0.02, "{length} {sent}");
 }
 
 #[test]
@@ -209,13 +222,15 @@ fn only_cells_within_the_bounds_change() {
     whole.integrate(&Pose::IDENTITY, &image).unwrap();
     let stats = part.integrate(&Pose::IDENTITY, &image).unwrap();
     assert_eq!(stats.hits_outside, image.hits() as u64);
-    let mut expected = cells(whole.store());
-    expected.retain(|c, _| bounds.grown(0.05).contains(lattice.center(*c)));
-    let held = cells(part.store());
-    assert!(held.len() > 300);
-    for (cell, c) in &held {
-        assert_eq!(expected.remove(cell).map(|e| e.length), Some(c.length), "{cell:?}");
-    }
-    assert!(expected.is_empty(), "{expected:?}");
+    // Blocks that reach out of the box are told apart cell by cell, by rays and in closed form alike.
+    let mut rays = Attenuation::<3>::new(lattice, NEVER).unwrap().with_sweep(OccupancySweep::Exact);
+    rays.set_bounds(Some(bounds));
+    rays.integrate(&Pose::IDENTITY, &image).unwrap();
+    let (held, exact) = (cells(part.store()), cells(rays.store()));
+    let inside = |c: &[i32; 3]| bounds.grown(0.05).contains(lattice.center(*c));
+    assert!(held.len() > 300 && held.keys().chain(exact.keys()).all(inside));
+    let sum = |all: &HashMap<[i32; 3], HitLength>| all.values().map(|c| c.cells()).sum::<f64>();
+    assert!((sum(&held) / sum(&exact) - 1.0).abs() < 0.03, "{} {}", sum(&held), sum(&exact));
+    assert!(held.len() < cells(whole.store()).len() / 2);
     assert!(part.store().cell([0, 0, 3]).is_none());
 }

@@ -3,6 +3,7 @@
 use super::hit_length::Run;
 use super::packed::ARC_HEADER;
 use super::{HitLength, Planes};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Hits, lengths and looks as three arrays.
@@ -20,6 +21,10 @@ impl HitLengthPlanes {
         let n = looks.len();
         let sane = |i: usize| looks[i] > 0 || hits[i] | length[i] == 0;
         (hits.len() == n && length.len() == n && (0..n).all(sane)).then_some(Self { hits, length, looks })
+    }
+
+    fn alike(cell: HitLength, n: usize) -> Self {
+        Self { hits: vec![cell.hits; n], length: vec![cell.length; n], looks: vec![cell.looks; n] }
     }
 
     /// Beams that ended in each cell.
@@ -75,41 +80,99 @@ impl Planes<HitLength> for HitLengthPlanes {
     }
 }
 
-/// Hits, lengths and looks of a brick's cells, x fastest, shared between snapshots until one of them changes it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HitLengthBrick(Arc<HitLengthPlanes>);
+/// Hits, lengths and looks of a brick's cells, x fastest, shared between snapshots until one of them changes it. A brick in
+/// which all cells are alike, as in free space, is one cell.
+#[derive(Clone, Debug)]
+pub struct HitLengthBrick(Form);
+
+#[derive(Clone, Debug)]
+enum Form {
+    Even { cell: HitLength, len: usize },
+    Cells(Arc<HitLengthPlanes>),
+}
 
 impl HitLengthBrick {
-    /// A brick of these planes.
+    /// A brick of these planes; one cell where all are alike and none was hit.
     pub fn of(planes: HitLengthPlanes) -> Self {
-        Self(Arc::new(planes))
+        let cell = |i| planes.get(i).unwrap_or_default();
+        let first = if planes.is_empty() { HitLength::default() } else { cell(0) };
+        let alike = first.hits == 0 && (0..planes.len()).all(|i| cell(i) == first);
+        Self(if alike {
+            Form::Even { cell: first, len: planes.len() }
+        } else {
+            Form::Cells(Arc::new(planes))
+        })
     }
 
-    /// Its planes.
-    #[inline(always)]
-    pub fn planes(&self) -> &HitLengthPlanes {
-        &self.0
+    /// Its planes; made where all cells are alike.
+    pub fn planes(&self) -> Cow<'_, HitLengthPlanes> {
+        match &self.0 {
+            Form::Even { cell, len } => Cow::Owned(HitLengthPlanes::alike(*cell, *len)),
+            Form::Cells(planes) => Cow::Borrowed(planes),
+        }
     }
 
-    /// Its planes for writing; copied first where a snapshot shares them.
-    #[inline(always)]
+    /// Its planes for writing; made where all cells are alike, copied first where a snapshot shares them.
     pub fn planes_mut(&mut self) -> &mut HitLengthPlanes {
-        Arc::make_mut(&mut self.0)
+        if let Form::Even { cell, len } = self.0 {
+            self.0 = Form::Cells(Arc::new(HitLengthPlanes::alike(cell, len)));
+        }
+        match &mut self.0 {
+            Form::Cells(planes) => Arc::make_mut(planes),
+            Form::Even { .. } => unreachable!("its planes were made just now"),
+        }
+    }
+
+    /// The cell that all are like, if they are known to be.
+    pub(super) fn even_mut(&mut self) -> Option<&mut HitLength> {
+        match &mut self.0 {
+            Form::Even { cell, .. } => Some(cell),
+            Form::Cells(_) => None,
+        }
+    }
+
+    /// Whether any cell was hit.
+    pub fn has_hits(&self) -> bool {
+        match &self.0 {
+            Form::Even { cell, .. } => cell.hits > 0,
+            Form::Cells(planes) => planes.hits().iter().any(|h| *h > 0),
+        }
+    }
+
+    /// Number of cells that were observed.
+    pub fn observed(&self) -> usize {
+        match &self.0 {
+            Form::Even { cell, len } => len * usize::from(cell.looks > 0),
+            Form::Cells(planes) => planes.looks().iter().filter(|l| **l > 0).count(),
+        }
+    }
+}
+
+/// Equal cells, in either form.
+impl PartialEq for HitLengthBrick {
+    fn eq(&self, other: &Self) -> bool {
+        self.len() == other.len() && (0..self.len()).all(|i| self.get(i) == other.get(i))
     }
 }
 
 impl Planes<HitLength> for HitLengthBrick {
     fn unobserved(n: usize) -> Self {
-        Self::of(HitLengthPlanes::unobserved(n))
+        Self(Form::Even { cell: HitLength::default(), len: n })
     }
 
     fn len(&self) -> usize {
-        self.0.len()
+        match &self.0 {
+            Form::Even { len, .. } => *len,
+            Form::Cells(planes) => planes.len(),
+        }
     }
 
     #[inline(always)]
     fn get(&self, i: usize) -> Option<HitLength> {
-        self.0.get(i)
+        match &self.0 {
+            Form::Even { cell, .. } => (cell.looks > 0).then_some(*cell),
+            Form::Cells(planes) => planes.get(i),
+        }
     }
 
     fn set(&mut self, i: usize, cell: Option<HitLength>) {
@@ -117,6 +180,9 @@ impl Planes<HitLength> for HitLengthBrick {
     }
 
     fn bytes(&self) -> usize {
-        self.0.bytes() + size_of::<HitLengthPlanes>() + ARC_HEADER
+        match &self.0 {
+            Form::Even { .. } => 0,
+            Form::Cells(planes) => planes.bytes() + size_of::<HitLengthPlanes>() + ARC_HEADER,
+        }
     }
 }

@@ -8,7 +8,7 @@ use crate::cell::{AttenuationRule, HitLength, HitLengths, LENGTH_UNITS, StopRule
 use crate::geom::{Aabb, CellBox, Grid, Lattice, Pose, block_cells};
 use crate::scan::{PointScan, RangeImage, ScanStats};
 use crate::store::{Bricks, Dense, Store};
-use crate::sweep::{BeamLengths, HitLengthSweep, Inside, OccupancySweep, Sweep};
+use crate::sweep::{BeamLengths, HitBlocks, HitLengthSweep, Inside, KnowsHits, OccupancySweep, Sweep};
 
 /// Hits that a cell is believed to have had before it was looked at, and in what length (cells): few enough that one beam
 /// overrules them, so that no cell is certain to let everything pass.
@@ -45,6 +45,8 @@ pub struct Attenuation<const D: usize, S = Bricks<HitLength, D>> {
     store: S,
     rule: AttenuationRule,
     bounds: Option<CellBox<D>>,
+    /// The blocks in which a beam ever ended.
+    hit: HitBlocks<D>,
     sweeps: Sweeps<D>,
 }
 
@@ -77,8 +79,7 @@ impl<const D: usize> Attenuation<D> {
 
     /// Number of cells that were observed. O(cells).
     pub fn observed_cells(&self) -> usize {
-        let observed = |looks: &[u16]| looks.iter().filter(|l| **l > 0).count();
-        self.store.bricks_by_age().map(|(_, brick)| observed(brick.planes().looks())).sum()
+        self.store.bricks_by_age().map(|(_, brick)| brick.observed()).sum()
     }
 }
 
@@ -105,7 +106,8 @@ impl<const D: usize, S: Store<HitLength, D>> Attenuation<D, S> {
     /// Where the lattice is not possible.
     pub fn from_store(store: S, rule: AttenuationRule) -> Result<Self, MapError> {
         check_lattice(store.lattice())?;
-        Ok(Self { store, rule, bounds: None, sweeps: Sweeps::new(OccupancySweep::default()) })
+        let hit = store.blocks_with(|cell| cell.hits > 0).into_iter().collect();
+        Ok(Self { store, rule, bounds: None, hit, sweeps: Sweeps::new(OccupancySweep::default()) })
     }
 
     /// The same map, with this sweep for images and points from now on.
@@ -114,7 +116,10 @@ impl<const D: usize, S: Store<HitLength, D>> Attenuation<D, S> {
     }
 
     /// Fuses one scan taken at a known pose. O(cells passed); in bricks parallel, with the same bytes for any number of
-    /// threads, and without forgetting for any order of scans. A pose that is not rigid or has no cell refuses the scan,
+    /// threads, and without forgetting for any order of scans in 2-D. In 3-D only blocks of 8 cells an edge in which a beam
+    /// ever ended are told apart cell by cell; in the others nothing stops beams, whatever their length is, so that each
+    /// scan adds its mean length there. (In another order of scans hits are the same, lengths may be spread otherwise within
+    /// a block that was passed before it was hit.) A pose that is not rigid or has no cell refuses the scan,
     /// which is counted, and so is a beam that is not finite, or longer than 2^20 cells within the bounds.
     ///
     /// # Errors
@@ -130,7 +135,7 @@ impl<const D: usize, S: Store<HitLength, D>> Attenuation<D, S> {
     }
 
     /// Fuses a scan by one of the sweeps.
-    pub(super) fn sweep<W: Sweep<D, Evidence = HitLengths>>(
+    pub(super) fn sweep<W: Sweep<D, Evidence = HitLengths> + KnowsHits<D>>(
         &mut self,
         choose: impl Fn(&mut Sweeps<D>) -> &mut W,
         world_from_sensor: &Pose<D>,
@@ -139,9 +144,11 @@ impl<const D: usize, S: Store<HitLength, D>> Attenuation<D, S> {
         let sweep = choose(&mut self.sweeps);
         let bounds = self.bounds.map(|b| b.aabb(self.store.lattice()));
         let limits = limits(&self.store, bounds, size_of::<HitLength>() * block_cells::<D>());
-        let Some(stats) = plan(&self.store, sweep, &limits, world_from_sensor, scan)? else {
-            return Ok(ScanStats::refused_pose());
-        };
+        // Lent to the sweep, which adds the blocks that the scan hits.
+        std::mem::swap(sweep.hit_blocks(), &mut self.hit);
+        let planned = plan(&self.store, sweep, &limits, world_from_sensor, scan);
+        std::mem::swap(sweep.hit_blocks(), &mut self.hit);
+        let Some(stats) = planned? else { return Ok(ScanStats::refused_pose()) };
         let scan = Inside { scan: &*sweep, cells: self.bounds };
         Ok(ScanStats { cells: self.store.fuse(&scan, &self.rule)?, ..stats })
     }

@@ -224,6 +224,13 @@ impl<C: Cell, const D: usize> Store<C, D> for Bricks<C, D> {
         self.brick(BlockKey::of_cell(cell))?.get(BlockKey::offset(cell))
     }
 
+    fn blocks_with(&self, holds: impl Fn(C) -> bool) -> Vec<BlockKey<D>> {
+        let has = |key: &BlockKey<D>| {
+            self.brick(*key).is_some_and(|b| (0..b.len()).any(|i| b.get(i).is_some_and(&holds)))
+        };
+        self.keys().into_iter().filter(has).collect()
+    }
+
     fn apply(&mut self, key: BlockKey<D>, evidence: &C::Evidence, rule: &C::Rule) -> Result<(), StoreFull> {
         let fuse =
             |_: usize, brick: &mut Option<C::Brick>, (): &mut ()| fuse_brick::<C, D>(brick, evidence, rule);

@@ -30,6 +30,7 @@ pub use cell_centre::CellCentre;
 pub use image::{Projective, ProjectiveSettings};
 pub(crate) use inside::Inside;
 pub use lengths::{BeamLengths, HitLengthSweep};
+pub(crate) use lengths::{HitBlocks, KnowsHits};
 pub use march::March;
 pub use occupancy::{HitMissSweep, OccupancySweep};
 pub use plan::{LONGEST_RAY_CELLS, PlanError, PlanLimits};

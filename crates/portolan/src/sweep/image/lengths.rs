@@ -8,6 +8,7 @@ use super::projector::Projector;
 use super::range_pyramid::RangePyramid;
 use super::search::{BlockBox, LONGEST_EDGE, Octants, find_blocks};
 use crate::cell::LENGTH_UNITS;
+use crate::geom::vector::distance;
 use crate::geom::{Aabb, BLOCK_EDGE, BlockKey, Lattice, Pose};
 use crate::scan::RangeImage;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, WeightModel};
@@ -151,15 +152,40 @@ impl ProjectiveLengths {
         else {
             return;
         };
-        let center = self.lattice.center(self.keys[i].first_cell());
-        let offset: [f64; 3] = std::array::from_fn(|k| center[k] - self.origin[k]);
-        let rows = &self.image_from_world;
-        let centers = BlockCenters {
-            first: rows.map(|row| (0..3).map(|k| row[k] * offset[k]).sum::<f64>() as f32),
-            steps: std::array::from_fn(|axis| rows.map(|row| (row[axis] * self.lattice.resolution) as f32)),
-        };
         let view = LengthLookup { projector, image: &self.image, cell: self.lattice.resolution as f32 };
-        add_block(&view, &centers, self.octants[i], lengths);
+        add_block(&view, &self.centers(i, 1), self.octants[i], lengths);
+    }
+
+    /// The mean length in the cells of the `i`-th block (units), by groups of eight cells.
+    pub(in crate::sweep) fn mean(&self, i: usize) -> f64 {
+        let Some(projector) = &self.projector else { return 0.0 };
+        let r = self.lattice.resolution;
+        // Beside the sensor beams open too fast for groups.
+        const NEAR: f64 = 16.0;
+        let middle = self.lattice.center(self.keys[i].first_cell().map(|v| v + BLOCK_EDGE as i32 / 2));
+        if distance(middle, self.origin) < NEAR * r {
+            let mut lengths = [0; BLOCK];
+            self.add_to(i, &mut lengths);
+            return lengths.iter().map(|l| f64::from(*l)).sum::<f64>() / BLOCK as f64;
+        }
+        let view = LengthLookup { projector, image: &self.image, cell: 2.0 * r as f32 };
+        // A group has eight times the volume, of which each cell has an eighth.
+        let groups = f64::from(mean_of_groups(&view, &self.centers(i, 2), self.octants[i].free == 0xff));
+        groups * r * r * f64::from(LENGTH_UNITS)
+    }
+
+    /// Centers of the `i`-th block's cells, or of groups of `wide^3` of them.
+    fn centers(&self, i: usize, wide: i32) -> BlockCenters {
+        let cells = f64::from(wide);
+        let corner = self.lattice.corner(self.keys[i].first_cell());
+        let half = 0.5 * cells * self.lattice.resolution;
+        let offset: [f64; 3] = std::array::from_fn(|k| corner[k] + half - self.origin[k]);
+        let rows = &self.image_from_world;
+        let step = cells * self.lattice.resolution;
+        BlockCenters {
+            first: rows.map(|row| (0..3).map(|k| row[k] * offset[k]).sum::<f64>() as f32),
+            steps: std::array::from_fn(|axis| rows.map(|row| (row[axis] * step) as f32)),
+        }
     }
 }
 
@@ -189,6 +215,13 @@ fn add_block(view: &LengthLookup<'_>, centers: &BlockCenters, octants: Octants, 
     }
 }
 
+/// Mean of beams per area, of those that pass, over the 64 groups of a block (1/m^2).
+#[multiversion(targets = "simd")]
+fn mean_of_groups(view: &LengthLookup<'_>, centers: &BlockCenters, free: bool) -> f32 {
+    let all = beams_per_area(view, &centers.octant(0), &centers.steps, free);
+    all.iter().sum::<f32>() * (1.0 / LANES as f32)
+}
+
 /// The lengths in 64 cells about these centers (sensor's frame, as are the edges of a cell). `free`: all pixels saw past all
 /// of them.
 #[inline(always)]
@@ -198,6 +231,21 @@ fn octant_lengths(
     edges: &[[f32; 3]; 3],
     free: bool,
 ) -> [u32; LANES] {
+    let beams = beams_per_area(view, p, edges, free);
+    let mut units = [0u32; LANES];
+    let scale = view.cell * view.cell * LENGTH_UNITS as f32;
+    for l in 0..LANES {
+        let length = beams[l] * scale;
+        // Rounded up or down by chance, so that thin beams are not lost; the low bits are chance enough.
+        let chance = (length.to_bits().wrapping_mul(0x9e37_79b9) >> 9) as f32 * (1.0 / (1u32 << 23) as f32);
+        units[l] = (length.clamp(0.0, 1e9) + chance) as u32;
+    }
+    units
+}
+
+/// Beams per area across them that pass each of 64 cells (1/m^2).
+#[inline(always)]
+fn beams_per_area(view: &LengthLookup<'_>, p: &[Lanes; 3], edges: &[[f32; 3]; 3], free: bool) -> Lanes {
     let seen = view.projector.project(p);
     let turning = view.projector.columns_of_turn().is_some();
     let parallel = view.projector.is_parallel();
@@ -222,22 +270,14 @@ fn octant_lengths(
         down[l] /= depth;
         per_area[l] = across[l] * down[l] * seen.scale[l];
     }
-    let mut share = [1.0f32; LANES];
     if !free {
         let per_depth = per_depth(view, &seen, p, edges);
-        share = shares(view, &seen, &across, &down, &per_depth);
+        let share = shares(view, &seen, &across, &down, &per_depth);
+        for l in 0..LANES {
+            per_area[l] *= share[l];
+        }
     }
-    let mut units = [0u32; LANES];
-    let scale = cell * cell * LENGTH_UNITS as f32;
-    for l in 0..LANES {
-        let length = per_area[l] * share[l] * scale;
-        // Rounded up or down by chance, so that thin beams are not lost; the low bits are chance enough, and the same ones
-        // every time.
-        let chance = (length.to_bits().wrapping_mul(0x9e37_79b9) >> 9) as f32 * (1.0 / (1u32 << 23) as f32);
-        let sane = length.clamp(0.0, 16_000_000.0);
-        units[l] = (sane + chance) as u32;
-    }
-    units
+    per_area
 }
 
 /// One over the length of the ray through the middle of each cell (per meter): edge by edge it leaves through the faces that

@@ -1,14 +1,17 @@
 //! Hits and lengths of beams with kinds, in 2-D and 3-D.
 
+use super::blocks::{HitBlocks, KnowsHits};
 use super::rays::{Ray, RayLengths};
-use crate::cell::HitLengths;
+use crate::cell::{Evidence, HitLengths};
 use crate::geom::vector::along;
-use crate::geom::{BlockKey, Lattice, Pose};
+use crate::geom::{BlockKey, Lattice, Pose, block_cells};
 use crate::scan::{Scan, ScanStats};
 use crate::sweep::{PlanError, PlanLimits, Sweep, Swept, beam_stats};
 
 /// Walks every beam through the cells (Amanatides & Woo 1987), up to its end or as far as it is known to be free, and adds
 /// its length in each; the cell of an end point gets a hit. O(cells passed).
+///
+/// In 3-D only the cells of blocks in which a beam ever ended are told apart; of the others it says the mean length.
 ///
 /// Every beam counts, also where many pass a cell: what is observed is their length, and a cell that a hundred beams
 /// crossed was tried a hundred times.
@@ -32,16 +35,24 @@ impl<const D: usize> Default for BeamLengths<D> {
 
 impl<const D: usize> Swept<D> for BeamLengths<D> {
     type Evidence = HitLengths;
-    type Scratch = ();
+    type Scratch = HitLengths;
 
-    fn scratch(&self) {}
+    fn scratch(&self) -> HitLengths {
+        HitLengths::silent(block_cells::<D>())
+    }
 
     fn blocks(&self) -> &[BlockKey<D>] {
         self.rays.keys()
     }
 
-    fn evidence<'a>(&'a self, i: usize, (): &'a mut ()) -> &'a HitLengths {
-        self.rays.evidence(i)
+    fn evidence<'a>(&'a self, i: usize, scratch: &'a mut HitLengths) -> &'a HitLengths {
+        self.rays.evidence(i, scratch)
+    }
+}
+
+impl<const D: usize> KnowsHits<D> for BeamLengths<D> {
+    fn hit_blocks(&mut self) -> &mut HitBlocks<D> {
+        &mut self.rays.hit
     }
 }
 
@@ -57,16 +68,11 @@ impl<const D: usize> Sweep<D> for BeamLengths<D> {
     ) -> Result<ScanStats, PlanError> {
         let mut stats = beam_stats(scan, world_from_sensor, limits);
         let origin = world_from_sensor.translation;
-        let rays: Vec<_> = scan
-            .beams()
-            .filter(|b| b.free_range() > 0.0)
-            .map(|b| {
-                let (direction, length) = (world_from_sensor.rotate(b.direction), b.range);
-                let end = along(origin, direction, length);
-                Ray { origin, end, direction, length, hit: b.is_hit(), passes: true }
-            })
-            .collect();
-        let tally = self.rays.plan(lattice, limits, rays.len(), |i| rays[i])?;
+        let rays = scan.beams().filter(|b| b.free_range() > 0.0).map(|b| {
+            let end = along(origin, world_from_sensor.rotate(b.direction), b.range);
+            Ray { origin, end, hit: b.is_hit(), passes: true }
+        });
+        let tally = self.rays.plan(lattice, limits, rays)?;
         let refused = tally.refused.total();
         (0..refused).for_each(|i| stats.refuse_far(i < tally.refused_hits));
         Ok(stats)

@@ -1,9 +1,9 @@
 //! Hits and lengths of 3-D scans: exact rays, or exact ends and lengths in closed form through a range image.
 
+use super::blocks::{HitBlocks, KnowsHits, is_fine, shared_out};
 use super::rays::{Ray, RayLengths};
 use crate::cell::{Evidence, HitLengths};
-use crate::geom::vector::{norm, scale, sub};
-use crate::geom::{BlockKey, Lattice, Pose, block_cells};
+use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
 use crate::scan::{LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
 use crate::sweep::image::ProjectiveLengths;
 use crate::sweep::occupancy::stats;
@@ -18,7 +18,8 @@ use std::marker::PhantomData;
 /// beams have on average: so many beams per steradian, times a cell's volume over the squared range, times the share of the
 /// cell's window that looks past it. That costs cells instead of beams times cells, and agrees with exact rays to a few
 /// per cent over any patch of cells that beams pass densely; where beams are further apart than cells, the length lies
-/// between them, too.
+/// between them, too. Only the cells of blocks in which a beam ever ended are told apart; of the others the sweep says the
+/// mean length.
 #[derive(Debug)]
 pub struct HitLengthSweep<S: ?Sized> {
     sweep: OccupancySweep,
@@ -26,8 +27,16 @@ pub struct HitLengthSweep<S: ?Sized> {
     lengths: ProjectiveLengths,
     layout: LayoutFinder,
     keys: Vec<BlockKey<3>>,
-    parts: Vec<[Option<u32>; 2]>,
+    parts: Vec<Seen>,
     scan: PhantomData<fn(&S)>,
+}
+
+/// A block's place among those that rays touch, and among those that the image sees, and whether its cells are told apart.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    rays: Option<u32>,
+    image: Option<u32>,
+    fine: bool,
 }
 
 /// Without what it remembers of the last scan: a snapshot of a map does not pay for it.
@@ -54,9 +63,8 @@ impl<S: ?Sized> HitLengthSweep<S> {
     /// Takes rays in, and the lengths that an image gives.
     fn plan_rays(
         &mut self,
-        hits: usize,
-        count: usize,
-        ray: impl Fn(usize) -> Ray<3> + Sync,
+        (hits, count): (usize, usize),
+        rays: impl Iterator<Item = Ray<3>>,
         view: Option<(&RangeImage, &Pose<3>)>,
         lattice: &Lattice<3>,
         limits: &PlanLimits<3>,
@@ -64,16 +72,16 @@ impl<S: ?Sized> HitLengthSweep<S> {
         self.keys.clear();
         self.parts.clear();
         self.lengths.clear();
-        let tally = self.rays.plan(lattice, limits, count, ray)?;
+        let tally = self.rays.plan(lattice, limits, rays)?;
         if let Some((image, world_from_image)) = view {
             self.lengths.plan(image, world_from_image, lattice, limits)?;
         }
-        self.unite();
+        self.unite(lattice, limits.bounds.as_ref());
         Ok(stats(hits, count, tally))
     }
 
     /// Blocks of the rays and of the image together, ascending, as both are.
-    fn unite(&mut self) {
+    fn unite(&mut self, lattice: &Lattice<3>, bounds: Option<&Aabb<3>>) {
         let (marked, seen) = (self.rays.keys(), self.lengths.blocks());
         let (mut i, mut j) = (0, 0);
         while i < marked.len() || j < seen.len() {
@@ -84,19 +92,12 @@ impl<S: ?Sized> HitLengthSweep<S> {
             };
             let (is_marked, is_seen) = (marked.get(i) == Some(&key), seen.get(j) == Some(&key));
             self.keys.push(key);
-            self.parts.push([is_marked.then_some(i as u32), is_seen.then_some(j as u32)]);
+            let (rays, image) = (is_marked.then_some(i as u32), is_seen.then_some(j as u32));
+            self.parts.push(Seen { rays, image, fine: is_fine(&self.rays.hit, bounds, lattice, key) });
             i += usize::from(is_marked);
             j += usize::from(is_seen);
         }
     }
-}
-
-/// A ray between two points of the world.
-fn between(origin: [f64; 3], end: [f64; 3], hit: bool, passes: bool) -> Ray<3> {
-    let offset = sub(end, origin);
-    let length = norm(offset);
-    let direction = scale(offset, if length > 0.0 { 1.0 / length } else { 0.0 });
-    Ray { origin, end, direction, length, hit, passes: passes && length > 0.0 }
 }
 
 impl Sweep<3> for HitLengthSweep<RangeImage> {
@@ -111,15 +112,15 @@ impl Sweep<3> for HitLengthSweep<RangeImage> {
     ) -> Result<ScanStats, PlanError> {
         image.check().map_err(PlanError::BadImage)?;
         let exact = self.sweep == OccupancySweep::Exact;
-        let all: Vec<_> = image.readings().collect();
-        let ray = |i: usize| {
-            let (origin, end, hit) = all[i];
-            let to_world = |p| world_from_sensor.transform_point(p);
-            between(to_world(origin), to_world(end), hit, exact)
-        };
-        let hits = all.iter().filter(|r| r.2).count();
+        let to_world = |p| world_from_sensor.transform_point(p);
+        let rays = image.readings().map(|(origin, end, hit)| {
+            // Of a ray that is not followed only the end counts.
+            let origin = if exact { to_world(origin) } else { world_from_sensor.translation };
+            Ray { origin, end: to_world(end), hit, passes: exact }
+        });
+        let count = image.values.iter().filter(|v| **v != 0.0).count();
         let view = (!exact).then_some((image, world_from_sensor));
-        let stats = self.plan_rays(hits, all.len(), ray, view, lattice, limits)?;
+        let stats = self.plan_rays((image.hits(), count), rays, view, lattice, limits)?;
         Ok(ScanStats { refused: stats.refused + image.refused, ..stats })
     }
 }
@@ -143,17 +144,20 @@ impl Sweep<3> for HitLengthSweep<PointScan> {
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
         let exact = image.is_none();
         let ray = |i: usize| match i.checked_sub(hits) {
-            Some(free) => between(common, to_world(scan.free_ends[free]), false, true),
+            Some(free) => {
+                Ray { origin: common, end: to_world(scan.free_ends[free]), hit: false, passes: true }
+            }
             None => {
                 let origin = match &scan.origin {
                     Origin::Common(_) => common,
                     Origin::PerPoint(all) => all.get(i).map_or([f64::NAN; 3], |o| to_world(*o)),
                 };
-                between(origin, to_world(scan.points[i]), true, exact)
+                Ray { origin, end: to_world(scan.points[i]), hit: true, passes: exact }
             }
         };
         let view = image.as_deref().map(|image| (image, &world_from_image));
-        let stats = self.plan_rays(hits, hits + scan.free_ends.len(), ray, view, lattice, limits)?;
+        let count = hits + scan.free_ends.len();
+        let stats = self.plan_rays((hits, count), (0..count).map(ray), view, lattice, limits)?;
         Ok(ScanStats { refused: stats.refused + scan.refused, ..stats })
     }
 }
@@ -194,18 +198,32 @@ impl<S: ?Sized> Swept<3> for HitLengthSweep<S> {
     }
 
     fn evidence<'a>(&'a self, i: usize, scratch: &'a mut HitLengths) -> &'a HitLengths {
-        let [rays, seen] = self.parts[i];
-        match (rays, seen) {
-            (Some(slot), None) => return self.rays.evidence(slot as usize),
-            (slot, Some(at)) => {
-                match slot {
-                    Some(slot) => scratch.clone_from(self.rays.evidence(slot as usize)),
-                    None => scratch.clear(),
-                }
-                self.lengths.add_to(at as usize, scratch.lengths_mut());
-            }
-            (None, None) => scratch.clear(),
+        let Seen { rays, image, fine } = self.parts[i];
+        if !fine {
+            let of_rays = rays.map_or(0.0, |at| self.rays.mean(at as usize));
+            let of_image = image.map_or(0.0, |at| self.lengths.mean(at as usize));
+            scratch.set_even(shared_out(of_rays + of_image));
+            return scratch;
         }
+        let Some(at) = image else {
+            return match rays {
+                Some(at) => self.rays.evidence(at as usize, scratch),
+                None => scratch,
+            };
+        };
+        // Cells that are told apart are so by rays and image alike.
+        let mut none = HitLengths::silent(0);
+        match rays {
+            Some(at) => scratch.copy(self.rays.evidence(at as usize, &mut none)),
+            None => scratch.clear(),
+        }
+        self.lengths.add_to(at as usize, scratch.planes_mut().1);
         scratch
+    }
+}
+
+impl<S: ?Sized> KnowsHits<3> for HitLengthSweep<S> {
+    fn hit_blocks(&mut self) -> &mut HitBlocks<3> {
+        &mut self.rays.hit
     }
 }
