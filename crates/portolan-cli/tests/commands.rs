@@ -429,7 +429,7 @@ fn append_keeps_maps_that_are_not_asked_for() {
 #[test]
 fn maps_agree_on_what_lies_outside_of_bounds() {
     let (folder, log) = room();
-    let counts = ["grid", "tree", "tsdf"].map(|kind| {
+    let counts = ["grid", "tree", "tsdf", "attenuation"].map(|kind| {
         let out = folder.path().join(kind);
         let bounds = ["--resolution", "0.1", "--bounds", "1,1,3,3", "--maps", kind];
         json([&["map", arg(&log), "--out", arg(&out), "--json"][..], &bounds].concat())["beams"].clone()

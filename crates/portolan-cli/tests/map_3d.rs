@@ -131,7 +131,8 @@ fn the_memory_limit_saves_what_fits() {
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(error.contains("the map needs more than") && error.contains("fused and saved"), "{error}");
     let summary = summary(&out);
-    let total: u64 = ["tree", "tsdf"].iter().map(|m| summary["bytes"][m].as_u64().unwrap()).sum();
+    let total: u64 =
+        ["tree", "tsdf", "attenuation"].iter().map(|m| summary["bytes"][m].as_u64().unwrap()).sum();
     assert!(total <= 8 << 20, "{total}");
     assert!(json(["info", arg(&out), "--json"])["maps"]["tsdf"]["bricks"].as_u64().unwrap() > 100);
 }

@@ -8,7 +8,7 @@ use crate::sweep::LONGEST_RAY_CELLS;
 
 /// The distribution of the range that a sensor reads along a ray: a beam ends in every bit of length with the probability
 /// that the map's hits per meter give, so that the density at a range is `sigma exp(-depth)` with the depth summed up over
-/// the cells before *(Schaefer, Luft, Burgard 2017; the weights of a volume renderer)*.
+/// the cells before *(Schaefer, Luft & Burgard 2017; the weights of a volume renderer)*.
 ///
 /// Cells that were never observed count as the map believes before it looks
 /// ([`Attenuation::hit_probability`]), so that no range is impossible in them. Beams that meet nothing up to the largest

@@ -9,7 +9,7 @@ use multiversion::multiversion;
 ///
 /// `hits / length` is the density that makes what was observed most likely, if a beam ends in every bit of length with the
 /// same probability: the maximum of a volume renderer's likelihood for ranges, without a descent. As a map it is known as
-/// "decay rates" *(Schaefer, Luft, Burgard 2017)*. Counts say how much of what came here ended here, which a sign or a
+/// "decay rates" *(Schaefer, Luft & Burgard 2017)*. Counts say how much of what came here ended here, which a sign or a
 /// clamped log odds cannot: thin things that stop a beam in three stay visible.
 ///
 /// All three are whole numbers: without forgetting they are sums, the same in any order.

@@ -1,6 +1,6 @@
 //! `info` of a map.portolan.
 
-use portolan::cell::{Cell, Planes};
+use portolan::cell::{Cell, HitLengthPlanes, Planes};
 use portolan::store::{Bricks, Store};
 use portolan_io::{MapFile, MapHeader};
 use serde_json::{Value, json};
@@ -76,8 +76,9 @@ fn maps_of_hits<const D: usize>(maps: &mut Value, file: &MapFile<D>) {
     if let Some(map) = &file.attenuation {
         maps["attenuation"] = of_bricks("hits, length of beams and looks, whole numbers", &map.store);
         maps["attenuation"]["half_life"] = json!(map.rule.half_life);
-        let hits = map.store.bricks_by_age().flat_map(|(_, brick)| brick.planes().hits());
-        maps["attenuation"]["hits"] = json!(hits.map(|h| u64::from(*h)).sum::<u64>());
+        let hits = |planes: &HitLengthPlanes| planes.hits().iter().map(|h| u64::from(*h)).sum::<u64>();
+        let all = map.store.bricks_by_age().map(|(_, brick)| hits(&brick.planes()));
+        maps["attenuation"]["hits"] = json!(all.sum::<u64>());
     }
 }
 

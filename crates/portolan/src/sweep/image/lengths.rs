@@ -268,7 +268,10 @@ fn beams_per_area(view: &LengthLookup<'_>, p: &[Lanes; 3], edges: &[[f32; 3]; 3]
         let depth = if parallel { 1.0 } else { (seen.length[l] / seen.scale[l]).max(nearest) };
         across[l] /= depth;
         down[l] /= depth;
-        per_area[l] = across[l] * down[l] * seen.scale[l];
+        // The mean of one over the squared range is larger than that at the middle, by its curvature.
+        let wide = cell / seen.length[l].abs().max(cell);
+        let curved = if parallel { 1.0 } else { 1.0 + wide * wide * (1.0 / 12.0) };
+        per_area[l] = across[l] * down[l] * seen.scale[l] * curved;
     }
     if !free {
         let per_depth = per_depth(view, &seen, p, edges);
