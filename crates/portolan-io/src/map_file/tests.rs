@@ -357,7 +357,7 @@ fn memory_is_limited<const D: usize>() {
     let container = Container::parse(full::<D>(1).to_bytes().unwrap(), "m".as_ref()).unwrap();
     // The content of all chunks, and what bricks take beside their planes.
     let content: u64 = container.chunks().iter().map(|c| c.length).sum();
-    let needed = content + 3 * 96 * keys::<D>(1).len() as u64;
+    let needed = content + 4 * 96 * keys::<D>(1).len() as u64;
     let error = |memory| MapFile::<D>::from_container(&container, memory).err().map(|e| e.to_string());
     assert_eq!(error(needed), None);
     for memory in [2_000, needed / 4, needed / 2, needed - 1] {
