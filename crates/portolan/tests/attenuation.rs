@@ -230,3 +230,17 @@ fn only_cells_within_the_bounds_change() {
     assert!(held.len() < cells(whole.store()).len() / 2);
     assert!(part.store().cell([0, 0, 3]).is_none());
 }
+
+/// Bricks of free space take no memory until a beam ends in them: then the limit is asked, too.
+#[test]
+fn the_limit_is_kept_where_free_bricks_are_hit() {
+    let camera = Pinhole { fx: 40.0, fy: 40.0, cx: 31.5, cy: 23.5 };
+    let image = |half| room(RangeImage::from_depth(camera, 64, 48, vec![0.0; 64 * 48]), half);
+    let mut map = Attenuation::<3>::new(Lattice::new([0.0; 3], 0.02), NEVER).unwrap();
+    map.integrate(&Pose::IDENTITY, &image(3.0)).unwrap();
+    let limit = map.memory_bytes() + 100_000;
+    map.set_limit(limit);
+    let full = map.integrate(&Pose::IDENTITY, &image(2.0)).unwrap_err();
+    assert!(matches!(full, portolan::map::MapError::Full(_)), "{full}");
+    assert!(map.memory_bytes() <= limit && map.memory_bytes() > limit - 20_000, "{}", map.memory_bytes());
+}

@@ -148,7 +148,9 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
                 // Taken out, so that every brick is changed in place by one worker alone.
                 let brick = slot.map(|s| std::mem::replace(&mut self.bricks[s as usize], empty.clone()));
                 let bytes = brick.as_ref().map_or(0, Planes::bytes);
-                Work { position: chunk * TOGETHER + i, slot, bytes, brick, cells: 0 }
+                // What takes no memory yet may come to take some: then the limit is asked first.
+                let before = brick.clone().filter(|_| bytes == 0);
+                Work { position: chunk * TOGETHER + i, slot, bytes, before, brick, cells: 0 }
             }));
             parallel::change_each(&mut work, CELLS_A_TASK / block_cells::<D>(), &scratch, |w, s| {
                 w.cells = change(w.position, &mut w.brick, s)
@@ -158,6 +160,13 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
                 match (w.slot, w.brick) {
                     (Some(slot), Some(brick)) => {
                         let slot = slot as usize;
+                        let grown = brick.bytes().saturating_sub(w.bytes);
+                        let fits = grown == 0 || full.is_ok() && self.limit >= self.memory_bytes() + grown;
+                        if let (false, Some(before)) = (fits, w.before) {
+                            self.bricks[slot] = before;
+                            full = full.and(Err(StoreFull { limit: self.limit, bytes: self.memory_bytes() }));
+                            continue;
+                        }
                         self.bytes = self.bytes - w.bytes + brick.bytes();
                         self.bricks[slot] = brick;
                         if w.cells > 0 {
@@ -195,6 +204,8 @@ struct Work<C: Cell> {
     position: usize,
     slot: Option<u32>,
     bytes: usize,
+    /// The brick as it was, where it took no memory.
+    before: Option<C::Brick>,
     brick: Option<C::Brick>,
     cells: usize,
 }
