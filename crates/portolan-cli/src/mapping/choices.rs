@@ -50,11 +50,11 @@ pub(crate) enum SweepArg {
     CellCentre,
     /// 2-D: the textbook's march along beams
     March,
-    /// 3-D: projective where a scan has rows and columns, exact rays otherwise
+    /// 3-D: through rows and columns where a scan has them, or where they are found and keep its points; exact rays otherwise (summary.json says which, and why)
     Auto,
     /// 3-D: every ray is traced
     Exact,
-    /// 3-D: cells are projected into the range image
+    /// 3-D: the same as auto
     Projective,
 }
 

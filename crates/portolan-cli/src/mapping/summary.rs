@@ -5,6 +5,8 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
+use portolan::scan::{Way, WhyRays};
+
 use super::extent::Extent;
 use super::memory::peak_memory;
 use super::{Derived, FusionReport, Settings};
@@ -135,6 +137,7 @@ impl Summary<'_> {
                         .as_ref()
                         .map(|t| { json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }) })
                 );
+                document["sweeps"] = json::ways(&self.fusion.stats.ways);
                 document["points_without_pixel"] = json!(self.fusion.without_pixel);
             }
         }
@@ -173,6 +176,20 @@ impl Summary<'_> {
     }
 }
 
+/// How a 3-D scan became evidence, and why.
+fn way_words(way: Way) -> &'static str {
+    match way {
+        Way::Stated => "through their rows and columns",
+        Way::Found => "through rows and columns that were found in their points",
+        Way::Rays(WhyRays::Asked) => "ray by ray, as asked for",
+        Way::Rays(WhyRays::OwnOrigins) => "ray by ray: each point has an origin of its own",
+        Way::Rays(WhyRays::Colors) => "ray by ray: their points have colors, and no rows and columns",
+        Way::Rays(WhyRays::NoRows) => "ray by ray: no rows and columns were found in their points",
+        Way::Rays(WhyRays::SharedPixels) => "ray by ray: rows and columns would lose points",
+        Way::Rays(WhyRays::Gaps) => "ray by ray: rows and columns would have gaps",
+    }
+}
+
 /// The summary for people.
 pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     let mut text = String::new();
@@ -200,6 +217,10 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         }
     };
     let _ = writeln!(text, "{}", summary.settings.forgetting());
+    let ways = Way::ALL.map(|way| (stats.ways.count(way), way_words(way)));
+    for (scans, words) in ways.into_iter().filter(|(scans, _)| *scans > 0) {
+        let _ = writeln!(text, "{scans} scans {words}");
+    }
     let sizes: Vec<_> =
         summary.bytes.iter().map(|(name, &n)| format!("{name} {}", shown_bytes(n as f64))).collect();
     let _ = writeln!(text, "{}", sizes.join(", "));

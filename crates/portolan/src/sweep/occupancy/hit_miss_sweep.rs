@@ -5,7 +5,9 @@ use super::masks::Bits;
 use crate::cell::HitMiss;
 use crate::geom::{BlockKey, Lattice, Pose};
 use crate::parallel;
-use crate::scan::{BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{
+    BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays,
+};
 use crate::sweep::image::ProjectiveMisses;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept};
 use std::borrow::Cow;
@@ -163,7 +165,8 @@ impl Sweep<3> for HitMissSweep<RangeImage> {
         let view = (!passes).then_some(View { world_from_image: world_from_sensor, image });
         let rays = Rays { hits, count: all.len(), ray: |i| all[i], view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
-        Ok(ScanStats { refused: stats.refused + image.refused, ..stats })
+        let way = if passes { Way::Rays(WhyRays::Asked) } else { Way::Stated };
+        Ok(ScanStats { refused: stats.refused + image.refused, ..stats }.by(way))
     }
 }
 
@@ -179,9 +182,9 @@ impl Sweep<3> for HitMissSweep<PointScan> {
     ) -> Result<ScanStats, PlanError> {
         let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
-        let (common, image) = match &scan.origin {
+        let (common, (way, image)) = match &scan.origin {
             Origin::Common(o) => (world_from_sensor.transform_point(*o), self.organised(scan, *o)?),
-            Origin::PerPoint(_) => (world_from_sensor.translation, None),
+            Origin::PerPoint(_) => (world_from_sensor.translation, (Way::Rays(WhyRays::OwnOrigins), None)),
         };
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
         let view = image.as_deref().map(|image| View { world_from_image: &world_from_image, image });
@@ -200,7 +203,7 @@ impl Sweep<3> for HitMissSweep<PointScan> {
         };
         let rays = Rays { hits, count: hits + scan.free_ends.len(), ray, view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
-        Ok(ScanStats { refused: stats.refused + scan.refused, ..stats })
+        Ok(ScanStats { refused: stats.refused + scan.refused, ..stats }.by(way))
     }
 }
 
@@ -223,20 +226,23 @@ impl Sweep<3> for HitMissSweep<[[f64; 3]]> {
 }
 
 impl HitMissSweep<PointScan> {
-    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them.
+    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them, and which way it is.
     fn organised<'a>(
         &mut self,
         scan: &'a PointScan,
         origin: [f64; 3],
-    ) -> Result<Option<Cow<'a, RangeImage>>, PlanError> {
+    ) -> Result<(Way, Option<Cow<'a, RangeImage>>), PlanError> {
         if self.sweep == OccupancySweep::Exact {
-            return Ok(None);
+            return Ok((Way::Rays(WhyRays::Asked), None));
         }
         if let Some(image) = &scan.image {
             image.check().map_err(PlanError::BadImage)?;
-            return Ok(Some(Cow::Borrowed(image)));
+            return Ok((Way::Stated, Some(Cow::Borrowed(image))));
         }
-        Ok(self.layout.image(&scan.points, origin).map(Cow::Owned))
+        Ok(match self.layout.image(&scan.points, origin) {
+            Ok(image) => (Way::Found, Some(Cow::Owned(image))),
+            Err(why) => (Way::Rays(why), None),
+        })
     }
 }
 
