@@ -221,14 +221,14 @@ fn agrees(said: Said, cell: Option<SignedDistance>) -> bool {
 }
 
 /// The image with bridges: pixels of a lidar without a reading on the line between the next ones in their row, where both are
-/// surfaces of at most 60 degrees of incidence (or within 3 cm), no further apart than twice the wider distance of neighboring rays.
+/// surfaces of at most 60 degrees of incidence (or within 3 cm), no further apart than twice the wider distance of neighboring rays, or 0.04 radians.
 fn bridged(image: &RangeImage) -> RangeImage {
     let mut whole = image.clone();
     let Projection::Spherical(s) = &image.projection else { return whole };
     let mut down: Vec<f64> = s.elevations.windows(2).map(|w| f64::from(w[0]) - f64::from(w[1])).collect();
     down.sort_by(f64::total_cmp);
     let across = s.azimuth_step.abs();
-    let most = (2.002 * across.max(down[down.len() / 2]) / across) as i64;
+    let most = (1.001 * (2.0 * across.max(down[down.len() / 2])).max(0.04) / across) as i64;
     let n = image.columns as i64;
     for row in 0..image.rows {
         let at = |c: i64| {

@@ -67,7 +67,7 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
         if self.config.color && !scan.colors.is_empty() {
             return Err(WhyRays::Colors);
         }
-        let mut image = self.layout.image(&scan.points, origin)?;
+        let mut image = self.layout.image(&scan.points, origin, self.config.resolution)?;
         if let (Some(layout), false) = (self.layout.layout(), scan.free_ends.is_empty()) {
             let free = layout.image(&scan.free_ends, origin);
             for (value, free) in image.values.iter_mut().zip(free.values) {

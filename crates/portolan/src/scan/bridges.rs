@@ -2,9 +2,10 @@
 
 use super::{MAX_OPENING, RangeImage, Spherical};
 
-/// The widest gap that is bridged, in times of the wider of the two distances between neighboring rays: there the map is
-/// interpolated over one such distance anyway.
+/// The widest gap that is bridged, in times of the wider of the two distances between neighboring rays (the map is
+/// interpolated over one such distance anyway), or in radians, whichever is wider.
 const WIDEST: f32 = 2.0;
+const WIDEST_ANGLE: f32 = 0.04;
 /// The tangent of the steepest incidence on a bridge (60 degrees): less than between neighbors, since more is guessed.
 const STEEPEST: f32 = 1.73;
 /// Readings this near to each other are of one surface, however steep (meters).
@@ -39,7 +40,7 @@ impl<'a> Bridges<'a> {
         down.sort_unstable_by(f32::total_cmp);
         let down = down.get(down.len() / 2).copied().unwrap_or(across);
         // A gap of a single pixel is always narrow enough.
-        let widest = (WIDEST * across.max(down) / across * 1.001) as usize;
+        let widest = ((WIDEST * across.max(down)).max(WIDEST_ANGLE) / across * 1.001) as usize;
         Self { rays, closed, widest }
     }
 
@@ -102,6 +103,8 @@ pub(super) struct Holds {
     pub(super) across: f64,
     /// The same in columns.
     pub(super) down: f64,
+    /// How far readings are apart across the rays, at their median range (meters).
+    pub(super) spacing: f64,
 }
 
 impl Holds {
@@ -130,7 +133,16 @@ impl Holds {
         let above_or_below: usize = rows.windows(2).map(|w| all(w[0]) + all(w[1])).sum();
         let share = |n: usize, of: usize| n as f64 / of.max(1) as f64;
         let own = share(all(&image.values), all(&values));
-        Self { own, across: share(across, beside), down: share(down, above_or_below) }
+        let mut ranges: Vec<f32> = image.values.iter().copied().filter(filled).collect();
+        let middle = ranges.len() / 2;
+        let range = match ranges.is_empty() {
+            true => 0.0,
+            false => f64::from(*ranges.select_nth_unstable_by(middle, f32::total_cmp).1),
+        };
+        let ends = [rays.elevations[0], rays.elevations[rays.elevations.len() - 1]].map(f64::from);
+        let rows = (ends[0] - ends[1]) / (rays.elevations.len() as f64 - 1.0).max(1.0);
+        let spacing = range * (rays.azimuth_step.abs() * rows / own.max(1e-3)).sqrt();
+        Self { own, across: share(across, beside), down: share(down, above_or_below), spacing }
     }
 }
 
@@ -169,7 +181,7 @@ mod tests {
 
     #[test]
     fn wide_gaps_steps_and_free_rays_are_not_bridged() {
-        // Five steps of 0.01 are wider than twice 0.02; a step of 20 cm is steeper than 60 degrees.
+        // Five steps of 0.01 are wider than 0.04; a step of 20 cm is steeper than 60 degrees.
         for row in [
             [3.0, 0.0, 0.0, 0.0, 0.0, 3.0],
             [3.0, 0.0, 3.2, 3.2, 3.2, 3.2],

@@ -29,13 +29,14 @@ impl LayoutFinder {
         self.layout.as_ref()
     }
 
-    /// The range image of points about `origin`, both in the sensor's frame. O(n); O(n log n) where it searches.
+    /// The range image of points about `origin`, both in the sensor's frame, for a map with cells of this edge (meters): the
+    /// coarser they are, the better rays alone show a surface, and the fewer pixels may be missing. O(n); O(n log n) where it searches.
     ///
     /// # Errors
     /// Why points have to be followed ray by ray: they have no rows and columns, or those would lose what the points show.
     /// Of scans that are not searched, why the last one that was had none.
-    pub fn image(&mut self, points: &[[f32; 3]], origin: [f64; 3]) -> Result<RangeImage, WhyRays> {
-        let known = self.layout.as_ref().map(|layout| layout.good_image(points, origin));
+    pub fn image(&mut self, points: &[[f32; 3]], origin: [f64; 3], cell: f64) -> Result<RangeImage, WhyRays> {
+        let known = self.layout.as_ref().map(|layout| layout.good_image(points, origin, cell));
         if let Some(Ok(image)) = known {
             return Ok(image);
         }
@@ -45,7 +46,7 @@ impl LayoutFinder {
         }
         match SphericalLayout::found(points, origin) {
             Ok(layout) => {
-                let image = layout.good_image(points, origin);
+                let image = layout.good_image(points, origin, cell);
                 *self = Self::of(layout);
                 image
             }
@@ -77,12 +78,12 @@ mod tests {
     fn a_layout_is_kept_while_it_explains_points_and_replaced_when_not() {
         let mut finder = LayoutFinder::default();
         let narrow = scan(16, 0.2);
-        assert_eq!(finder.image(&narrow, [0.0; 3]).unwrap().hits(), narrow.len());
+        assert_eq!(finder.image(&narrow, [0.0; 3], 0.1).unwrap().hits(), narrow.len());
         let first = finder.layout().cloned();
-        assert!(finder.image(&narrow[..4000], [0.0; 3]).is_ok());
+        assert!(finder.image(&narrow[..4000], [0.0; 3], 0.1).is_ok());
         assert_eq!(finder.layout().cloned(), first, "part of a scan");
         let wide = scan(32, 0.6);
-        assert_eq!(finder.image(&wide, [0.0; 3]).unwrap().hits(), wide.len());
+        assert_eq!(finder.image(&wide, [0.0; 3], 0.1).unwrap().hits(), wide.len());
         assert_eq!(finder.layout().unwrap().spherical().elevations.len(), 32);
     }
 
@@ -90,11 +91,11 @@ mod tests {
     fn a_scan_that_the_layout_would_lose_is_followed_ray_by_ray() {
         let mut finder = LayoutFinder::default();
         let whole = scan(32, 0.6);
-        assert!(finder.image(&whole, [0.0; 3]).is_ok());
+        assert!(finder.image(&whole, [0.0; 3], 0.1).is_ok());
         // One point in forty, on all rings: holes everywhere.
         let thin: Vec<_> = whole.iter().copied().step_by(41).collect();
-        assert!(finder.image(&thin, [0.0; 3]).is_err());
-        assert!(finder.image(&whole, [0.0; 3]).is_ok(), "the layout is kept");
+        assert!(finder.image(&thin, [0.0; 3], 0.1).is_err());
+        assert!(finder.image(&whole, [0.0; 3], 0.1).is_ok(), "the layout is kept");
     }
 
     #[test]
@@ -105,7 +106,7 @@ mod tests {
         cloud.extend(cloud.clone().iter().map(|p| p.map(|v| 2.0 * v)));
         let rests: Vec<u32> = (0..8)
             .map(|_| {
-                assert_eq!(finder.image(&cloud, [0.0; 3]), Err(WhyRays::SharedPixels));
+                assert_eq!(finder.image(&cloud, [0.0; 3], 0.1), Err(WhyRays::SharedPixels));
                 finder.rest
             })
             .collect();

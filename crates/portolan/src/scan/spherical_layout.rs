@@ -13,7 +13,10 @@ const FEWEST_POINTS: usize = 512;
 const FEWEST_KEPT: f64 = 0.8;
 /// Share of the neighbors of pixels, bridges counted, that must have a value too: an image full of holes shows less surface
 /// than its points.
-const FEWEST_NEIGHBORS: f64 = 0.75;
+const FEWEST_NEIGHBORS: f64 = 0.8;
+/// The same where points are so dense that rays alone show their surface: closer than [`DENSE`] cells.
+const FEWEST_NEIGHBORS_OF_DENSE: f64 = 0.95;
+const DENSE: f64 = 0.3;
 /// Share of the pixels with a value that need a reading of their own; the others are bridges.
 const FEWEST_OWN: f64 = 0.2;
 
@@ -23,7 +26,7 @@ const FEWEST_OWN: f64 = 0.2;
 /// Lidar logs mostly keep points without rows and columns. What sees space between rays through a range image needs them back.
 /// Rings are found as clusters of elevations, columns from the steps of azimuth along rings.
 ///
-/// A layout is only good for points that it keeps: four fifths have a pixel of their own, and three quarters of the pixels beside one
+/// A layout is only good for points that it keeps: four fifths have a pixel of their own, and four fifths of the pixels beside one
 /// with a value, in rows and in columns, have a value too, where gaps of a few pixels within a surface are bridged. Points of
 /// other origins (grids, clouds of several scans, meshes, blurred rings) fail, and are better followed ray by ray.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,18 +60,25 @@ impl SphericalLayout {
             return Err(WhyRays::NoRows);
         }
         let layout = Self::of_rings(&polar).ok_or(WhyRays::NoRows)?;
-        layout.good_image(points, origin)?;
+        layout.good_image(points, origin, 0.0)?;
         Ok(layout)
     }
 
-    /// The image of points that the layout is good for, else why it is not. O(points + pixels).
-    pub(super) fn good_image(&self, points: &[[f32; 3]], origin: [f64; 3]) -> Result<RangeImage, WhyRays> {
+    /// The image of points that the layout is good for in cells of this edge (meters), else why it is not. O(points + pixels).
+    pub(super) fn good_image(
+        &self,
+        points: &[[f32; 3]],
+        origin: [f64; 3],
+        cell: f64,
+    ) -> Result<RangeImage, WhyRays> {
         let image = self.image(points, origin);
         if (image.hits() as f64) < FEWEST_KEPT * points.len() as f64 {
             return Err(WhyRays::SharedPixels);
         }
         let holds = Holds::of(&image, &self.spherical);
-        let whole = holds.across.min(holds.down) >= FEWEST_NEIGHBORS && holds.own >= FEWEST_OWN;
+        let dense = holds.spacing < DENSE * cell;
+        let fewest = if dense { FEWEST_NEIGHBORS_OF_DENSE } else { FEWEST_NEIGHBORS };
+        let whole = holds.across.min(holds.down) >= fewest && holds.own >= FEWEST_OWN;
         if whole { Ok(image) } else { Err(WhyRays::Gaps) }
     }
 

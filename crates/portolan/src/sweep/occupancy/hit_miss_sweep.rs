@@ -183,7 +183,9 @@ impl Sweep<3> for HitMissSweep<PointScan> {
         let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
         let (common, (way, image)) = match &scan.origin {
-            Origin::Common(o) => (world_from_sensor.transform_point(*o), self.organised(scan, *o)?),
+            Origin::Common(o) => {
+                (world_from_sensor.transform_point(*o), self.organised(scan, *o, lattice.resolution)?)
+            }
             Origin::PerPoint(_) => (world_from_sensor.translation, (Way::Rays(WhyRays::OwnOrigins), None)),
         };
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
@@ -231,6 +233,7 @@ impl HitMissSweep<PointScan> {
         &mut self,
         scan: &'a PointScan,
         origin: [f64; 3],
+        cell: f64,
     ) -> Result<(Way, Option<Cow<'a, RangeImage>>), PlanError> {
         if self.sweep == OccupancySweep::Exact {
             return Ok((Way::Rays(WhyRays::Asked), None));
@@ -239,7 +242,7 @@ impl HitMissSweep<PointScan> {
             image.check().map_err(PlanError::BadImage)?;
             return Ok((Way::Stated, Some(Cow::Borrowed(image))));
         }
-        Ok(match self.layout.image(&scan.points, origin) {
+        Ok(match self.layout.image(&scan.points, origin, cell) {
             Ok(image) => (Way::Found, Some(Cow::Owned(image))),
             Err(why) => (Way::Rays(why), None),
         })
