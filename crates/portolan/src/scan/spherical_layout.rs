@@ -16,7 +16,7 @@ const FEWEST_KEPT: f64 = 0.8;
 const FEWEST_NEIGHBORS: f64 = 0.8;
 /// The same where points are so dense that rays alone show their surface: closer than [`DENSE`] cells.
 const FEWEST_NEIGHBORS_OF_DENSE: f64 = 0.95;
-const DENSE: f64 = 0.3;
+const DENSE: f64 = 0.36;
 /// Share of the pixels with a value that need a reading of their own; the others are bridges.
 const FEWEST_OWN: f64 = 0.2;
 
