@@ -76,10 +76,10 @@ impl<'a> Bridges<'a> {
             first = first.or(Some(column));
             last = Some(column);
         }
-        if let (Some(first), Some(last), true) = (first, last, self.closed) {
-            if first + n > last + 1 {
-                bridge(last, first + n);
-            }
+        if let (Some(first), Some(last), true) = (first, last, self.closed)
+            && first + n > last + 1
+        {
+            bridge(last, first + n);
         }
     }
 

@@ -83,8 +83,8 @@ impl Projector {
                 }
             }
         }
-        // (Where nothing is known it is NaN.)
-        cosine.map(|c| c.max(LEAST_COSINE).min(1.0))
+        // Where nothing is known it is NaN, which `max` takes out and `clamp` would not.
+        cosine.map(|c| 1.0f32.min(c.max(LEAST_COSINE)))
     }
 
     /// Distances between points and the rays of pixels near them (meters).
