@@ -446,7 +446,7 @@ fn maps_of_a_kind_that_no_command_reads_are_refused() {
     use portolan_io::{MapFile, TsdfBricks};
     let folder = tempfile::tempdir().unwrap();
     let (in_2d, in_3d) = (folder.path().join("2d.portolan"), folder.path().join("3d.portolan"));
-    let map = Tsdf::<2>::new(TsdfConfig::default()).unwrap();
+    let map = Tsdf::<2>::new(TsdfConfig::textbook()).unwrap();
     let config = *map.config();
     let bricks = TsdfBricks {
         store: map.into_stores().0,

@@ -82,9 +82,9 @@ fn check_ghost(ghost: &Value) {
     assert_eq!(runs.len(), 3);
     for (run, w_max) in runs.iter().zip([4.0f64, 24.0, 64.0]) {
         let predicted = std::f64::consts::LN_2 / (1.0 / w_max).ln_1p();
-        let measured = run["measured"]["half_life"].as_f64().unwrap();
+        let measured = run["saturated"]["half_life"].as_f64().unwrap();
         assert!((measured / predicted - 1.0).abs() < 0.1, "{measured} instead of {predicted}");
-        assert!(run["measured"]["cells"].as_u64().unwrap() >= 8);
+        assert!(run["saturated"]["cells"].as_u64().unwrap() >= 8);
         let noise = &run["static_noise"];
         let ratio = noise["measured"].as_f64().unwrap() / noise["predicted"].as_f64().unwrap();
         assert!((0.9..1.5).contains(&ratio), "noise {ratio} times the prediction");

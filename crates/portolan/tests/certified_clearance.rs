@@ -251,7 +251,7 @@ fn unknown_cells_are_bounded_in_the_plane() {
         let cells = store.keys().into_iter().flat_map(|key| (0..64).map(move |i| key.cell(i)));
         let mut tsdf = Tsdf2::covering(
             &Grid::new([500_000.0 - 1.6; 2], 0.1, [64; 2]),
-            TsdfConfig { truncation: 1.0, ..Default::default() },
+            TsdfConfig { truncation: 1.0, ..TsdfConfig::textbook() },
         )
         .unwrap();
         for (cell, d) in cells.filter_map(|c| Some((c, store.cell(c)?))) {

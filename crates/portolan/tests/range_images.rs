@@ -17,7 +17,7 @@ struct Maps {
 
 impl Maps {
     fn of(frame: &Frame) -> Self {
-        let config = TsdfConfig { resolution: RESOLUTION, ..TsdfConfig::default() };
+        let config = TsdfConfig { resolution: RESOLUTION, ..TsdfConfig::textbook() };
         let lattice = Lattice::new([0.0; 3], RESOLUTION);
         let mut maps = Self {
             distances: Tsdf3::new(config).unwrap(),

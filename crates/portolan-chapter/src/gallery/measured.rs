@@ -34,7 +34,7 @@ impl GallerySettings {
     pub fn new(grid: Grid<2>, probes: usize, surface_length: Option<f64>) -> Self {
         Self {
             grid,
-            tsdf: Default::default(),
+            tsdf: TsdfConfig::textbook(),
             model: Default::default(),
             contour: Default::default(),
             esdf: Default::default(),

@@ -16,7 +16,7 @@ const POINT_BYTES: usize = 2 * 16 + 4;
 fn scans_until_larger() -> (usize, usize) {
     let world = apartment().world;
     let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
-    let tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
+    let tsdf = Tsdf2::covering(&grid, TsdfConfig::textbook()).unwrap();
     let field = esdf_from_tsdf(&tsdf, 0.5, 1.5).memory_bytes();
     let mut points = 0;
     let scans = lap(&world, &LapConfig::default());
@@ -49,7 +49,7 @@ fn after_the_move() -> (f64, f64, Option<f64>) {
     let world = apartment().world;
     let moved = world.with_moved("chair", CHAIR_MOVE);
     let grid = Grid::covering(world.aabb(), 0.05).unwrap();
-    let mut tsdf = Tsdf2::covering(&grid, TsdfConfig { w_max: 4.0, ..TsdfConfig::default() }).unwrap();
+    let mut tsdf = Tsdf2::covering(&grid, TsdfConfig { w_max: 4.0, ..TsdfConfig::textbook() }).unwrap();
     let mut cloud = Cloud::new();
     for (k, world) in [&world, &moved].into_iter().enumerate() {
         for (pose, scan) in lap(world, &LapConfig { first_index: 200 * k as u64, ..Default::default() }) {

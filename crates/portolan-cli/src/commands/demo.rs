@@ -226,12 +226,13 @@ fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), made)
 }
 
-/// Free space weighs as much as a surface, as in the textbook (`map` gives it less).
+/// The textbook's weights: free space weighs as much as a surface and the clamp is 64 (`map` has others).
 fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
     let mut settings = Settings::default();
     settings.shape.resolution = RESOLUTION;
     settings.shape.truncation = Some(TRUNCATION);
     settings.shape.carve_weight = 1.0;
+    settings.shape.forgetting = ForgettingArgs::of(TsdfConfig::<2>::textbook().w_max);
     settings.shape.range = RangeArgs { max_range: Some(lidar.max_range), ..RangeArgs::default() };
     if let Some(w_max) = w_max {
         settings.shape.forgetting = ForgettingArgs::of(w_max);
@@ -245,7 +246,7 @@ fn config_of(settings: &Settings) -> TsdfConfig<2> {
         resolution: settings.resolution(),
         truncation: settings.truncation(),
         w_max: settings.w_max(),
-        ..Default::default()
+        ..TsdfConfig::textbook()
     }
 }
 

@@ -17,7 +17,7 @@ use portolan_io::write_atomic;
 use portolan_sim::{LapConfig, World};
 use serde_json::Value;
 
-use crate::arguments::{Bounds, bounds, bytes, length};
+use crate::arguments::{Bounds, ForgettingArgs, bounds, bytes, length};
 use crate::dimension::Dimension;
 use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
@@ -111,12 +111,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 impl Args {
-    /// As `demo` has them: free space weighs as much as a surface, as in the textbook (`map` gives it less).
+    /// As `demo` has them: the textbook's weights.
     fn settings(&self) -> Settings {
         let mut settings = Settings::default();
         settings.shape.resolution = self.resolution;
         settings.shape.truncation = Some(self.truncation.unwrap_or(3.0 * self.resolution));
         settings.shape.carve_weight = 1.0;
+        settings.shape.forgetting = ForgettingArgs::of(TsdfConfig::<2>::textbook().w_max);
         settings.every = self.every;
         settings.bounds = self.bounds;
         settings.resolved(Dimension::Two)
@@ -147,7 +148,7 @@ pub(crate) fn measure(
         tsdf: TsdfConfig {
             truncation: made_with.truncation(),
             w_max: made_with.w_max(),
-            ..Default::default()
+            ..TsdfConfig::textbook()
         },
         model: OccupancyModel::default(),
         contour: ContourSettings::default(),

@@ -14,7 +14,8 @@ use crate::dimension::{Dimension, ONLY_3D, option};
 use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::log::{LimitArgs, NoReturnArgs, RangeArgs, Selection};
-use portolan::mapper::{CARVE_WEIGHT, MapperSettings};
+use portolan::map::{CARVE_WEIGHT, W_MAX};
+use portolan::mapper::MapperSettings;
 
 /// What shapes the cells: a map can only be gone on with under the same values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
@@ -43,8 +44,8 @@ pub(crate) struct Shape {
     /// Do not fuse the free space in front of surfaces into the signed distances: faster, but free space stays unknown
     #[arg(long = "no-carve", action = clap::ArgAction::SetFalse)]
     pub(crate) carve: bool,
-    /// Weight of free space relative to that of a surface, above 0 and at most 1. A lower weight keeps thin objects, but
-    /// objects that have moved away fade more slowly [default: 0.3; the textbook uses 1]
+    /// Weight of free space relative to that of a surface, above 0 and at most 1. A lower weight keeps thin objects;
+    /// what has gone fades as fast with any [default: 0.2; the textbook uses 1]
     #[arg(long, value_name = "W", value_parser = share, allow_negative_numbers = true, conflicts_with = "carve")]
     #[arg(required = false)]
     #[serde(serialize_with = "four_digits")]
@@ -113,8 +114,6 @@ impl Default for Shape {
     }
 }
 
-/// Clamp of the weight of distances.
-const W_MAX: f32 = 64.0;
 /// Distances of 3-D fields are found up to here (meters).
 const MAX_DISTANCE: f64 = 1.0;
 
@@ -216,7 +215,7 @@ impl Settings {
         Selection { every: self.every, hold_out: self.shape.hold_out }
     }
 
-    /// Observations of weight 1 after which a saturated cell has lost half the error of a stale estimate.
+    /// Observations, of any weight up to 1, after which a saturated cell has lost half the error of a stale estimate.
     fn half_life(&self) -> f64 {
         TsdfRule { truncation: self.truncation() as f32, w_max: self.w_max() }.half_life(1.0)
     }

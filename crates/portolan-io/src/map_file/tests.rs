@@ -113,7 +113,7 @@ fn full<const D: usize>(seed: u64) -> MapFile<D> {
         near.insert(BlockKey([i; D]), brick).unwrap();
     }
     let model = OccupancyModel::default();
-    let config = TsdfConfig { truncation: 0.3, weights: WeightModel::CosIncidence, ..Default::default() };
+    let config = TsdfConfig { truncation: 0.3, weights: WeightModel::CosIncidence, ..TsdfConfig::textbook() };
     let (occupancy, tsdf, colors) = bricks(seed);
     MapFile {
         header: MapHeader {
@@ -196,7 +196,7 @@ fn a_map_without_bricks_is_a_map<const D: usize>() {
 }
 
 fn infinite_weights_survive<const D: usize>() {
-    let config = TsdfConfig { w_max: f32::INFINITY, ..Default::default() };
+    let config = TsdfConfig { w_max: f32::INFINITY, ..TsdfConfig::textbook() };
     let file = MapFile {
         tsdf: Some(DenseTsdf::covering(&Grid::new([0.0; D], config.resolution, [4; D]), config).unwrap()),
         ..Default::default()

@@ -90,7 +90,7 @@ fn tsdf_of(log: &BuildingLog, config: TsdfConfig<3>) -> Tsdf3 {
 #[test]
 fn the_surface_of_lidar_scans_is_3_mm_off_in_the_median() {
     let log = &*LIDAR;
-    let map = tsdf_of(log, TsdfConfig { truncation: 0.15, ..Default::default() });
+    let map = tsdf_of(log, TsdfConfig { truncation: 0.15, ..TsdfConfig::textbook() });
     let errors = surface_errors(&log.world, vertices(&map).into_iter()).unwrap();
     println!("lidar, 5 cm, noise 1 cm: {errors:?}");
     assert!(errors.count > 50_000 && errors.median <= 3e-3, "{errors:?}");
@@ -104,7 +104,7 @@ fn the_surface_and_colours_of_depth_images_are_right() {
         sensor: BuildingSensor::Camera(camera),
         ..Default::default()
     });
-    let map = tsdf_of(&log, TsdfConfig { color: true, truncation: 0.15, ..Default::default() });
+    let map = tsdf_of(&log, TsdfConfig { color: true, truncation: 0.15, ..TsdfConfig::textbook() });
     let points = vertices(&map);
     let errors = surface_errors(&log.world, points.iter().copied()).unwrap();
     println!("depth camera, 5 cm, noise 1 cm: {errors:?}");

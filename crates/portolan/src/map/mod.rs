@@ -28,7 +28,7 @@ pub use occupancy_tree::CoarseOccupancy;
 pub use scan_kind::ScanKind;
 pub use thresholds::{DistanceMap, Thresholds};
 pub use tsdf::Tsdf;
-pub use tsdf_config::{BeamSweep, PointSweep, TsdfConfig};
+pub use tsdf_config::{BeamSweep, CARVE_WEIGHT, PointSweep, TsdfConfig, W_MAX};
 
 use crate::cell::{LogOdds8, SignedDistance};
 use crate::store::{Dense, Tree};

@@ -10,4 +10,4 @@ mod settings;
 mod tests;
 
 pub use maps::{Fused, Mapper};
-pub use settings::{CARVE_WEIGHT, MapperSettings};
+pub use settings::MapperSettings;

@@ -2,13 +2,8 @@
 
 use crate::cell::OccupancyModel;
 use crate::geom::Aabb;
-use crate::map::{BeamSweep, MapError, PointSweep, TsdfConfig};
+use crate::map::{BeamSweep, CARVE_WEIGHT, MapError, PointSweep, TsdfConfig, W_MAX};
 use crate::sweep::{LONGEST_RAY_CELLS, OccupancySweep, WeightModel};
-
-/// Weight of free space against a surface's 1: on real logs, full of table legs, surfaces that weigh as much as the beams
-/// that pass beside them are carved away (Intel Research Lab at 5 cm: 85.0 % of held-out ranges within two cells, 82.1 with
-/// a weight of 1).
-pub const CARVE_WEIGHT: f32 = 0.3;
 
 /// Settings of a [`Mapper`](super::Mapper).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +15,7 @@ pub struct MapperSettings<const D: usize> {
     pub origin: Option<[f64; D]>,
     /// Truncation of the signed distances (meters); `None`: three cells.
     pub truncation: Option<f64>,
-    /// Clamp of the weight of signed distances. Infinity: never forget.
+    /// Clamp of the weight of signed distances, in observations ([`TsdfConfig::w_max`]). Infinity: never forget.
     pub w_max: f32,
     /// Whether free space goes into the signed distances. Without it is unknown there.
     pub carve: bool,
@@ -47,14 +42,14 @@ pub struct MapperSettings<const D: usize> {
 }
 
 impl<const D: usize> MapperSettings<D> {
-    /// Both maps with cells of this edge (meters): truncation three cells, free space at [`CARVE_WEIGHT`], clamp 64,
+    /// Both maps with cells of this edge (meters): truncation three cells, free space at [`CARVE_WEIGHT`], clamp [`W_MAX`],
     /// Euclidean distances up to a meter, no limit of memory.
     pub fn new(resolution: f64) -> Self {
         Self {
             resolution,
             origin: None,
             truncation: None,
-            w_max: 64.0,
+            w_max: W_MAX,
             carve: true,
             carve_weight: CARVE_WEIGHT,
             weights: WeightModel::default(),
