@@ -48,6 +48,10 @@ pub(crate) struct Args {
     poses: PosesArg,
     #[command(flatten)]
     forgetting: ForgettingArgs,
+    /// Accuracy is the median over worlds turned by these angles against the lattice, and shifted by parts of a cell
+    /// (degrees, separated by commas) [default: 0,10,17,30,45; a second or so for each]
+    #[arg(long, value_name = "DEGREES", value_delimiter = ',', allow_negative_numbers = true, value_parser = gallery::degrees)]
+    turn: Vec<f64>,
     /// Leave out the experiment with the moved chair
     #[arg(long)]
     no_ghost: bool,
@@ -104,9 +108,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (mut file, fusion) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
     describe(&mut file, &settings, &config, &fusion.stats);
     let derived = run.timed("derive", || Derived::of(&file, &settings, usize::MAX));
-    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings)))?;
-    let gallery =
+    let turns = gallery::turns(&args.turn);
+    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings), &turns))?;
+    let mut gallery =
         run.timed("gallery", || gallery::measure(&scans, &grid, &settings, PROBES, Some(&world)))?;
+    let turned =
+        run.timed("turned", || gallery::measure_turned(&scans, &grid, &settings, &world, &args.turn))?;
+    gallery.turned = Some(turned);
 
     gallery::make_folder(&args.out)?;
     let scene = Scene { gallery: &gallery, log: &scans, poses: drift.chosen.poses(), world: Some(&world) };
