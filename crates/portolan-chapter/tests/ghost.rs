@@ -77,11 +77,7 @@ fn the_half_life_is_the_promised_one_whatever_the_weights() {
         let m = &run.saturated;
         assert!(m.cells > 30, "{weights:?}");
         let promised = std::f64::consts::LN_2 / 0.25f64.ln_1p();
-        assert!(
-            (m.half_life_measured / promised - 1.0).abs() < 0.2,
-            "{weights:?}: {}",
-            m.half_life_measured
-        );
+        assert!((m.half_life_measured / promised - 1.0).abs() < 0.2, "{weights:?}: {}", m.half_life_measured);
         if weights == WeightModel::InverseSquare {
             // The looks are light ones, which at the clamp in units of weight took four times as long.
             assert!(m.weight < 0.5);

@@ -47,7 +47,8 @@ impl Corridor<2> for Tsdf2 {
     fn see(&mut self, tangents: &[f64], wall: f64) {
         let bearings: Vec<f64> = tangents.iter().map(|t| t.atan()).collect();
         let ranges: Vec<f64> = bearings.iter().map(|b| wall / b.cos()).collect();
-        self.integrate(&Pose::IDENTITY, &Scan::from_laser(&bearings, &ranges, &RangeLimits::default())).unwrap();
+        self.integrate(&Pose::IDENTITY, &Scan::from_laser(&bearings, &ranges, &RangeLimits::default()))
+            .unwrap();
     }
 
     fn behind(&self, wall: f64) -> f64 {
@@ -69,7 +70,8 @@ impl Corridor<3> for Tsdf3 {
 
     fn see(&mut self, tangents: &[f64], wall: f64) {
         let at = |t: f64| (wall * t) as f32;
-        let points = tangents.iter().flat_map(|&y| tangents.iter().map(move |&z| [wall as f32, at(y), at(z)]));
+        let points =
+            tangents.iter().flat_map(|&y| tangents.iter().map(move |&z| [wall as f32, at(y), at(z)]));
         self.integrate(&Pose::IDENTITY, &Frame::Points(PointScan::new(points, [0.0; 3]))).unwrap();
     }
 

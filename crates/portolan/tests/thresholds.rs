@@ -41,8 +41,13 @@ impl Wall<3> for Tsdf3 {
     fn seen(weights: WeightModel, carve_weight: f32) -> Self {
         let at = |i: u16| 0.03 * f32::from(i) - 2.0;
         let points = (0..133 * 133).map(|n| [4.0, at(n % 133), at(n / 133)]);
-        let config =
-            TsdfConfig { resolution: R, truncation: 3.0 * R, weights, carve_weight, ..TsdfConfig::textbook() };
+        let config = TsdfConfig {
+            resolution: R,
+            truncation: 3.0 * R,
+            weights,
+            carve_weight,
+            ..TsdfConfig::textbook()
+        };
         let mut map = Tsdf3::new(config).unwrap();
         map.integrate(&Pose::IDENTITY, &Frame::Points(PointScan::new(points, [0.0; 3]))).unwrap();
         map

@@ -397,7 +397,7 @@ fn watched_cells_tell_what_happened() {
 
 #[test]
 fn lattice_is_the_one_that_was_asked_for() {
-    let map =
-        Tsdf3::new(TsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..TsdfConfig::textbook() }).unwrap();
+    let map = Tsdf3::new(TsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..TsdfConfig::textbook() })
+        .unwrap();
     assert_eq!(*map.lattice(), Lattice::new([1.0, 2.0, 3.0], 0.1));
 }

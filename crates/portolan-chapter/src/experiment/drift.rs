@@ -81,7 +81,8 @@ impl Drift {
         let lap = correct(start, &motions, &scans, &settings)?;
         let before = PoseErrors::absolute(&lap.odometry, &truth);
         let after = PoseErrors::absolute(&lap.poses, &truth);
-        let drift = Self { truth, lap, chosen, before, after, contours: [None; 3], contours_as_drawn: [None; 3] };
+        let drift =
+            Self { truth, lap, chosen, before, after, contours: [None; 3], contours_as_drawn: [None; 3] };
         let log = drift.poses(chosen).iter().copied().zip(scans).collect();
         Ok((drift, log))
     }

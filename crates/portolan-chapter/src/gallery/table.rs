@@ -84,8 +84,7 @@ fn rows(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
             bytes(row.memory_bytes, row.derived),
             time(row.update),
             time(row.occupancy),
-            beside
-                .told(|a| a.rows[i].occupancy_wrong.map_or("-".into(), |w| format!("{:.2} %", 100.0 * w))),
+            beside.told(|a| a.rows[i].occupancy_wrong.map_or("-".into(), |w| format!("{:.2} %", 100.0 * w))),
             time(row.distance),
             beside.told(|a| millimetres(a.rows[i].distance_error)),
             time(row.surface),
@@ -145,8 +144,15 @@ fn crossovers(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
 }
 
 fn fields(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
-    let header =
-        ["distance field", "rebuild", "off the contour, mm", "99 %", "too large by", "off the world", "gradient"];
+    let header = [
+        "distance field",
+        "rebuild",
+        "off the contour, mm",
+        "99 %",
+        "too large by",
+        "off the world",
+        "gradient",
+    ];
     let mm = |v: Option<f64>| v.map_or("-".into(), |v| format!("{:.2}", 1e3 * v));
     let mut lines = vec![header.map(String::from)];
     let beside = Beside::of(gallery);

@@ -5,7 +5,7 @@
 //! median over those.
 
 use super::against_truth::hold_against_truth;
-use super::asker::{Asker, observed_free};
+use super::asker::{Asker, candidates, observed_free};
 use super::build::build;
 use super::measured::{Gallery, GallerySettings};
 use super::probes::points;
@@ -198,15 +198,17 @@ fn in_world(
     for corner in [drawn.min, drawn.max, [drawn.min[0], drawn.max[1]], [drawn.max[0], drawn.min[1]]] {
         turned.include(pose.transform_point(corner));
     }
+    let candidates = candidates(&settings.grid);
     let grid = Grid::covering(turned, resolution).ok_or(MapError::Resolution(resolution))?;
     let settings = GallerySettings { grid, ..settings.clone() };
     let truth = TurnedTruth::new(truth, &pose);
     let mut gallery = build(&turn.of_log(log, resolution), &settings, &mut || 0.0)?;
     // The same questions as in the world as it is drawn.
-    let everywhere: Vec<_> =
-        points(&drawn, settings.probes).into_iter().map(|p| pose.transform_point(p)).collect();
+    let asked =
+        |points: Vec<[f64; 2]>| points.into_iter().map(|p| pose.transform_point(p)).collect::<Vec<_>>();
+    let (everywhere, candidates) = (asked(points(&drawn, settings.probes)), asked(candidates));
     let min_weight = settings.esdf.min_weight.unwrap_or(gallery.tsdf.thresholds().observed);
-    let free = observed_free(&gallery.tsdf, min_weight, Some(&truth));
+    let free = observed_free(&gallery.tsdf, candidates, min_weight, Some(&truth));
     hold_against_truth(&mut gallery, &Asker { truth: Some(&truth), free, everywhere: &everywhere, grid });
     Ok(Accuracy::of(&gallery))
 }

@@ -20,11 +20,9 @@ fn beside(gallery: &Gallery, tell: impl Fn(&Accuracy) -> Option<String>) -> Stri
 
 /// Median, p99, worst over, worst under in millimeters.
 fn cells(gallery: &Gallery, of: impl Fn(&Accuracy) -> Option<ErrorSummary>) -> Vec<String> {
-    let parts: [fn(&ErrorSummary) -> f64; 4] =
-        [|e| e.median, |e| e.p99, |e| e.worst_over, |e| e.worst_under];
-    let cell = |part: fn(&ErrorSummary) -> f64| {
-        beside(gallery, |a| of(a).map(|e| format!("{:.1}", 1e3 * part(&e))))
-    };
+    let parts: [fn(&ErrorSummary) -> f64; 4] = [|e| e.median, |e| e.p99, |e| e.worst_over, |e| e.worst_under];
+    let cell =
+        |part: fn(&ErrorSummary) -> f64| beside(gallery, |a| of(a).map(|e| format!("{:.1}", 1e3 * part(&e))));
     parts.into_iter().map(cell).collect()
 }
 
@@ -44,7 +42,9 @@ fn worlds(gallery: &Gallery) -> String {
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     facts.scene.world?;
     let gallery = facts.scene.gallery;
-    let body = [worlds(gallery), distances(gallery), fields(gallery), surfaces(gallery), gradients(&facts.scene)].concat();
+    let body =
+        [worlds(gallery), distances(gallery), fields(gallery), surfaces(gallery), gradients(&facts.scene)]
+            .concat();
     Some(Section {
         title: "How true the answers are",
         body,
@@ -104,9 +104,7 @@ fn surfaces(gallery: &Gallery) -> String {
             };
             let mut row = vec![escaped(&r.name)];
             row.extend(parts.map(error));
-            row.push(
-                beside(gallery, |a| a.rows[i].occupancy_wrong.map(|w| format!("{:.2} %", 100.0 * w))),
-            );
+            row.push(beside(gallery, |a| a.rows[i].occupancy_wrong.map(|w| format!("{:.2} %", 100.0 * w))));
             row
         })
         .collect();
@@ -118,9 +116,9 @@ fn surfaces(gallery: &Gallery) -> String {
          <p>The text asks the contour by its crossing number, which counts on closed outlines. Seen from its rooms a building \
          is none: of the outer walls only the inner faces were observed, and every count is off by one. Here the first segment \
          that a ray meets decides, by the side that it shows; through a gap in the contour it still sees the wrong wall.</p>\
-         <p>Thin walls come out too thick. Each side's claim reaches the truncation deep and meets the other side's there: at \
-         τ = 15 cm a wall of 10 cm comes out 11.1 cm thick, at τ = 30 cm 16.4 cm. Walls between τ and 2 τ keep their faces. A \
-         smaller truncation is the remedy, as far as the noise of the range allows.</p>",
+         <p>Thin walls come out too thick. Each side's claim reaches the truncation deep and meets the other side's there, \
+         where it is thinner than τ; walls between τ and 2 τ keep their faces. A smaller truncation is the remedy, as far as \
+         the noise of the range allows.</p>",
         table(&header, &rows, &[])
     )
 }

@@ -9,7 +9,12 @@ use crate::pictures;
 
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let forgetting = facts.forgetting?;
-    let body = format!("{}{}{}", half_lives(forgetting), failures(&forgetting.ghost.per_w_max), PRICE);
+    let body = format!(
+        "{}{}{}",
+        half_lives(forgetting),
+        failures(&forgetting.ghost.per_w_max),
+        price(&forgetting.ghost.per_w_max)
+    );
     Some(Section {
         title: "The ghost of the chair, and what forgetting costs",
         body,
@@ -120,8 +125,18 @@ fn failures(runs: &[GhostRun]) -> String {
 }
 
 /// What forgetting costs.
-const PRICE: &str = "<p><b>What forgetting costs.</b> A map that forgets never comes to rest: where nothing moves, its cells keep the standard \
+fn price(runs: &[GhostRun]) -> String {
+    let noise = |run: &GhostRun| Some((run.w_max, run.static_noise?.measured));
+    let compared = match (runs.first().and_then(noise), runs.last().and_then(noise)) {
+        (Some((short, noisy)), Some((long, calm))) if long > short => {
+            format!("{:.0} times the memory, {:.2} of the noise", long / short, calm / noisy)
+        }
+        _ => "The longer the memory, the less noise".to_owned(),
+    };
+    format!(
+        "<p><b>What forgetting costs.</b> A map that forgets never comes to rest: where nothing moves, its cells keep the standard \
          deviation σ / √(2 <i>W<sub>max</sub></i> + <i>w</i>). The last two columns are the same three maps in a world that stands \
          still. The measured noise lies above the prediction, more so for large clamps: lost beams make the mix of views differ from \
-         lap to lap, and each view has a bias of its own. Sixteen times the memory, about a third of the noise: choose by how often \
-         things move.</p>";
+         lap to lap, and each view has a bias of its own. {compared}: choose by how often things move.</p>"
+    )
+}

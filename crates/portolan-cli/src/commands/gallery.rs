@@ -179,7 +179,11 @@ pub(crate) fn turns(degrees: &[f64]) -> Vec<Turn> {
 
 /// An angle.
 pub(crate) fn degrees(text: &str) -> Result<f64, String> {
-    text.trim().parse().ok().filter(|d: &f64| d.is_finite()).ok_or_else(|| "must be an angle in degrees".to_owned())
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|d: &f64| d.is_finite())
+        .ok_or_else(|| "must be an angle in degrees".to_owned())
 }
 
 fn gallery_settings(

@@ -40,11 +40,15 @@ fn assert_labels(resolution: f64, sweep: OccupancySweep, most_lost: f64) {
     let lost = [0.26, 0.0].map(|least_cos| {
         let seen = seen_surface(&log.world, &surface, &log.scans, 0.5 * resolution, least_cos);
         let lost = score_surface(&seen, resolution, is_free);
+        let at_the_point = score_surface(&seen, 0.0, is_free);
         println!(
-            "  of {} points of surface seen with a cosine of {least_cos} or more {:.3} % called free, {:.2} % occupied",
+            "  of {} points of surface seen with a cosine of {least_cos} or more {:.3} % called free, {:.2} % occupied, within a \
+             voxel along the axes; at the very point {:.2} % free, {:.2} % occupied",
             seen.len(),
             100.0 * lost.free_share(),
             100.0 * lost.occupied_share(),
+            100.0 * at_the_point.free_share(),
+            100.0 * at_the_point.occupied_share(),
         );
         lost
     });
