@@ -4,10 +4,12 @@
 
 mod truth;
 
+use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::Lattice;
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan::sweep::OccupancySweep;
+use portolan_sim::ErrorSummary;
 use portolan_sim::building::{BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, building_log};
 use std::sync::LazyLock;
 use truth::{free_points, score_free, score_surface, seen_surface, surface_errors, surface_points};
@@ -98,6 +100,22 @@ fn the_surface_of_lidar_scans_is_3_mm_off_in_the_median() {
     let errors = surface_errors(&log.world, vertices(&map).into_iter()).unwrap();
     println!("lidar, 5 cm, noise 1 cm: {errors:?}");
     assert!(errors.count > 50_000 && errors.median <= 3e-3, "{errors:?}");
+}
+
+/// Clearance against the true walls, everywhere in free space that was seen and not only beside surfaces.
+#[test]
+fn distances_of_lidar_scans_are_those_to_the_true_walls() {
+    let log = &*LIDAR;
+    let map = tsdf_of(log, TsdfConfig { truncation: 0.15, ..TsdfConfig::textbook() });
+    let esdf = Esdf::of(&map, &EsdfSettings::of(&map));
+    let probes = free_points(&log.world, &log.scans, 0.05, 20_000, 3);
+    let errors: Vec<f64> = probes
+        .iter()
+        .filter_map(|&p| Some(esdf.distance(p).known()? - log.world.signed_distance(p)))
+        .collect();
+    let errors = ErrorSummary::of(errors).unwrap();
+    println!("clearance in 3-D, 5 cm, noise 1 cm: {errors:?} of {} probes", probes.len());
+    assert!(errors.count > probes.len() / 2 && errors.median <= 5e-3, "{errors:?}");
 }
 
 #[test]
