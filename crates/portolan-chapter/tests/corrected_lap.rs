@@ -76,7 +76,7 @@ fn optimised_poses_are_within_centimetres() {
 /// Distances of the vertices of the map's contour to the nearest true wall (meters).
 fn map_errors(lap: &Lap, poses: &[Pose<2>]) -> ErrorMeasures {
     let grid = Grid::covering(lap.world.aabb().grown(0.5), 0.05).unwrap();
-    let mut tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
+    let mut tsdf = Tsdf2::covering(&grid, TsdfConfig::textbook()).unwrap();
     for (pose, scan) in poses.iter().zip(&lap.scans) {
         tsdf.integrate(pose, scan).unwrap();
     }

@@ -27,7 +27,7 @@ const TABLE: [[f64; 5]; 6] = [
 
 #[test]
 fn chapter19_voxel_filter_table() {
-    let config = TsdfConfig { truncation: 0.20, w_max: 4.0, ..Default::default() };
+    let config = TsdfConfig { truncation: 0.20, w_max: 4.0, ..TsdfConfig::textbook() };
     let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 1.0, [1, 1]), config).unwrap();
     let rule = TsdfRule { truncation: 0.20, w_max: 4.0 };
     let (mut d, mut w) = (0.0, 0.0);

@@ -43,6 +43,11 @@ pub(crate) fn share(text: &str) -> Result<f32, String> {
     number_that(text, fits, "above 0 and at most 1").map(|v| v as f32)
 }
 
+/// A share of beams, or 0.
+pub(crate) fn thin(text: &str) -> Result<f64, String> {
+    number_that(text, |v| (0.0..1.0).contains(&v), "0, or a share below 1")
+}
+
 /// A number of observations; `inf` is one.
 pub(crate) fn half_life(text: &str) -> Result<f64, String> {
     number_that(text, |v| v >= 0.1, "a number of observations, 0.1 or more, or inf to never forget")
@@ -51,11 +56,12 @@ pub(crate) fn half_life(text: &str) -> Result<f64, String> {
 /// How soon distances forget, in either of two units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 pub(crate) struct ForgettingArgs {
-    /// Largest weight of a cell; inf: old observations are never forgotten [default: 64]
+    /// Largest weight of a cell, in observations; inf: old ones are never forgotten [default: 128; demo: 64]
     #[arg(long, value_name = "W", value_parser = weight, allow_negative_numbers = true)]
     #[serde(serialize_with = "finite", deserialize_with = "infinite", default = "never")]
     w_max: Option<f32>,
-    /// --w-max as a half-life: the number of observations after which half of an outdated distance is left
+    /// --w-max as a half-life: the number of observations, whatever they weigh, after which half of an outdated distance is
+    /// left [default: 89; demo: 45]
     #[arg(long, value_name = "N", value_parser = half_life, allow_negative_numbers = true, conflicts_with = "w_max")]
     #[serde(skip)]
     half_life: Option<f64>,

@@ -1,13 +1,15 @@
-//! Distance fields of 2-D maps, and the methods of both dimensions.
+//! Distance fields of saved maps.
 
-use anyhow::Context;
-use portolan::cell::DistancePlanes;
-use portolan::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings};
-use portolan::geom::{Grid, vector};
+use anyhow::{Context, ensure};
+use portolan::cell::{DistancePlanes, LogOdds8};
+use portolan::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings, ObstacleCells};
+use portolan::geom::{Grid, Lattice, vector};
 use portolan::map::{Tsdf2, TsdfConfig};
-use portolan::store::Dense;
-use portolan_io::MapCell;
+use portolan::store::{Bricks, Dense, Store};
+use portolan_io::{MapCell, MapFile, TsdfBricks};
 use serde::{Deserialize, Serialize};
+
+use crate::mapping::Settings;
 
 /// What distances are measured to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
@@ -33,18 +35,97 @@ impl EsdfArg {
     }
 }
 
-/// The field of a 2-D map, as far as the method reaches (509 cells where it is accurate), with distances to
-/// unknown cells where they are wanted.
-pub(crate) fn esdf_2d(tsdf: &Tsdf2, method: EsdfArg, unknown: bool) -> Esdf<2> {
-    let grid = tsdf.grid();
-    let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
-    let how = EsdfSettings { max_distance, method: method.method(), unknown, ..EsdfSettings::default() };
-    Esdf::of(tsdf, &how)
+/// How the distance field of a saved map is made.
+#[derive(Clone, Copy)]
+pub(crate) struct FieldHow {
+    pub(crate) method: EsdfArg,
+    /// Whether distances to unknown cells are wanted.
+    pub(crate) unknown: bool,
+    /// Share of beams that makes a cell an obstacle without a surface; 0: only surfaces are.
+    pub(crate) thin: f64,
+    /// Of 3-D fields (meters).
+    pub(crate) max_distance: f64,
 }
 
-/// The cells of the field of a 2-D map.
-pub(crate) fn dense_esdf_2d(tsdf: &Tsdf2, method: EsdfArg) -> EsdfGrid<2> {
-    esdf_2d(tsdf, method, false).dense(tsdf.grid())
+impl FieldHow {
+    /// As a map with these settings makes it.
+    pub(crate) fn of(settings: &Settings) -> Self {
+        let max_distance = settings.max_distance;
+        Self { method: settings.esdf, unknown: false, thin: settings.thin, max_distance }
+    }
+
+    fn settings(&self) -> EsdfSettings {
+        EsdfSettings {
+            max_distance: self.max_distance,
+            method: self.method.method(),
+            unknown: self.unknown,
+            ..EsdfSettings::default()
+        }
+    }
+}
+
+/// The field of a 2-D map, as far as the method reaches (509 cells where it is accurate), around the surface and what the
+/// other maps of the file say stops beams.
+///
+/// # Errors
+/// Where the maps of the file do not fit each other.
+pub(crate) fn esdf_2d(file: &MapFile<2>, tsdf: &Tsdf2, how: &FieldHow) -> anyhow::Result<Esdf<2>> {
+    let grid = tsdf.grid();
+    let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
+    let settings = EsdfSettings { max_distance, ..how.settings() };
+    Ok(Esdf::with_obstacles(tsdf, &obstacle_cells_2d(file, tsdf, how.thin)?, &settings))
+}
+
+/// The field of a 3-D map, likewise, up to a largest distance.
+pub(crate) fn esdf_3d(file: &MapFile<3>, tsdf: &TsdfBricks<3>, how: &FieldHow) -> anyhow::Result<Esdf<3>> {
+    let mut cells = ObstacleCells::default();
+    if let Some(map) = file.occupancy_bricks.as_ref().filter(|_| how.thin > 0.0) {
+        ensure!(map.store.lattice() == tsdf.store.lattice(), LATTICES);
+        cells.follow_occupancy(&map.store);
+    }
+    follow_attenuation(&mut cells, file, tsdf.store.lattice(), how.thin)?;
+    Ok(Esdf::with_obstacles(tsdf, &cells, &how.settings()))
+}
+
+const LATTICES: &str = "the maps of the file have not the same cells";
+
+fn obstacle_cells_2d(file: &MapFile<2>, tsdf: &Tsdf2, thin: f64) -> anyhow::Result<ObstacleCells<2>> {
+    let mut cells = ObstacleCells::default();
+    if thin == 0.0 {
+        return Ok(cells);
+    }
+    let lattice = *tsdf.lattice();
+    let on_lattice = |dense: &Dense<LogOdds8, 2>| Bricks::of_dense(dense, lattice).context(LATTICES);
+    let occupancy = match (&file.grid, &file.tree) {
+        (Some(map), _) => Some(on_lattice(map.store())?),
+        (None, Some(map)) => {
+            let own = map.store().to_bricks(*map.store().lattice(), usize::MAX)?;
+            Some(on_lattice(&Dense::of_bricks(&own, *tsdf.grid()).context(LATTICES)?)?)
+        }
+        (None, None) => None,
+    };
+    occupancy.iter().for_each(|map| cells.follow_occupancy(map));
+    follow_attenuation(&mut cells, file, &lattice, thin)?;
+    Ok(cells)
+}
+
+fn follow_attenuation<const D: usize>(
+    cells: &mut ObstacleCells<D>,
+    file: &MapFile<D>,
+    lattice: &Lattice<D>,
+    thin: f64,
+) -> anyhow::Result<()> {
+    if let Some(map) = file.attenuation.as_ref().filter(|_| thin > 0.0) {
+        ensure!(map.store.lattice() == lattice, LATTICES);
+        cells.follow_attenuation(&map.store, thin);
+    }
+    Ok(())
+}
+
+/// A 2-D field around the surface alone, where nothing else is known.
+pub(crate) fn esdf_of_surface(tsdf: &Tsdf2) -> anyhow::Result<EsdfGrid<2>> {
+    let how = FieldHow { thin: 0.0, ..FieldHow::of(&Settings::default()) };
+    Ok(esdf_2d(&MapFile::default(), tsdf, &how)?.dense(tsdf.grid()))
 }
 
 /// The status plane of a file, where it holds more than NaN does.

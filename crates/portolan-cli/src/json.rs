@@ -1,7 +1,7 @@
 //! Library values as JSON.
 
 use portolan::geom::{Aabb, Grid};
-use portolan::scan::{RefusedBeams, ScanStats};
+use portolan::scan::{RefusedBeams, ScanStats, ScanWays, Way, WhyRays};
 use portolan_io::scan_log::ScanLogStats;
 use portolan_io::{CarmenStats, TimeOrder};
 use serde_json::{Map, Value, json};
@@ -27,6 +27,22 @@ pub(crate) fn stats(stats: &ScanStats) -> Value {
         "refused_beams": {
             "total": r.total(), "not_finite": r.not_finite, "negative": r.negative, "too_near": r.too_near,
             "too_far": r.too_far,
+        },
+    })
+}
+
+/// 3-D scans by how they became evidence, and why.
+pub(crate) fn ways(ways: &ScanWays) -> Value {
+    let rays = |why| ways.count(Way::Rays(why));
+    json!({
+        "rows_and_columns": { "of_the_log": ways.count(Way::Stated), "found_in_points": ways.count(Way::Found) },
+        "exact_rays": {
+            "asked_for": rays(WhyRays::Asked),
+            "an_origin_for_each_point": rays(WhyRays::OwnOrigins),
+            "colors": rays(WhyRays::Colors),
+            "no_rows_and_columns_found": rays(WhyRays::NoRows),
+            "rows_and_columns_would_lose_points": rays(WhyRays::SharedPixels),
+            "rows_and_columns_would_have_gaps": rays(WhyRays::Gaps),
         },
     })
 }

@@ -87,6 +87,7 @@ impl SavedMap {
                 ("grid", file.grid.as_ref().map(|map| map.memory_bytes())),
                 ("tree", file.tree.as_ref().map(|map| map.memory_bytes())),
                 ("tsdf", file.tsdf.as_ref().map(|map| map.memory_bytes())),
+                ("attenuation", file.attenuation.as_ref().map(|map| map.store.memory_bytes())),
             ],
             Self::Three(file) => {
                 let colors = file.color_bricks.as_ref().map_or(0, |map| map.store.memory_bytes());
@@ -94,6 +95,7 @@ impl SavedMap {
                     ("grid", None),
                     ("tree", file.occupancy_bricks.as_ref().map(|map| map.store.memory_bytes())),
                     ("tsdf", file.tsdf_bricks.as_ref().map(|map| map.store.memory_bytes() + colors)),
+                    ("attenuation", file.attenuation.as_ref().map(|map| map.store.memory_bytes())),
                 ]
             }
         };

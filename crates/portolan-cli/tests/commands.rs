@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 
 use support::{arg, fail, json, log_lines, map, portolan, range, room, succeed};
 
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     "contour.geojson",
     "contour.svg",
     "esdf.bin",
@@ -17,6 +17,7 @@ const FILES: [&str; 8] = [
     "map.png",
     "map.portolan",
     "map.yaml",
+    "obstacles.csv",
     "summary.json",
 ];
 
@@ -91,16 +92,17 @@ fn queries_answer_with_distance_and_gradient() {
     std::fs::write(&points, "x,y\n0.5,2.0 # left wall\n-0.06,2\n3,2\n100,100\n").unwrap();
     let text = succeed(["query", arg(&out), "--points", arg(&points)]);
     let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
-    assert_eq!(rows[0].join(","), "x,y,status,occupancy,distance,lower,upper,gx,gy");
+    assert_eq!(rows[0].join(","), "x,y,status,occupancy,distance,lower,upper,gx,gy,unknown_as");
     let number = |row: usize, column: usize| rows[row][column].parse::<f64>().unwrap();
     assert_eq!(rows[1][2], "known");
     assert!(number(1, 3) < 0.2 && (number(1, 4) - 0.5).abs() < 0.06 && (number(1, 7) - 1.0).abs() < 0.1);
     assert!(number(2, 4) < 0.0 && rows[2][2] == "known");
     for row in [1, 2] {
-        // Certified to within a tenth of a cell here, beside a straight wall; without the sign of the side.
-        let (distance, lower, upper) = (number(row, 4).abs(), number(row, 5), number(row, 6));
-        assert!(lower <= upper && upper - lower < 0.005, "{lower} {upper}");
-        assert!(lower - 0.01 < distance && distance < upper + 0.01, "{distance} not near {lower} to {upper}");
+        // Certified to within a tenth of a cell here, beside a straight wall; of one sign.
+        let (distance, lower, upper) = (number(row, 4), number(row, 5), number(row, 6));
+        assert!(upper - lower < 0.005 && lower.signum() == upper.signum(), "{lower} {upper}");
+        assert!(lower <= distance && distance <= upper, "{distance} not within {lower} to {upper}");
+        assert_eq!(rows[row][9], "obstacle");
     }
     let seeded = succeed(["query", arg(&out), "--points", arg(&points), "--esdf", "seeded"]);
     assert_eq!(seeded.lines().nth(1).unwrap().split(',').skip(5).take(2).collect::<String>(), "");
@@ -112,8 +114,8 @@ fn queries_answer_with_distance_and_gradient() {
     };
     assert!(lower("pessimistic") <= lower("optimistic") && lower("pessimistic") > 0.2);
     std::fs::write(&points, "x,y\n0.5,2.0\n-0.06,2\n3,2\n100,100\n").unwrap();
-    assert_eq!(rows[3][2..], ["unknown", "", "", "", "", "", ""]);
-    assert_eq!(rows[4][2..], ["outside", "", "", "", "", "", ""]);
+    assert_eq!(rows[3][2..], ["unknown", "", "", "", "", "", "", ""]);
+    assert_eq!(rows[4][2..], ["outside", "", "", "", "", "", "", ""]);
     assert_eq!(rows.len(), 5);
 
     let mut child = Command::new(env!("CARGO_BIN_EXE_portolan"))
@@ -147,7 +149,7 @@ fn saturated_cells_answer_at_least_so_far() {
     std::fs::write(&points, "1,1\n3,1\n").unwrap();
     let text = succeed(["query", arg(&path), "--points", arg(&points)]);
     let rows: Vec<_> = text.lines().skip(1).collect();
-    assert_eq!(rows, ["1,1,known,,1,,,0,0", "3,1,saturated,,-2,2,,,"]);
+    assert_eq!(rows, ["1,1,known,,1,,,0,0,", "3,1,saturated,,-2,,-2,,,"]);
 }
 
 #[test]
@@ -429,7 +431,7 @@ fn append_keeps_maps_that_are_not_asked_for() {
 #[test]
 fn maps_agree_on_what_lies_outside_of_bounds() {
     let (folder, log) = room();
-    let counts = ["grid", "tree", "tsdf"].map(|kind| {
+    let counts = ["grid", "tree", "tsdf", "attenuation"].map(|kind| {
         let out = folder.path().join(kind);
         let bounds = ["--resolution", "0.1", "--bounds", "1,1,3,3", "--maps", kind];
         json([&["map", arg(&log), "--out", arg(&out), "--json"][..], &bounds].concat())["beams"].clone()
@@ -446,7 +448,7 @@ fn maps_of_a_kind_that_no_command_reads_are_refused() {
     use portolan_io::{MapFile, TsdfBricks};
     let folder = tempfile::tempdir().unwrap();
     let (in_2d, in_3d) = (folder.path().join("2d.portolan"), folder.path().join("3d.portolan"));
-    let map = Tsdf::<2>::new(TsdfConfig::default()).unwrap();
+    let map = Tsdf::<2>::new(TsdfConfig::textbook()).unwrap();
     let config = *map.config();
     let bricks = TsdfBricks {
         store: map.into_stores().0,

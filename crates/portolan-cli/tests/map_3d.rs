@@ -33,7 +33,16 @@ fn a_lidar_log_becomes_all_maps() {
     assert!(text.contains("6 of 6 scans fused (kitti)"), "{text}");
     assert_eq!(
         files_in(&out),
-        ["esdf.bin", "map.portolan", "mesh.ply", "octree.bt", "octree.ot", "preview.png", "summary.json"]
+        [
+            "esdf.bin",
+            "map.portolan",
+            "mesh.ply",
+            "obstacles.csv",
+            "octree.bt",
+            "octree.ot",
+            "preview.png",
+            "summary.json"
+        ]
     );
     let summary = summary(&out);
     assert_eq!(summary["scans"]["fused"], 6);
@@ -131,7 +140,8 @@ fn the_memory_limit_saves_what_fits() {
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(error.contains("the map needs more than") && error.contains("fused and saved"), "{error}");
     let summary = summary(&out);
-    let total: u64 = ["tree", "tsdf"].iter().map(|m| summary["bytes"][m].as_u64().unwrap()).sum();
+    let total: u64 =
+        ["tree", "tsdf", "attenuation"].iter().map(|m| summary["bytes"][m].as_u64().unwrap()).sum();
     assert!(total <= 8 << 20, "{total}");
     assert!(json(["info", arg(&out), "--json"])["maps"]["tsdf"]["bricks"].as_u64().unwrap() > 100);
 }

@@ -16,12 +16,15 @@ pub struct AnswerRow<const D: usize> {
     pub occupancy: Option<f64>,
     /// Signed distance (meters).
     pub distance: Option<f64>,
-    /// Certified lower bound (meters).
+    /// Certified lower bound (meters) of the distance to obstacles, unknown space among them where it counts as one; negative
+    /// inside of obstacles like the distance.
     pub lower: Option<f64>,
-    /// Certified upper bound (meters).
+    /// Certified upper bound (meters) of the distance to the nearest known obstacle.
     pub upper: Option<f64>,
-    /// Gradient of the distance.
+    /// Gradient of the distance to the nearest known obstacle.
     pub gradient: Option<[f64; D]>,
+    /// What unknown space counts as; `None` where nothing is certified.
+    pub unknown: Option<UnknownSpace>,
 }
 
 impl<const D: usize> AnswerRow<D> {
@@ -32,19 +35,25 @@ impl<const D: usize> AnswerRow<D> {
             status: distance.status(),
             occupancy,
             distance: distance.value().map(|(d, _)| d),
-            // Bounds are about the magnitude; the side is the distance's sign.
-            lower: if distance.status() == Status::Saturated {
-                distance.value().map(|(d, _)| d.abs())
-            } else {
-                None
-            },
-            upper: None,
+            // Nothing is certified; what is saturated is at least so far away, on its side.
+            lower: distance
+                .value()
+                .map(|(d, _)| d)
+                .filter(|d| distance.status() == Status::Saturated && *d >= 0.0),
+            upper: distance
+                .value()
+                .map(|(d, _)| d)
+                .filter(|d| distance.status() == Status::Saturated && *d < 0.0),
             gradient: distance.known().map(|(_, gradient)| gradient),
+            unknown: None,
         }
     }
 
-    /// Fills in the certified bounds, where the row has a distance; `p` is its point in the frame of the field.
-    /// A lower bound of `limit` meters or more makes the answer saturated.
+    /// Fills in what is certified; `p` is the row's point in the frame of the field. Afterwards the row is one statement: the
+    /// nearest known obstacle is `distance` away, certified to be no more than `upper`, and nothing is nearer than `lower`,
+    /// which counts unknown space where that is an obstacle. The distance lies within its bounds, and all three have one
+    /// sign. In a cell of which something is known, it is known, though centers beside the point may not be; there is no
+    /// gradient then. A magnitude of `limit` meters or more makes the answer saturated.
     pub fn certify(
         &mut self,
         field: &impl ClearanceField<D>,
@@ -52,21 +61,30 @@ impl<const D: usize> AnswerRow<D> {
         unknown: UnknownSpace,
         limit: f64,
     ) {
-        if !self.status.has_value() {
+        let pessimistic = field.clearance(p, UnknownSpace::Pessimistic).value();
+        if !self.status.has_value() && pessimistic.is_none() {
             return;
         }
-        let bounds = |unknown| field.clearance(p, unknown).value();
-        let surface = bounds(UnknownSpace::Optimistic);
-        let far = surface.is_some_and(|c| c.lower >= limit);
-        if far {
-            self.status = Status::Saturated;
-            self.distance = self.distance.map(|d| limit.copysign(d));
+        let Some(c) = field.clearance(p, UnknownSpace::Optimistic).value() else { return };
+        self.unknown = Some(unknown);
+        let lower = c.lower.min(limit);
+        // Of what goes on beyond the limit no upper bound is said.
+        let upper = Some(c.upper).filter(|u| u.is_finite() && c.lower < limit);
+        let interpolated = self.distance.map_or(c.upper, |d| (if c.inside { -d } else { d }).max(0.0));
+        let magnitude = upper.map_or(lower, |upper| interpolated.clamp(lower, upper));
+        let nearest = match unknown {
+            UnknownSpace::Optimistic => lower,
+            // In unknown space itself nothing is certain to be farther.
+            UnknownSpace::Pessimistic => pessimistic.map_or(0.0, |c| c.lower.min(lower)),
+        };
+        let signed = |v: f64| if c.inside { 0.0 - v } else { v };
+        self.status = if upper.is_some() { Status::Known } else { Status::Saturated };
+        self.distance = Some(signed(magnitude));
+        let bounds = [Some(signed(nearest)), upper.map(signed)];
+        [self.lower, self.upper] = if c.inside { [bounds[1], bounds[0]] } else { bounds };
+        if self.status == Status::Saturated {
             self.gradient = None;
         }
-        let surface_only = unknown == UnknownSpace::Optimistic;
-        let asked = if surface_only { surface } else { bounds(unknown) };
-        self.lower = asked.map(|c| if far { c.lower.min(limit) } else { c.lower });
-        self.upper = asked.map(|c| c.upper).filter(|u| u.is_finite() && !(far && surface_only));
     }
 }
 
@@ -85,10 +103,18 @@ pub fn certified_reach<const D: usize>(field: &Esdf<D>) -> f64 {
 /// Those of the writer.
 pub fn write_answer_header<const D: usize>(w: &mut impl Write) -> io::Result<()> {
     let (z, gz) = if D == 3 { (",z", ",gz") } else { ("", "") };
-    writeln!(w, "x,y{z},status,occupancy,distance,lower,upper,gx,gy{gz}")
+    writeln!(w, "x,y{z},status,occupancy,distance,lower,upper,gx,gy{gz},unknown_as")
 }
 
-/// Writes one row: `x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz]`. Numbers are written so that
+/// What unknown space counts as, in one word.
+pub fn unknown_word(unknown: UnknownSpace) -> &'static str {
+    match unknown {
+        UnknownSpace::Pessimistic => "obstacle",
+        UnknownSpace::Optimistic => "free",
+    }
+}
+
+/// Writes one row: `x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz],unknown_as`. Numbers are written so that
 /// reading gives the same double.
 ///
 /// # Errors
@@ -105,12 +131,80 @@ pub fn write_answer<const D: usize>(w: &mut impl Write, row: &AnswerRow<D>) -> i
             None => write!(w, ",")?,
         }
     }
-    writeln!(w)
+    writeln!(w, ",{}", row.unknown.map_or("", unknown_word))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use portolan::field::Clearance;
+
+    /// A field that answers the same everywhere.
+    struct Same {
+        free: Answer<Clearance>,
+        obstacle: Answer<Clearance>,
+    }
+
+    impl ClearanceField<2> for Same {
+        fn clearance(&self, _: [f64; 2], unknown: UnknownSpace) -> Answer<Clearance> {
+            if unknown == UnknownSpace::Optimistic { self.free } else { self.obstacle }
+        }
+
+        fn distance_and_gradient(&self, _: [f64; 2]) -> Answer<(f64, [f64; 2])> {
+            Answer::Unknown
+        }
+
+        fn resolution(&self) -> f64 {
+            0.1
+        }
+    }
+
+    fn clearance(lower: f64, upper: f64, inside: bool) -> Clearance {
+        Clearance { lower, upper, inside }
+    }
+
+    fn certified(
+        interpolated: Answer<(f64, [f64; 2])>,
+        field: &Same,
+        unknown: UnknownSpace,
+    ) -> (Status, [Option<f64>; 3]) {
+        let mut row = AnswerRow::of([0.0; 2], None, interpolated);
+        row.certify(field, [0.0; 2], unknown, 1.0);
+        (row.status, [row.lower, row.distance, row.upper])
+    }
+
+    #[test]
+    fn a_row_is_one_statement() {
+        use UnknownSpace::{Optimistic, Pessimistic};
+        let known = |d| Answer::Known((d, [1.0, 0.0]));
+        let free = Same {
+            free: Answer::Known(clearance(0.4, 0.5, false)),
+            obstacle: Answer::Known(clearance(0.2, 0.25, false)),
+        };
+        // Interpolated values are taken into the bounds; unknown space lowers what is certain alone.
+        for (d, said) in [(0.3, 0.4), (0.45, 0.45), (0.7, 0.5), (-0.1, 0.4)] {
+            let row = certified(known(d), &free, Optimistic);
+            assert_eq!(row, (Status::Known, [Some(0.4), Some(said), Some(0.5)]));
+            let row = certified(known(d), &free, Pessimistic);
+            assert_eq!(row, (Status::Known, [Some(0.2), Some(said), Some(0.5)]));
+        }
+        // Where a center beside the point is unknown, what is certified is known.
+        let row = certified(Answer::Unknown, &free, Optimistic);
+        assert_eq!(row, (Status::Known, [Some(0.4), Some(0.5), Some(0.5)]));
+        // Inside one sign is that of all.
+        let at = clearance(0.05, 0.06, true);
+        let inside = Same { free: Answer::Known(at), obstacle: Answer::Known(at) };
+        let row = certified(known(-0.2), &inside, Pessimistic);
+        assert_eq!(row, (Status::Known, [Some(-0.06), Some(-0.06), Some(-0.05)]));
+        // Beyond the limit there is no upper bound, and the distance is where it begins.
+        let far = Answer::Saturated(clearance(1.2, f64::INFINITY, false));
+        let far = Same { free: far, obstacle: Answer::Known(clearance(0.3, 0.4, false)) };
+        let row = certified(Answer::Saturated((1.5, [0.0; 2])), &far, Pessimistic);
+        assert_eq!(row, (Status::Saturated, [Some(0.3), Some(1.0), None]));
+        // A cell that was not observed stays unknown.
+        let nothing = Same { free: free.free, obstacle: Answer::Unknown };
+        assert_eq!(certified(Answer::Unknown, &nothing, Optimistic), (Status::Unknown, [None; 3]));
+    }
 
     #[test]
     fn missing_answers_are_empty_fields() {
@@ -124,6 +218,7 @@ mod tests {
             lower: Some(-1.6),
             upper: None,
             gradient: Some([0.0, 1.0]),
+            unknown: Some(UnknownSpace::Pessimistic),
         };
         write_answer(&mut out, &row).unwrap();
         let none = AnswerRow {
@@ -134,11 +229,12 @@ mod tests {
             lower: None,
             upper: None,
             gradient: None,
+            unknown: None,
         };
         write_answer_header::<3>(&mut out).unwrap();
         write_answer(&mut out, &none).unwrap();
-        let expected = "x,y,status,occupancy,distance,lower,upper,gx,gy\n0.1,2,known,0.25,-1.5,-1.6,,0,1\n\
-                        x,y,z,status,occupancy,distance,lower,upper,gx,gy,gz\n1,2,3,outside,,,,,,,\n";
+        let expected = "x,y,status,occupancy,distance,lower,upper,gx,gy,unknown_as\n0.1,2,known,0.25,-1.5,-1.6,,0,1,obstacle\n\
+                        x,y,z,status,occupancy,distance,lower,upper,gx,gy,gz,unknown_as\n1,2,3,outside,,,,,,,,\n";
         assert_eq!(String::from_utf8(out).unwrap(), expected);
     }
 }

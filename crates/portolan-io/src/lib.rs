@@ -62,7 +62,9 @@ mod svg;
 mod testing;
 mod xyz;
 
-pub use answer_row::{AnswerRow, HELD_BACK, certified_reach, write_answer, write_answer_header};
+pub use answer_row::{
+    AnswerRow, HELD_BACK, certified_reach, unknown_word, write_answer, write_answer_header,
+};
 pub use bytes::{Compression, Input, open, write_atomic};
 pub use carmen::{
     CarmenLog, CarmenScan, CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage, TimeOrder,
@@ -77,8 +79,8 @@ pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{
-    ColorBricks, MapFile, MapHeader, OccupancyBricks, TsdfBricks, map_dimension, sweep_of, sweep_word,
-    weights_of, weights_word,
+    AttenuationBricks, ColorBricks, MapFile, MapHeader, OccupancyBricks, TsdfBricks, map_dimension, sweep_of,
+    sweep_word, weights_of, weights_word,
 };
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{

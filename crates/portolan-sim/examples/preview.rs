@@ -43,7 +43,7 @@ fn main() -> Result<(), Error> {
         truncation: 3.0 * resolution,
         color: true,
         carve: false,
-        ..Default::default()
+        ..TsdfConfig::textbook()
     };
     let mut map = Tsdf3::new(config)?;
     for (pose, frame) in &scans {

@@ -51,6 +51,30 @@ impl ErrorSummary {
     }
 }
 
+impl ErrorSummary {
+    /// The median over several summaries, number by number: of medians the median, of the worst errors the median. With an
+    /// even number of them the lower one of the two in the middle. `None` without any.
+    pub fn median_of(summaries: &[Self]) -> Option<Self> {
+        let middle = summaries.len().checked_sub(1)? / 2;
+        let of = |part: fn(&Self) -> f64| {
+            let mut values: Vec<f64> = summaries.iter().map(part).collect();
+            values.sort_by(f64::total_cmp);
+            values[middle]
+        };
+        let mut counts: Vec<usize> = summaries.iter().map(|s| s.count).collect();
+        counts.sort_unstable();
+        Some(Self {
+            count: counts[middle],
+            median: of(|s| s.median),
+            p95: of(|s| s.p95),
+            p99: of(|s| s.p99),
+            bias: of(|s| s.bias),
+            worst_over: of(|s| s.worst_over),
+            worst_under: of(|s| s.worst_under),
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,6 +85,10 @@ mod tests {
         assert_eq!((s.count, s.bias, s.worst_over, s.worst_under), (101, 0.0, 50.0, 50.0));
         assert_eq!((s.median, s.p99), (25.0, 50.0));
         assert_eq!(ErrorSummary::of(vec![]), None);
+        let others = [1.0, 9.0, 5.0].map(|e| ErrorSummary::of(vec![e, -2.0 * e]).unwrap());
+        let middle = ErrorSummary::median_of(&others).unwrap();
+        assert_eq!((middle.worst_over, middle.worst_under, middle.count), (5.0, 10.0, 2));
+        assert_eq!(ErrorSummary::median_of(&[]), None);
         assert_eq!(ErrorSummary::of(vec![2.0]).unwrap().worst_under, 0.0);
     }
 }

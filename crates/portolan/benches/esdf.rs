@@ -163,7 +163,7 @@ static WALK: LazyLock<[Tsdf3; 2]> = LazyLock::new(|| {
     let camera = DepthCamera::default();
     let config = BuildingConfig { scans: 600, sensor: BuildingSensor::Camera(camera), seed: SEED };
     let building = building_world(config.seed);
-    let mut map = Tsdf3::new(TsdfConfig { max_range: 5.0, ..Default::default() }).expect("a valid map");
+    let mut map = Tsdf3::new(TsdfConfig { max_range: 5.0, ..TsdfConfig::textbook() }).expect("a valid map");
     let mut before = map.clone();
     for (i, pose) in building_poses(&building, &config).iter().enumerate().take(16) {
         before = map.clone();

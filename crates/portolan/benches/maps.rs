@@ -55,7 +55,7 @@ fn quadtree(resolution: f64) -> Quadtree {
 }
 
 fn tsdf(sweep: BeamSweep, carve: bool) -> Tsdf2 {
-    let config = TsdfConfig { beams: sweep, carve, ..Default::default() };
+    let config = TsdfConfig { beams: sweep, carve, ..TsdfConfig::textbook() };
     let mut map = Tsdf2::covering(&grid(), config).expect("a valid map");
     for (pose, scan) in LOG.iter() {
         map.integrate(pose, scan).expect("memory without limit");
@@ -82,7 +82,7 @@ mod update {
 
     #[divan::bench(args = [false, true])]
     fn tsdf_bricks(bencher: Bencher, carve: bool) {
-        let config = TsdfConfig { carve, ..Default::default() };
+        let config = TsdfConfig { carve, ..TsdfConfig::textbook() };
         let new = || Tsdf::<2>::new(config).expect("a valid map");
         bencher.counter(scans()).bench(|| in_bricks(new(), |map, pose, scan| map.integrate(pose, scan)));
     }

@@ -143,7 +143,7 @@ fn made_up_lidar() -> Log {
 }
 
 fn config(resolution: f64, carve: bool) -> TsdfConfig<3> {
-    TsdfConfig { resolution, truncation: 4.0 * resolution, carve, max_range: 60.0, ..Default::default() }
+    TsdfConfig { resolution, truncation: 4.0 * resolution, carve, max_range: 60.0, ..TsdfConfig::textbook() }
 }
 
 fn fuse(bencher: Bencher, log: &Log, config: TsdfConfig<3>, threads: usize) {

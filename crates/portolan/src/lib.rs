@@ -34,10 +34,12 @@
 //! | how far to the nearest surface, and which way is away? | [`field::Esdf`], kept up to date with its map | one interpolation |
 //! | how far for certain, at least and at most? | [`field::ClearanceField`] of it | a look at the surface nearby |
 //! | is this path free, this pose of a robot, and where would it be? | [`plan`] over a field | steps of the clearance |
+//! | what share of beams does a cell stop, and what would a sensor read along a ray? | [`map::Attenuation`], [`beam_model::RangeDistribution`] | one look-up; one walk |
 //! | where does the known end, and what would be seen from there? | [`explore`] over a map | changed bricks |
 //! | how near is the nearest measurement? | [`map::Cloud`] | a k-d tree |
 
 mod answer;
+pub mod beam_model;
 pub mod cell;
 pub mod explore;
 pub mod field;

@@ -60,7 +60,7 @@ pub(crate) fn tsdf<const D: usize>(
     truncation: f64,
     mut distance: impl FnMut([f64; D]) -> f64,
 ) -> DenseTsdf<D> {
-    let mut tsdf = DenseTsdf::covering(&grid, TsdfConfig { truncation, ..Default::default() }).unwrap();
+    let mut tsdf = DenseTsdf::covering(&grid, TsdfConfig { truncation, ..TsdfConfig::textbook() }).unwrap();
     for cell in (0..grid.len()).map(|i| grid.cell(i)) {
         let d = distance(grid.lattice.center(cell));
         if !d.is_nan() {

@@ -84,7 +84,7 @@ fn the_expected_gain_is_what_a_scan_adds_and_more() {
 fn frontiers_of_the_building_follow_its_scans() {
     let sensor = BuildingSensor::Lidar(SpinningLidar { rings: 16, columns: 256, ..Default::default() });
     let log = building_log(&BuildingConfig { scans: 12, sensor, ..Default::default() });
-    let config = TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() };
+    let config = TsdfConfig { resolution: 0.1, truncation: 0.3, ..TsdfConfig::textbook() };
     let mut map = Tsdf3::new(config).unwrap();
     let mut kept = FrontierMap::new(FrontierSettings::default());
     for (pose, frame) in &log.scans {

@@ -64,7 +64,7 @@ fn far_from_zero_nothing_changes() {
     assert!(differing <= 60, "{differing} cells differ");
 
     let near = tsdf(BeamSweep::CellCentre, true, near_log);
-    let mut far = Tsdf2::covering(&far_grid, TsdfConfig::default()).unwrap();
+    let mut far = Tsdf2::covering(&far_grid, TsdfConfig::textbook()).unwrap();
     far_log.iter().for_each(|(pose, scan)| drop_stats(far.integrate(pose, scan).unwrap()));
     let values = |t: &Tsdf2, i| t.store().at(i).map(|c| (c.distance, c.weight));
     let mut worst: f32 = 0.0;
@@ -86,7 +86,7 @@ fn a_quarter_turn_of_everything_turns_the_contour() {
     let turned_log: Vec<_> = log.iter().map(|(pose, scan)| (turn * *pose, scan.clone())).collect();
     let turned_grid = Grid::new([0.0; 2], 0.05, [180, 240]);
     let straight = tsdf(BeamSweep::CellCentre, true, log);
-    let mut turned = Tsdf2::covering(&turned_grid, TsdfConfig::default()).unwrap();
+    let mut turned = Tsdf2::covering(&turned_grid, TsdfConfig::textbook()).unwrap();
     turned_log.iter().for_each(|(pose, scan)| drop_stats(turned.integrate(pose, scan).unwrap()));
     let a = esdf_from_tsdf(&straight, 0.5, 1.5);
     let b = esdf_from_tsdf(&turned, 0.5, 1.5);
@@ -109,7 +109,7 @@ fn a_slice_of_space_is_the_plane() {
     let space_grid = Grid::new([0.0, 0.0, -0.1], 0.05, [240, 180, 4]);
     let mut space = OccupancyGrid::<3>::covering(&space_grid, OccupancyModel::default()).unwrap();
     let mut space_tsdf =
-        DenseTsdf::covering(&space_grid, TsdfConfig { beams: BeamSweep::March, ..Default::default() })
+        DenseTsdf::covering(&space_grid, TsdfConfig { beams: BeamSweep::March, ..TsdfConfig::textbook() })
             .unwrap();
     for (pose, scan) in log {
         let [[c, s], _] = [[pose.rotation[0][0], pose.rotation[1][0]], [0.0; 2]];
@@ -142,7 +142,7 @@ fn a_slice_of_space_is_the_plane() {
 fn carving_costs_five_times_as_much_and_does_not_move_the_contour() {
     let log = &apartment().log;
     let count = |carve| {
-        let mut map = Tsdf2::covering(&grid(), TsdfConfig { carve, ..Default::default() }).unwrap();
+        let mut map = Tsdf2::covering(&grid(), TsdfConfig { carve, ..TsdfConfig::textbook() }).unwrap();
         let mut stats = ScanStats::default();
         log.iter().for_each(|(pose, scan)| stats += map.integrate(pose, scan).unwrap());
         (stats.cells, marching_squares(&map, &ContourSettings::default()).segments.len())

@@ -145,7 +145,8 @@ fn from_a_wall_the_nearest_free_place_is_before_it() {
 fn certified_motions_through_the_building_keep_their_clearance() {
     let sensor = BuildingSensor::Lidar(SpinningLidar { rings: 32, columns: 512, ..Default::default() });
     let log = building_log(&BuildingConfig { scans: 24, sensor, ..Default::default() });
-    let mut map = Tsdf3::new(TsdfConfig { resolution: 0.1, truncation: 0.3, ..Default::default() }).unwrap();
+    let mut map =
+        Tsdf3::new(TsdfConfig { resolution: 0.1, truncation: 0.3, ..TsdfConfig::textbook() }).unwrap();
     for (pose, frame) in &log.scans {
         map.integrate(pose, frame).unwrap();
     }

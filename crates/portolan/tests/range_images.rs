@@ -5,6 +5,8 @@ use portolan::cell::LogOdds8;
 use portolan::geom::{Lattice, Pose};
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::scan::{Frame, PointScan, RangeImage, Spherical};
+use portolan::store::Store;
+use portolan::sweep::WeightModel;
 use std::f64::consts::TAU;
 
 const RESOLUTION: f64 = 0.05;
@@ -17,7 +19,7 @@ struct Maps {
 
 impl Maps {
     fn of(frame: &Frame) -> Self {
-        let config = TsdfConfig { resolution: RESOLUTION, ..TsdfConfig::default() };
+        let config = TsdfConfig { resolution: RESOLUTION, ..TsdfConfig::textbook() };
         let lattice = Lattice::new([0.0; 3], RESOLUTION);
         let mut maps = Self {
             distances: Tsdf3::new(config).unwrap(),
@@ -130,6 +132,64 @@ fn another_lidar_is_noticed_by_both_maps() {
         let occupancy = maps.occupancy.integrate(&Pose::IDENTITY, &frame).unwrap();
         for stats in [distances, occupancy] {
             assert_eq!((stats.beams.hit, stats.beams.dropped), (512 * 32, 0));
+        }
+    }
+}
+
+/// A wall 2 m away with this unit normal towards it, in an image of 61 x 81 rays about the x axis.
+fn wall(normal: [f64; 3]) -> RangeImage {
+    let elevations: Vec<f32> = (0..61).map(|row| 0.3 - 0.01 * row as f32).collect();
+    let lidar = Spherical { elevations: elevations.clone(), first_azimuth: -0.4, azimuth_step: 0.01 };
+    let range = |column: usize, elevation: f32| {
+        let (azimuth, elevation) = (-0.4 + 0.01 * column as f64, f64::from(elevation));
+        let flat = elevation.cos();
+        let ray = [flat * azimuth.cos(), flat * azimuth.sin(), elevation.sin()];
+        (2.0 / (0..3).map(|k| normal[k] * ray[k]).sum::<f64>()) as f32
+    };
+    let ranges: Vec<f32> =
+        elevations.iter().flat_map(|&e| (0..81).map(move |c| (c, e))).map(|(c, e)| range(c, e)).collect();
+    RangeImage::from_ranges(lidar, 81, ranges)
+}
+
+/// What one scan of a wall leaves in cells in front of it is the weight of its ray: the cosine of the incidence, or that over
+/// the square of the range.
+#[test]
+fn weights_of_images_are_those_of_range_and_incidence() {
+    // Head on, turned to the side, turned upwards, both.
+    for [side, up] in [[0.0f64, 0.0], [0.8, 0.0], [0.0, 0.8], [0.5, -0.5]] {
+        let normal = [side.cos() * up.cos(), side.sin() * up.cos(), up.sin()];
+        for weights in
+            [WeightModel::CosIncidence, WeightModel::InverseSquare, WeightModel::InverseSquareCosIncidence]
+        {
+            let config = TsdfConfig { resolution: RESOLUTION, weights, ..TsdfConfig::textbook() };
+            let mut map = Tsdf3::new(config).unwrap();
+            map.integrate(&Pose::IDENTITY, &Frame::Image(wall(normal))).unwrap();
+            let mut seen = 0;
+            for n in 0..40 * 40 {
+                let (azimuth, elevation) =
+                    (-0.25 + 0.0125 * f64::from(n % 40), -0.15 + 0.0075 * f64::from(n / 40));
+                let flat = elevation.cos();
+                let ray = [flat * azimuth.cos(), flat * azimuth.sin(), elevation.sin()];
+                let cosine: f64 = (0..3).map(|k| normal[k] * ray[k]).sum();
+                let range = 2.0 / cosine;
+                let p = ray.map(|v| (range - 0.08) * v);
+                let cell = map.lattice().cell_of(p).and_then(|c| Store::cell(map.store(), c));
+                let Some(cell) = cell.filter(|c| c.distance > 0.0) else { continue };
+                seen += 1;
+                let (square, angle) = match weights {
+                    WeightModel::CosIncidence => (1.0, cosine),
+                    WeightModel::InverseSquare => (range.powi(-2), 1.0),
+                    _ => (range.powi(-2), cosine),
+                };
+                let want = square * angle;
+                // The cell's center is on a ray beside this one.
+                assert!(
+                    (f64::from(cell.weight) / want - 1.0).abs() < 0.15,
+                    "{weights:?} {side} {up}: {} instead of {want}",
+                    cell.weight
+                );
+            }
+            assert!(seen > 1000, "{seen}");
         }
     }
 }

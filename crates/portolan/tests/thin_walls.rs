@@ -24,7 +24,7 @@ fn extracted(thickness: f64, sweep: BeamSweep, truncation: f64) -> (f64, f64) {
     ]);
     let grid = Grid::new([-3.5, -2.5], 0.05, [140, 100]);
     let mut tsdf =
-        Tsdf2::covering(&grid, TsdfConfig { beams: sweep, truncation, ..Default::default() }).unwrap();
+        Tsdf2::covering(&grid, TsdfConfig { beams: sweep, truncation, ..TsdfConfig::textbook() }).unwrap();
     for i in 0..40u32 {
         let side = if i % 2 == 0 { 1.0 } else { -1.0 };
         let step = f64::from(i / 2);

@@ -26,7 +26,7 @@ impl Wall<2> for Tsdf2 {
         let bearings: Vec<f64> = (-250..=250).map(|i| 0.002 * f64::from(i)).collect();
         let ranges: Vec<f64> = bearings.iter().map(|b| 4.0 / b.cos()).collect();
         let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
-        let config = TsdfConfig { truncation: 3.0 * R, weights, carve_weight, ..Default::default() };
+        let config = TsdfConfig { truncation: 3.0 * R, weights, carve_weight, ..TsdfConfig::textbook() };
         let mut map = Tsdf2::covering(&Grid::new([-0.5, -3.0], R, [55, 60]), config).unwrap();
         map.integrate(&Pose::IDENTITY, &scan).unwrap();
         map
@@ -41,8 +41,13 @@ impl Wall<3> for Tsdf3 {
     fn seen(weights: WeightModel, carve_weight: f32) -> Self {
         let at = |i: u16| 0.03 * f32::from(i) - 2.0;
         let points = (0..133 * 133).map(|n| [4.0, at(n % 133), at(n / 133)]);
-        let config =
-            TsdfConfig { resolution: R, truncation: 3.0 * R, weights, carve_weight, ..Default::default() };
+        let config = TsdfConfig {
+            resolution: R,
+            truncation: 3.0 * R,
+            weights,
+            carve_weight,
+            ..TsdfConfig::textbook()
+        };
         let mut map = Tsdf3::new(config).unwrap();
         map.integrate(&Pose::IDENTITY, &Frame::Points(PointScan::new(points, [0.0; 3]))).unwrap();
         map

@@ -122,11 +122,15 @@ fn said_between(
     if close {
         return Said::Close;
     }
+    let mut cosine = 1.0;
     let (range, hit) = if whole {
         let (x, y) = (u - c as f64, v - r as f64);
         let linear = four.map(|v| if parallel { v } else { 1.0 / v });
         let q =
             (1.0 - y) * ((1.0 - x) * linear[0] + x * linear[1]) + y * ((1.0 - x) * linear[2] + x * linear[3]);
+        let right = (1.0 - y) * (linear[1] - linear[0]) + y * (linear[3] - linear[2]);
+        let below = (1.0 - x) * (linear[2] - linear[0]) + x * (linear[3] - linear[1]);
+        cosine = incidence(image, (u, v), scale, [q, right, below], [ax, ay]).clamp(0.4, 1.0);
         (scale * if parallel { q } else { 1.0 / q }, true)
     } else {
         if near_half(u) || near_half(v) {
@@ -153,12 +157,14 @@ fn said_between(
         return Said::Nothing;
     }
     let d = range - length;
-    if (d - tau).abs() < 1e-4 || d.abs() > tau - 1e-5 && d < 0.0 && d > -tau - 1e-5 || length.abs() < 1e-5 {
+    let across = d * cosine;
+    let near = |d: f64, to: f64| (d - to).abs() < 2e-4;
+    if near(d, tau) || near(across, tau) || near(across, -tau) || length.abs() < 1e-5 {
         return Said::Close;
     }
     let squared = matches!(config.weights, WeightModel::InverseSquare) && !parallel;
     let by_range = if squared { 1.0 / range.max(1.0).powi(2) } else { 1.0 };
-    if d > tau {
+    if across > tau {
         let speaks = config.carve && length >= 0.0;
         return if speaks {
             Said::One(tau, by_range * f64::from(config.carve_weight))
@@ -166,10 +172,37 @@ fn said_between(
             Said::Nothing
         };
     }
-    if d < -tau || !hit {
+    if across < -tau || !hit {
         return Said::Nothing;
     }
-    Said::One(d, by_range * (1.0 + d / tau).clamp(0.0, 1.0))
+    let taper = |d: f64| (1.0 + d / tau).clamp(0.0, 1.0);
+    let head_on = if d > tau { 0.0 } else { taper(d) };
+    Said::One(d.clamp(-tau, tau), by_range * head_on.max(taper(across).min(0.15)))
+}
+
+/// Cosine of the incidence on the surface between pixels, from what is linear there and by how much it grows to the right and
+/// below: by the two tangents of the surface.
+fn incidence(
+    image: &RangeImage,
+    (u, v): (f64, f64),
+    scale: f64,
+    [q, right, below]: [f64; 3],
+    [ax, ay]: [f64; 2],
+) -> f64 {
+    let Projection::Pinhole(c) = &image.projection else {
+        let parallel = image.has_parallel_rays();
+        let per = |growth: f64, opening: f64| growth / opening / if parallel { 1.0 } else { q };
+        return 1.0 / (1.0 + per(right, ax).powi(2) + per(below, ay).powi(2)).sqrt();
+    };
+    // The point z (x, y, 1), and how it moves with the column and with the row.
+    let (x, y, z) = ((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0 / q);
+    let moves = |growth: f64, aside: [f64; 2]| {
+        let dz = -growth * z * z;
+        [dz * x + z * aside[0], dz * y + z * aside[1], dz]
+    };
+    let (a, b) = (moves(right, [1.0 / c.fx, 0.0]), moves(below, [0.0, 1.0 / c.fy]));
+    let normal = vector::cross3(a, b);
+    vector::dot(normal, [x, y, 1.0]).abs() / (vector::norm(normal) * scale)
 }
 
 /// Whether a cell is what it should be, up to rounding.
@@ -187,11 +220,43 @@ fn agrees(said: Said, cell: Option<SignedDistance>) -> bool {
     }
 }
 
+/// The image with bridges: pixels of a lidar without a reading on the line between the next ones in their row, where both are
+/// surfaces of at most 60 degrees of incidence (or within 3 cm), no further apart than twice the wider distance of neighboring rays, or 0.04 radians.
+fn bridged(image: &RangeImage) -> RangeImage {
+    let mut whole = image.clone();
+    let Projection::Spherical(s) = &image.projection else { return whole };
+    let mut down: Vec<f64> = s.elevations.windows(2).map(|w| f64::from(w[0]) - f64::from(w[1])).collect();
+    down.sort_by(f64::total_cmp);
+    let across = s.azimuth_step.abs();
+    let most = (1.001 * (2.0 * across.max(down[down.len() / 2])).max(0.04) / across) as i64;
+    let n = image.columns as i64;
+    for row in 0..image.rows {
+        let at = |c: i64| {
+            let inside = (0..n).contains(&c) || image.is_full_turn();
+            if inside { image.values[row * image.columns + c.rem_euclid(n) as usize] } else { 0.0 }
+        };
+        for c in (0..n).filter(|&c| at(c) == 0.0) {
+            let next = |way: i64| (1..=most).find(|k| at(c + way * k) != 0.0);
+            let (Some(left), Some(right)) = (next(-1), next(1)) else { continue };
+            let (a, b) = (f64::from(at(c - left)), f64::from(at(c + right)));
+            let angle = (left + right) as f64 * across * f64::from(s.elevations[row].cos());
+            let of_one = (a - b).abs() <= 1.73 * angle * a.min(b) + 0.03 && angle <= 0.2;
+            if left + right <= most && a > 0.0 && b > 0.0 && of_one {
+                let share = left as f64 / (left + right) as f64;
+                whole.values[row * image.columns + c as usize] =
+                    (1.0 / (1.0 / a + share * (1.0 / b - 1.0 / a))) as f32;
+            }
+        }
+    }
+    whole
+}
+
 /// Every cell of a box around everything, and nothing beyond it.
 fn equals_its_definition(image: RangeImage, pose: &Pose<3>, config: &TsdfConfig<3>, reach: f64) {
     let mut map = Tsdf3::new(*config).expect("a valid map");
     let frame = Frame::Image(image.clone());
     map.integrate(pose, &frame).unwrap();
+    let image = bridged(&image);
     let lattice = *map.lattice();
     let low = lattice.cell_of(pose.translation.map(|v| v - reach)).unwrap();
     let high = lattice.cell_of(pose.translation.map(|v| v + reach)).unwrap();
@@ -397,7 +462,7 @@ fn watched_cells_tell_what_happened() {
 
 #[test]
 fn lattice_is_the_one_that_was_asked_for() {
-    let map =
-        Tsdf3::new(TsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..Default::default() }).unwrap();
+    let map = Tsdf3::new(TsdfConfig { resolution: 0.1, origin: [1.0, 2.0, 3.0], ..TsdfConfig::textbook() })
+        .unwrap();
     assert_eq!(*map.lattice(), Lattice::new([1.0, 2.0, 3.0], 0.1));
 }

@@ -83,7 +83,7 @@ fn quantiles(mut errors: Vec<f64>) -> (f64, f64) {
 }
 
 fn config(resolution: f64, cells: f64) -> TsdfConfig<3> {
-    TsdfConfig { resolution, truncation: cells * resolution, ..Default::default() }
+    TsdfConfig { resolution, truncation: cells * resolution, ..TsdfConfig::textbook() }
 }
 
 #[test]

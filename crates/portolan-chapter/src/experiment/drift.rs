@@ -6,9 +6,10 @@ use portolan::scan::Scan;
 use portolan::surface::{ContourSettings, marching_squares};
 use portolan_graph::GraphError;
 use portolan_sim::ErrorSummary;
-use portolan_sim::{Lap, LapConfig, World, lap, measure_motions};
+use portolan_sim::{Lap, LapConfig, Truth, World, lap, measure_motions};
 use serde_json::{Value, json};
 
+use crate::gallery::{Turn, TurnedTruth};
 use crate::poses::{CorrectedLap, CorrectionSettings, PoseErrors, correct};
 
 /// Which poses the maps are made with.
@@ -60,8 +61,11 @@ pub struct Drift {
     pub before: PoseErrors,
     /// Error of the optimized poses.
     pub after: PoseErrors,
-    /// Distance of the contour from the true walls, for each of [`PoseSet::ALL`]; `None` without a contour.
+    /// Distance of the contour from the true walls, for each of [`PoseSet::ALL`]: the median over the turned worlds; `None`
+    /// without a contour.
     pub contours: [Option<ErrorSummary>; 3],
+    /// The same in the world as it is drawn.
+    pub contours_as_drawn: [Option<ErrorSummary>; 3],
 }
 
 impl Drift {
@@ -77,7 +81,8 @@ impl Drift {
         let lap = correct(start, &motions, &scans, &settings)?;
         let before = PoseErrors::absolute(&lap.odometry, &truth);
         let after = PoseErrors::absolute(&lap.poses, &truth);
-        let drift = Self { truth, lap, chosen, before, after, contours: [None; 3] };
+        let drift =
+            Self { truth, lap, chosen, before, after, contours: [None; 3], contours_as_drawn: [None; 3] };
         let log = drift.poses(chosen).iter().copied().zip(scans).collect();
         Ok((drift, log))
     }
@@ -91,25 +96,53 @@ impl Drift {
         }
     }
 
-    /// Maps the same scans with each set of poses, carving, and measures the contours. Of `config` all is taken but
-    /// the cells.
+    /// Maps the same scans with each set of poses, carving, and measures the contours, in the world as it is drawn and in
+    /// turned ones (none: as drawn counts). Of `config` all is taken but the cells.
     ///
     /// # Errors
     /// Where the settings of the map are not possible.
-    pub fn measure_maps(&mut self, log: &Lap, world: &World, config: &TsdfConfig<2>) -> Result<(), MapError> {
-        // A multiple of cells around the box of the maps: the lattices coincide.
-        let grid = Grid::covering(world.aabb().grown(ROOM), config.resolution);
-        let Some(grid) = grid else { return Ok(()) };
+    pub fn measure_maps(
+        &mut self,
+        log: &Lap,
+        world: &World,
+        config: &TsdfConfig<2>,
+        turns: &[Turn],
+    ) -> Result<(), MapError> {
         for (k, set) in PoseSet::ALL.into_iter().enumerate() {
-            let mut tsdf = Tsdf2::covering(&grid, *config)?;
-            for (pose, (_, scan)) in self.poses(set).iter().zip(log) {
-                tsdf.integrate(pose, scan)?;
-            }
-            let contour = marching_squares(&tsdf, &ContourSettings::default());
-            let errors = contour.vertices.iter().map(|&v| world.signed_distance(v));
-            self.contours[k] = ErrorSummary::of(errors.collect());
+            let off = |turned: &Pose<2>| self.contour_off(set, log, world, config, turned);
+            let drawn = off(&Pose::IDENTITY)?;
+            let turned: Vec<_> =
+                turns.iter().map(|t| off(&t.pose(config.resolution))).collect::<Result<_, _>>()?;
+            let turned: Vec<_> = turned.into_iter().flatten().collect();
+            self.contours[k] = ErrorSummary::median_of(&turned).or(drawn);
+            self.contours_as_drawn[k] = drawn;
         }
         Ok(())
+    }
+
+    /// Distance of the contour from the true walls, with a set of poses in a world behind a pose.
+    fn contour_off(
+        &self,
+        set: PoseSet,
+        log: &Lap,
+        world: &World,
+        config: &TsdfConfig<2>,
+        turned: &Pose<2>,
+    ) -> Result<Option<ErrorSummary>, MapError> {
+        let seen = world.aabb().grown(ROOM);
+        let mut extent = Aabb::EMPTY;
+        for corner in [seen.min, seen.max, [seen.min[0], seen.max[1]], [seen.max[0], seen.min[1]]] {
+            extent.include(turned.transform_point(corner));
+        }
+        // A multiple of cells around the box of the maps: the lattices coincide.
+        let Some(grid) = Grid::covering(extent, config.resolution) else { return Ok(None) };
+        let mut tsdf = Tsdf2::covering(&grid, *config)?;
+        for (pose, (_, scan)) in self.poses(set).iter().zip(log) {
+            tsdf.integrate(&(*turned * *pose), scan)?;
+        }
+        let contour = marching_squares(&tsdf, &ContourSettings::default());
+        let truth = TurnedTruth::new(world, turned);
+        Ok(ErrorSummary::of(contour.vertices.iter().map(|&v| truth.signed_distance(v)).collect()))
     }
 
     /// Closures that the optimized poses do not agree with.
@@ -134,7 +167,9 @@ impl Drift {
     pub fn to_json(&self) -> Value {
         let errors = |e: &PoseErrors| json!({ "translation": e.translation, "rotation": e.rotation });
         let relative = |set| errors(&PoseErrors::relative(self.poses(set), &self.truth, 10));
-        let contour = |k: usize| self.contours[k].map(|e| json!({ "median": e.median, "p95": e.p95 }));
+        let error = |e: ErrorSummary| json!({ "median": e.median, "p95": e.p95 });
+        let contour = |k: usize| self.contours[k].map(error);
+        let drawn = |k: usize| self.contours_as_drawn[k].map(error);
         let rounds = self.lap.rounds.iter().map(|r| {
             json!({
                 "candidates": r.candidates, "closures": r.closures, "refused": r.refused,
@@ -154,6 +189,7 @@ impl Drift {
             "closures_disagreeing": self.disagreeing(),
             "rounds": rounds.collect::<Vec<_>>(),
             "contour": { "true": contour(0), "odometry": contour(1), "optimised": contour(2) },
+            "contour_as_drawn": { "true": drawn(0), "odometry": drawn(1), "optimised": drawn(2) },
         })
     }
 

@@ -38,7 +38,7 @@ impl Forgetting {
             "scans_per_lap": self.settings.lap.scans,
             "resolution": self.settings.resolution,
             "truncation": self.settings.truncation,
-            "prediction": "ln 2 / ln(1 + w / W_max)",
+            "prediction": "ln 2 / ln(1 + max(w, 1) / W_max)",
             "runs": self.ghost.per_w_max,
         })
     }
@@ -47,25 +47,25 @@ impl Forgetting {
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         for run in &self.ghost.per_w_max {
-            let m = &run.measured;
+            let (left, m) = (&run.left, &run.saturated);
             let noise = run.static_noise.map_or(String::new(), |n| {
                 format!("; static noise {:.2} mm, predicted {:.2}", 1e3 * n.measured, 1e3 * n.predicted)
             });
             lines.push(format!(
-                "ghost at W_max {}: half-life {} re-observations, predicted {} ({} cells){noise}",
+                "ghost at W_max {}: half of it gone after {} re-observations ({} cells), by the gain of saturated cells {}{noise}",
                 run.w_max,
-                shown(m.half_life_measured),
+                shown(left.half_life_measured),
+                left.cells,
                 shown(m.half_life_predicted),
-                m.cells
             ));
-            let others = [("not yet clamped", &run.unclamped), ("tapered", &run.tapered)];
+            let others = [("saturated", m), ("not yet clamped", &run.unclamped), ("tapered", &run.tapered)];
             let others: Vec<_> = others
                 .into_iter()
                 .filter(|(_, g)| g.cells > 0)
                 .map(|(name, g)| format!("{name} {} ({} cells)", shown(g.half_life_measured), g.cells))
                 .collect();
             if !others.is_empty() {
-                lines.push(format!("  where it does not hold: {}", others.join(", ")));
+                lines.push(format!("  by kind of cell: {}", others.join(", ")));
             }
         }
         let restless = self.ghost.per_w_max.iter().filter(|r| r.laps_until_saturated.is_none());

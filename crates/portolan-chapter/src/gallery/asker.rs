@@ -1,6 +1,6 @@
 //! Answers held against the truth.
 
-use portolan::geom::{Aabb, Grid};
+use portolan::geom::Grid;
 use portolan::map::Tsdf2;
 use portolan::surface::Contour;
 use portolan_sim::{ErrorSummary, Truth};
@@ -51,10 +51,18 @@ impl Asker<'_> {
     }
 }
 
-/// Centers of cells that were seen free, more than 5 cm from any surface.
-pub(super) fn observed_free(tsdf: &Tsdf2, min_weight: f32, truth: Option<&dyn Truth<2>>) -> Vec<[f64; 2]> {
-    let inside = Aabb::new(tsdf.grid().aabb().min, tsdf.grid().aabb().max).grown(-tsdf.config().resolution);
-    let candidates = points(&inside, 16_000).into_iter();
+/// Where free space is looked for: evenly in the box of a grid, a cell from its border.
+pub(super) fn candidates(grid: &Grid<2>) -> Vec<[f64; 2]> {
+    points(&grid.aabb().grown(-grid.lattice.resolution), 16_000)
+}
+
+/// Those of the candidates that were seen free, more than 5 cm from any surface.
+pub(super) fn observed_free(
+    tsdf: &Tsdf2,
+    candidates: Vec<[f64; 2]>,
+    min_weight: f32,
+    truth: Option<&dyn Truth<2>>,
+) -> Vec<[f64; 2]> {
     let free = |p: &[f64; 2]| {
         tsdf.grid()
             .index_of(*p)
@@ -62,6 +70,7 @@ pub(super) fn observed_free(tsdf: &Tsdf2, min_weight: f32, truth: Option<&dyn Tr
             .is_some_and(|c| c.weight >= min_weight && c.distance > 0.0)
     };
     candidates
+        .into_iter()
         .filter(free)
         .filter(|&p| truth.is_none_or(|t| t.signed_distance(p) > 0.05))
         .take(4000)

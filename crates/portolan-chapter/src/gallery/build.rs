@@ -134,6 +134,7 @@ pub(super) fn build(
         chapter_tree: maps.chapter_tree.map,
         marched: maps.marched.map,
         contour_settings: settings.contour,
+        turned: None,
     })
 }
 

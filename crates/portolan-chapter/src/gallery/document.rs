@@ -41,5 +41,6 @@ pub fn document(gallery: &Gallery, log: &str, scans: usize) -> Value {
         "cloud_crossover": { "points": cloud.points, "measured": measured },
         "gradient_norm": { "tsdf": gallery.tsdf_gradient, "esdf": gallery.fields[0].gradient },
         "fields": fields,
+        "turned": gallery.turned,
     })
 }

@@ -3,6 +3,7 @@
 use super::crossover::{CloudCrossover, TreeCrossover};
 use super::fields::MeasuredField;
 use super::row::{Row, Winner};
+use super::turned::{Accuracy, Turned};
 use portolan::cell::OccupancyModel;
 use portolan::field::{EsdfGrid, EsdfSettings};
 use portolan::geom::Grid;
@@ -34,7 +35,7 @@ impl GallerySettings {
     pub fn new(grid: Grid<2>, probes: usize, surface_length: Option<f64>) -> Self {
         Self {
             grid,
-            tsdf: Default::default(),
+            tsdf: TsdfConfig::textbook(),
             model: Default::default(),
             contour: Default::default(),
             esdf: Default::default(),
@@ -76,12 +77,19 @@ pub struct Gallery {
     /// The TSDF by the textbook's march.
     pub(super) marched: Tsdf2,
     pub(super) contour_settings: ContourSettings,
+    /// How true the answers are in worlds that are turned against the lattice; `None`: not measured.
+    pub turned: Option<Turned>,
 }
 
 impl Gallery {
     /// The accurate distance field.
     pub fn distance(&self) -> &EsdfGrid<2> {
         &self.fields[0].field
+    }
+
+    /// What is to be said of accuracy: the medians over turned worlds where they were measured, else that of this one.
+    pub fn headline(&self) -> Accuracy {
+        self.turned.as_ref().map_or_else(|| Accuracy::of(self), |turned| turned.accuracy.clone())
     }
 
     /// Bytes of everything that was built.

@@ -14,6 +14,7 @@ mod probes;
 mod row;
 mod run;
 mod table;
+mod turned;
 
 pub use crossover::{CloudCrossover, TreeCrossover, tree_crossovers_at};
 pub use document::document;
@@ -22,3 +23,4 @@ pub use measured::{Gallery, GallerySettings};
 pub use probes::Clock;
 pub use row::{Cost, LEVEL, Row, Winner, Workload};
 pub use run::run;
+pub use turned::{Accuracy, FieldAccuracy, RowAccuracy, Turn, Turned, TurnedTruth, turned};

@@ -1,7 +1,7 @@
 //! Builds every representation from one log and measures it.
 
 use super::against_truth::hold_against_truth;
-use super::asker::{Asker, observed_free};
+use super::asker::{Asker, candidates, observed_free};
 use super::build::build;
 use super::measured::{Gallery, GallerySettings};
 use super::probes::{Clock, points};
@@ -24,8 +24,8 @@ pub fn run(
     let grid = settings.grid;
     let mut gallery = build(log, settings, clock)?;
     let everywhere = points(&grid.aabb(), settings.probes);
-    let min_weight = settings.esdf.min_weight.unwrap_or(gallery.tsdf.thresholds().observed);
-    let free = observed_free(&gallery.tsdf, min_weight, truth);
+    let min_weight = settings.esdf.min_weight.unwrap_or(gallery.tsdf.min_weight());
+    let free = observed_free(&gallery.tsdf, candidates(&grid), min_weight, truth);
     hold_against_truth(&mut gallery, &Asker { truth, free, everywhere: &everywhere, grid });
     for workload in Workload::ALL {
         gallery.measure(workload, settings.probes, clock);

@@ -3,6 +3,7 @@
 use super::Cost;
 use super::build::format_ms;
 use super::measured::Gallery;
+use super::turned::{Accuracy, FieldAccuracy, Turned};
 use portolan_sim::ErrorSummary;
 use std::fmt::{self, Display, Formatter, Write};
 
@@ -29,6 +30,25 @@ fn millimetres(error: Option<ErrorSummary>) -> String {
     error.map_or("-".into(), |e| format!("{:.1}", 1e3 * e.median))
 }
 
+/// What is said of accuracy, and what holds in the world as it is drawn, where that is not the same.
+struct Beside {
+    headline: Accuracy,
+    drawn: Option<Accuracy>,
+}
+
+impl Beside {
+    fn of(gallery: &Gallery) -> Self {
+        Self { headline: gallery.headline(), drawn: gallery.turned.as_ref().map(|_| Accuracy::of(gallery)) }
+    }
+
+    fn told(&self, tell: impl Fn(&Accuracy) -> String) -> String {
+        match (tell(&self.headline), self.drawn.as_ref().map(tell)) {
+            (headline, Some(drawn)) if headline != "-" => format!("{headline} ({drawn})"),
+            (headline, _) => headline,
+        }
+    }
+}
+
 impl Display for Gallery {
     /// The table, the winners, the crossovers, the distance fields.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -38,7 +58,7 @@ impl Display for Gallery {
         writeln!(
             f,
             "median gradient norm of the raw TSDF at observed free points: {:.3}\n",
-            self.tsdf_gradient
+            self.headline().tsdf_gradient
         )?;
         fields(self, f)
     }
@@ -57,17 +77,18 @@ fn rows(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
         "error mm",
     ];
     let mut lines = vec![header.map(String::from)];
-    lines.extend(gallery.rows.iter().map(|row| {
+    let beside = Beside::of(gallery);
+    lines.extend(gallery.rows.iter().enumerate().map(|(i, row)| {
         [
             row.name.clone(),
             bytes(row.memory_bytes, row.derived),
             time(row.update),
             time(row.occupancy),
-            row.occupancy_wrong.map_or("-".into(), |w| format!("{:.2} %", 100.0 * w)),
+            beside.told(|a| a.rows[i].occupancy_wrong.map_or("-".into(), |w| format!("{:.2} %", 100.0 * w))),
             time(row.distance),
-            millimetres(row.distance_error),
+            beside.told(|a| millimetres(a.rows[i].distance_error)),
             time(row.surface),
-            millimetres(row.surface_error),
+            beside.told(|a| millimetres(a.rows[i].surface_error)),
         ]
     }));
     aligned(f, &lines)?;
@@ -75,7 +96,21 @@ fn rows(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
         f,
         "\n\"+\": on top of the TSDF it is derived from; its update is a full rebuild. \"-\": cannot answer."
     )?;
-    writeln!(f, "Errors are medians against the true world; distances at observed free points.\n")
+    writeln!(f, "Errors are medians against the true world; distances at observed free points.")?;
+    match &gallery.turned {
+        Some(turned) => writeln!(f, "{}\n", worlds(turned)),
+        None => writeln!(f),
+    }
+}
+
+/// In which worlds accuracy was measured.
+fn worlds(turned: &Turned) -> String {
+    let angles: Vec<String> = turned.turns.iter().map(|t| t.degrees.to_string()).collect();
+    format!(
+        "They are medians over worlds turned by {} degrees and shifted by parts of a cell; in parentheses the world as it is \
+         drawn, whose walls lie on borders of cells.",
+        angles.join(", ")
+    )
 }
 
 fn winners(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
@@ -109,19 +144,28 @@ fn crossovers(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
 }
 
 fn fields(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
-    let header =
-        ["distance field", "rebuild", "off the contour", "99 %", "too large by", "off the world", "gradient"];
-    let mm = |v: Option<f64>| v.map_or("-".into(), |v| format!("{:.2} mm", 1e3 * v));
+    let header = [
+        "distance field",
+        "rebuild",
+        "off the contour, mm",
+        "99 %",
+        "too large by",
+        "off the world",
+        "gradient",
+    ];
+    let mm = |v: Option<f64>| v.map_or("-".into(), |v| format!("{:.2}", 1e3 * v));
     let mut lines = vec![header.map(String::from)];
-    lines.extend(gallery.fields.iter().map(|field| {
+    let beside = Beside::of(gallery);
+    lines.extend(gallery.fields.iter().enumerate().map(|(k, field)| {
+        let told = |of: fn(&FieldAccuracy) -> Option<f64>| beside.told(|a| mm(of(&a.fields[k])));
         [
             field.name().into(),
             format!("{} ms", format_ms(field.seconds)),
-            mm(field.against_contour.map(|e| e.median)),
-            mm(field.against_contour.map(|e| e.p99)),
-            mm(field.against_contour.map(|e| e.worst_over)),
-            mm(field.against_truth.map(|e| e.median)),
-            format!("{:.3}", field.gradient),
+            told(|f| Some(f.against_contour?.median)),
+            told(|f| Some(f.against_contour?.p99)),
+            told(|f| Some(f.against_contour?.worst_over)),
+            told(|f| Some(f.against_truth?.median)),
+            format!("{:.3}", beside.headline.fields[k].gradient),
         ]
     }));
     aligned(f, &lines)

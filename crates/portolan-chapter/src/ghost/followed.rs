@@ -11,13 +11,13 @@ pub struct GhostGroup {
     /// Those that have lost half of their error when the run ends.
     pub halved: usize,
     /// Re-observations until half of the error was lost: the median over the cells, those that never do included as
-    /// infinite. NaN without cells.
+    /// infinite. NaN without cells. Of cells that are saturated and only ever told +tau it follows from the gain alone.
     #[serde(rename = "half_life")]
     pub half_life_measured: f64,
-    /// `ln 2 / ln(1 + w / W_max)` for the median weight of a full observation. NaN without cells.
+    /// `ln 2 / ln(1 + max(w, 1) / W_max)` for the median weight of a full observation. NaN without cells.
     pub half_life_predicted: f64,
-    /// The same for the weights that the cells really received (their mean gain in the logarithm, weight before
-    /// included): the median over the cells. NaN without cells.
+    /// The same for the gains that the cells really had: the median over the cells. What differs from the half-life above
+    /// is what they were told. NaN without cells.
     pub half_life_of_gains: f64,
     /// Median weight that a re-observation carried. NaN without cells.
     pub weight: f64,
@@ -44,7 +44,7 @@ pub(crate) struct Followed {
 /// How a followed cell counts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fate {
-    Measured,
+    Saturated,
     Unclamped,
     Tapered,
     /// Never seen again, or at the new place never behind a surface: left out.
@@ -59,16 +59,16 @@ impl Followed {
             Fate::Silent
         } else if behind {
             Fate::Tapered
-        } else if self.weight_at_move < f64::from(w_max) {
+        } else if self.events[0].gain > (1.0 + 1e-6) * clamped_gain(&self.events[0], w_max) {
             Fate::Unclamped
         } else {
-            Fate::Measured
+            Fate::Saturated
         }
     }
 
     /// Median weight of its re-observations.
     pub(crate) fn weight(&self) -> f64 {
-        median(self.events.iter().map(weight_of).collect())
+        median(self.events.iter().map(|e| e.weight).collect())
     }
 
     /// Error after `n` re-observations as a part of the error when the chair moved.
@@ -105,9 +105,10 @@ impl Followed {
     }
 }
 
-/// The weight of an observation: `K = w / (W + w)` solved for `w`.
-fn weight_of(event: &FusionEvent) -> f64 {
-    if event.gain < 1.0 { event.weight_before * event.gain / (1.0 - event.gain) } else { event.weight_after }
+/// The gain that an observation has at the clamp.
+fn clamped_gain(event: &FusionEvent, w_max: f32) -> f64 {
+    let unit = event.weight.max(1.0);
+    unit / (f64::from(w_max) + unit)
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -125,7 +126,7 @@ impl GhostGroup {
         let of = |f: &dyn Fn(&Followed) -> f64| median(cells.iter().map(|c| f(c)).collect());
         let full: Vec<f64> = cells
             .iter()
-            .flat_map(|c| c.events.iter().filter(|e| e.observation >= 0.0).map(weight_of))
+            .flat_map(|c| c.events.iter().filter(|e| e.observation >= 0.0).map(|e| e.weight))
             .collect();
         let longest = cells.iter().map(|c| c.events.len()).max().unwrap_or(0);
         // Only as far as at least half of the cells were followed.
@@ -144,7 +145,7 @@ impl GhostGroup {
                 _ => rule.half_life(if full.is_nan() { 1.0 } else { full }),
             },
             half_life_of_gains: of(&Followed::half_life_of_gains),
-            weight: median(cells.iter().flat_map(|c| c.events.iter().map(weight_of)).collect()),
+            weight: median(cells.iter().flat_map(|c| c.events.iter().map(|e| e.weight)).collect()),
             observations_per_lap: of(&|c| c.events.len() as f64) / laps,
             weight_at_move: of(&|c| c.weight_at_move),
             curve: curve.collect(),

@@ -30,9 +30,11 @@ pub struct GhostRun {
     pub laps_until_saturated: Option<usize>,
     /// Laps driven afterwards.
     pub laps_after: usize,
-    /// Cells of the abandoned place where the prediction should hold: saturated when the chair moved, and only
-    /// ever seen as free from then on.
-    pub measured: GhostGroup,
+    /// All cells of the abandoned place that were seen again: how long the map believes in the chair.
+    pub left: GhostGroup,
+    /// Those of them that were saturated when the chair moved, and only ever seen as free from then on. Their half-life
+    /// is the filter's gain in other words: a check of the program, not a measurement of the theory.
+    pub saturated: GhostGroup,
     /// Those that had not reached `W_max`: their gain is higher than the clamp's, and they forget faster.
     pub unclamped: GhostGroup,
     /// Cells, here and at the chair's new place, of which at least one re-observation lay behind a surface, where the
@@ -154,15 +156,16 @@ impl Run {
     }
 
     fn tell(self) -> GhostRun {
-        let groups =
-            self.watch.map(|w| w.groups(self.tsdf.rule(), self.laps_after as f64)).unwrap_or_default();
-        let [measured, unclamped, tapered] = groups;
+        let (rule, laps) = (self.tsdf.rule(), self.laps_after as f64);
+        let of_watch = |w: &GhostWatch| (w.left(rule, laps), w.groups(rule, laps));
+        let (left, [saturated, unclamped, tapered]) = self.watch.as_ref().map(of_watch).unwrap_or_default();
         GhostRun {
             w_max: self.w_max,
             laps_before: self.laps_before,
             laps_until_saturated: self.saturated_after,
             laps_after: self.laps_after,
-            measured,
+            left,
+            saturated,
             unclamped,
             tapered,
             static_noise: None,

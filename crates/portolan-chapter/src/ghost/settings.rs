@@ -18,6 +18,8 @@ pub struct GhostSettings {
     pub sweep: BeamSweep,
     /// How much each beam is trusted.
     pub weights: WeightModel,
+    /// Weight of free space against a surface's 1.
+    pub carve_weight: f32,
     /// One lap.
     pub lap: LapConfig,
     /// After so many laps the chair moves, saturated or not.
@@ -40,6 +42,7 @@ impl Default for GhostSettings {
             truncation: 0.15,
             sweep: BeamSweep::default(),
             weights: WeightModel::default(),
+            carve_weight: 1.0,
             lap: LapConfig::default(),
             max_laps_before: 4,
             max_laps_after: 16,
@@ -55,7 +58,8 @@ pub(super) fn map_config(settings: &GhostSettings, w_max: f32) -> TsdfConfig<2> 
         truncation: settings.truncation,
         beams: settings.sweep,
         weights: settings.weights,
-        ..Default::default()
+        carve_weight: settings.carve_weight,
+        ..TsdfConfig::textbook()
     }
 }
 

@@ -58,15 +58,23 @@ impl GhostWatch {
     /// only ever seen as free since), those that had not reached the clamp, and those of which some re-observation lay
     /// behind a surface. `laps` have gone by since the move.
     pub fn groups(&self, rule: &TsdfRule, laps: f64) -> [GhostGroup; 3] {
-        [Fate::Measured, Fate::Unclamped, Fate::Tapered].map(|fate| {
+        [Fate::Saturated, Fate::Unclamped, Fate::Tapered].map(|fate| {
             let cells = self.cells.iter().map(|c| &c.1).filter(|c| c.fate(self.w_max) == fate);
             GhostGroup::of(&cells.collect::<Vec<_>>(), rule, laps)
         })
     }
 
+    /// All cells of the old place that were seen again since the thing moved, whatever their weight was and whatever they
+    /// were told.
+    pub fn left(&self, rule: &TsdfRule, laps: f64) -> GhostGroup {
+        let cells = self.cells.iter().map(|c| &c.1);
+        let left = cells.filter(|c| !c.appears && c.fate(self.w_max) != Fate::Silent);
+        GhostGroup::of(&left.collect::<Vec<_>>(), rule, laps)
+    }
+
     /// Whether there are cells for which the prediction should hold, and all were seen for `half_lives` of it.
     pub(crate) fn is_measured(&self, rule: &TsdfRule, half_lives: f64) -> bool {
-        let mut measured = self.cells.iter().filter(|c| c.1.fate(self.w_max) == Fate::Measured).peekable();
+        let mut measured = self.cells.iter().filter(|c| c.1.fate(self.w_max) == Fate::Saturated).peekable();
         // Without a cell that is seen again the run goes on to its last lap.
         measured.peek().is_some()
             && measured.all(|(_, c)| c.events.len() as f64 >= half_lives * rule.half_life(c.weight()))

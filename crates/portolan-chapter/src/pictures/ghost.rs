@@ -44,7 +44,7 @@ fn prediction(half_life: f64, longest: f64) -> Vec<[f64; 2]> {
 }
 
 fn longest(forgetting: &Forgetting) -> f64 {
-    let ends = forgetting.ghost.per_w_max.iter().filter_map(|r| r.measured.curve.last());
+    let ends = forgetting.ghost.per_w_max.iter().filter_map(|r| r.saturated.curve.last());
     ends.map(|p| p[0]).fold(2.0, f64::max)
 }
 
@@ -54,13 +54,13 @@ fn measured(forgetting: &Forgetting) -> Chart {
         "Saturated cells seen as free: the filter's own rate",
         "Median error of the cells, as a part of the error when the chair moved. Dots: half-lives.",
     );
-    for (run, tone) in runs(forgetting).filter(|(r, _)| r.measured.cells > 0) {
-        let m = &run.measured;
+    for (run, tone) in runs(forgetting).filter(|(r, _)| r.saturated.cells > 0) {
+        let m = &run.saturated;
         let name = format!("W_max {}: {:.1}", run.w_max, m.half_life_measured);
         chart = chart.series(Series::line(name, m.curve.iter().copied(), tone).width(4.5));
     }
-    for (n, (run, _)) in runs(forgetting).filter(|(r, _)| r.measured.cells > 0).enumerate() {
-        let m = &run.measured;
+    for (n, (run, _)) in runs(forgetting).filter(|(r, _)| r.saturated.cells > 0).enumerate() {
+        let m = &run.saturated;
         let end = m.curve.last().map_or(1.0, |p| p[0]);
         let name = if n == 0 { "prediction" } else { "" };
         chart = chart.series(
@@ -68,9 +68,9 @@ fn measured(forgetting: &Forgetting) -> Chart {
         );
     }
     for (run, tone) in runs(forgetting) {
-        if run.measured.half_life_measured.is_finite() {
+        if run.saturated.half_life_measured.is_finite() {
             chart =
-                chart.series(Series::scatter("", [[run.measured.half_life_measured, 0.5]], tone).width(7.0));
+                chart.series(Series::scatter("", [[run.saturated.half_life_measured, 0.5]], tone).width(7.0));
         }
     }
     chart
@@ -92,9 +92,9 @@ fn deviating(forgetting: &Forgetting) -> Chart {
             chart = chart.series(Series::line(name, group.curve.iter().copied(), tone).width(width));
         }
     }
-    for (n, (run, _)) in runs(forgetting).filter(|(r, _)| r.measured.cells > 0).enumerate() {
+    for (n, (run, _)) in runs(forgetting).filter(|(r, _)| r.saturated.cells > 0).enumerate() {
         let name = if n == 0 { "prediction" } else { "" };
-        let curve = prediction(run.measured.half_life_predicted, longest(forgetting));
+        let curve = prediction(run.saturated.half_life_predicted, longest(forgetting));
         chart = chart.series(Series::line(name, curve, color::INK).dashed().width(1.5));
     }
     chart

@@ -4,22 +4,47 @@ use portolan_sim::ErrorSummary;
 
 use super::page::{escaped, figure, table};
 use super::{Facts, Section};
-use crate::gallery::Gallery;
+use crate::gallery::{Accuracy, Gallery};
 use crate::pictures::{self, Layer, Scene};
 
-/// Median, p99, worst over, worst under in millimeters.
-fn cells(error: Option<ErrorSummary>) -> Vec<String> {
-    let mm = |v: f64| format!("{:.1}", 1e3 * v);
-    match error {
-        Some(e) => vec![mm(e.median), mm(e.p99), mm(e.worst_over), mm(e.worst_under)],
-        None => vec!["–".into(); 4],
+/// A cell: the median over the turned worlds, with the world as it is drawn under it, where both were measured.
+fn beside(gallery: &Gallery, tell: impl Fn(&Accuracy) -> Option<String>) -> String {
+    let drawn = Accuracy::of(gallery);
+    match (tell(&gallery.headline()), tell(&drawn)) {
+        (Some(headline), Some(drawn)) if gallery.turned.is_some() => {
+            format!("{headline}<small>as drawn {drawn}</small>")
+        }
+        (headline, _) => headline.unwrap_or_else(|| "–".into()),
     }
+}
+
+/// Median, p99, worst over, worst under in millimeters.
+fn cells(gallery: &Gallery, of: impl Fn(&Accuracy) -> Option<ErrorSummary>) -> Vec<String> {
+    let parts: [fn(&ErrorSummary) -> f64; 4] = [|e| e.median, |e| e.p99, |e| e.worst_over, |e| e.worst_under];
+    let cell =
+        |part: fn(&ErrorSummary) -> f64| beside(gallery, |a| of(a).map(|e| format!("{:.1}", 1e3 * part(&e))));
+    parts.into_iter().map(cell).collect()
+}
+
+/// In which worlds the errors were measured.
+fn worlds(gallery: &Gallery) -> String {
+    let Some(turned) = &gallery.turned else { return String::new() };
+    let angles: Vec<String> = turned.turns.iter().map(|t| format!("{}°", t.degrees)).collect();
+    format!(
+        "<p>The walls of this apartment lie on borders of cells, and that accident decides some errors. So each error here is \
+         the median over {} worlds, turned by {} against the lattice and shifted by parts of a cell; under it stands the \
+         world as it is drawn.</p>",
+        angles.len(),
+        angles.join(", ")
+    )
 }
 
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     facts.scene.world?;
     let gallery = facts.scene.gallery;
-    let body = [distances(gallery), fields(gallery), surfaces(gallery), gradients(&facts.scene)].concat();
+    let body =
+        [worlds(gallery), distances(gallery), fields(gallery), surfaces(gallery), gradients(&facts.scene)]
+            .concat();
     Some(Section {
         title: "How true the answers are",
         body,
@@ -29,8 +54,10 @@ pub(super) fn section(facts: &Facts) -> Option<Section> {
 
 fn distances(gallery: &Gallery) -> String {
     let header = ["answer", "median", "99 %", "worst, too large", "worst, too small"];
-    let asked = gallery.rows.iter().filter(|r| r.distance_error.is_some());
-    let rows: Vec<_> = asked.map(|r| [vec![escaped(&r.name)], cells(r.distance_error)].concat()).collect();
+    let asked = gallery.rows.iter().enumerate().filter(|(_, r)| r.distance_error.is_some());
+    let rows: Vec<_> = asked
+        .map(|(i, r)| [vec![escaped(&r.name)], cells(gallery, |a| a.rows[i].distance_error)].concat())
+        .collect();
     format!(
         "<p>The text has no such column, and it matters more than speed. Distances are asked at observed free points and \
          compared with the true world (millimetres):</p>{}\
@@ -46,11 +73,12 @@ fn fields(gallery: &Gallery) -> String {
     let rows: Vec<Vec<String>> = gallery
         .fields
         .iter()
-        .map(|field| {
+        .enumerate()
+        .map(|(k, field)| {
             let mut row = vec![field.name().to_owned()];
-            row.extend(cells(field.against_contour));
-            row.extend(cells(field.against_truth).into_iter().take(2));
-            row.push(format!("{:.3}", field.gradient));
+            row.extend(cells(gallery, |a| a.fields[k].against_contour));
+            row.extend(cells(gallery, |a| a.fields[k].against_truth).into_iter().take(2));
+            row.push(beside(gallery, |a| Some(format!("{:.3}", a.fields[k].gradient))));
             row
         })
         .collect();
@@ -67,34 +95,36 @@ fn surfaces(gallery: &Gallery) -> String {
     let rows: Vec<_> = gallery
         .rows
         .iter()
-        .filter(|r| r.surface_error.is_some())
-        .map(|r| {
+        .enumerate()
+        .filter(|(_, r)| r.surface_error.is_some())
+        .map(|(i, r)| {
+            let parts: [fn(&ErrorSummary) -> f64; 3] = [|e| e.median, |e| e.bias, |e| e.p99];
+            let error = |part: fn(&ErrorSummary) -> f64| {
+                beside(gallery, |a| a.rows[i].surface_error.map(|e| format!("{:.1}", 1e3 * part(&e))))
+            };
             let mut row = vec![escaped(&r.name)];
-            row.extend(match r.surface_error {
-                Some(e) => [e.median, e.bias, e.p99].map(|v| format!("{:.1}", 1e3 * v)),
-                None => Default::default(),
-            });
-            row.push(r.occupancy_wrong.map_or("–".into(), |w| format!("{:.2} %", 100.0 * w)));
+            row.extend(parts.map(error));
+            row.push(beside(gallery, |a| a.rows[i].occupancy_wrong.map(|w| format!("{:.2} %", 100.0 * w))));
             row
         })
         .collect();
     format!(
         "<p>Surfaces, and answers to \"is this point occupied?\" (millimetres; positive bias: in front of the true face; \
          wrong answers among points further than half a cell from any face):</p>{}\
-         <p>Maps of bits stand a whole cell in front of the faces here: the faces of this apartment lie on the borders of \
-         cells, the noise of the range puts half of all end points into the cell in front, and one end point in a scan is \
+         <p>As drawn, maps of bits stand a whole cell in front of the faces: the faces lie on the borders of cells, the noise of the range puts half of all end points into the cell in front, and one end point in a scan is \
          enough to count the cell as hit. A signed distance averages the noise instead.</p>\
          <p>The text asks the contour by its crossing number, which counts on closed outlines. Seen from its rooms a building \
          is none: of the outer walls only the inner faces were observed, and every count is off by one. Here the first segment \
          that a ray meets decides, by the side that it shows; through a gap in the contour it still sees the wrong wall.</p>\
-         <p>Thin walls come out too thick. Each side's claim reaches the truncation deep and meets the other side's there: at \
-         τ = 15 cm a wall of 10 cm comes out 11.1 cm thick, at τ = 30 cm 16.4 cm. Walls between τ and 2 τ keep their faces. A \
-         smaller truncation is the remedy, as far as the noise of the range allows.</p>",
+         <p>Thin walls come out too thick. Each side's claim reaches the truncation deep and meets the other side's there, \
+         where it is thinner than τ; walls between τ and 2 τ keep their faces. A smaller truncation is the remedy, as far as \
+         the noise of the range allows.</p>",
         table(&header, &rows, &[])
     )
 }
 
 fn gradients(scene: &Scene) -> String {
+    let headline = scene.gallery.headline();
     let picture = figure(
         &pictures::figure(Layer::EsdfError, scene),
         "wide",
@@ -106,6 +136,6 @@ fn gradients(scene: &Scene) -> String {
         "<p>A gradient of length one says \"this way is away from the obstacle\". Median ‖∇‖ at observed free points: \
          <b>{:.3}</b> for the ESDF, <b>{:.3}</b> for the raw TSDF, which is constant beyond 15 cm: a planner on it stands \
          still.</p>{picture}",
-        scene.gallery.fields[0].gradient, scene.gallery.tsdf_gradient,
+        headline.fields[0].gradient, headline.tsdf_gradient,
     )
 }

@@ -52,7 +52,8 @@ pub(super) fn section(facts: &Facts) -> Section {
 /// The table of the three sets of poses.
 fn pose_sets(drift: &Drift) -> String {
     let errors = [None, Some(&drift.before), Some(&drift.after)];
-    let sets = PoseSet::ALL.into_iter().zip(errors).zip(drift.contours);
+    let contours = drift.contours.into_iter().zip(drift.contours_as_drawn);
+    let sets = PoseSet::ALL.into_iter().zip(errors).zip(contours);
     let rows: Vec<_> =
         sets.map(|((set, errors), contour)| row(set, set == drift.chosen, errors, contour)).collect();
     let header = [
@@ -70,7 +71,7 @@ fn row(
     set: PoseSet,
     chosen: bool,
     errors: Option<&PoseErrors>,
-    contour: Option<ErrorSummary>,
+    (contour, drawn): (Option<ErrorSummary>, Option<ErrorSummary>),
 ) -> Vec<String> {
     let name = match set {
         PoseSet::True => "the simulator's: true",
@@ -87,10 +88,13 @@ fn row(
         ],
         None => ["0", "0", "0"].map(String::from),
     });
-    cells.extend(match contour {
-        Some(e) => [e.median, e.p95].map(|v| format!("{:.1} mm", 1e3 * v)),
-        None => ["–", "–"].map(String::from),
-    });
+    let parts: [fn(&ErrorSummary) -> f64; 2] = [|e| e.median, |e| e.p95];
+    cells.extend(parts.map(|part| match (contour, drawn) {
+        (Some(e), Some(d)) => {
+            format!("{:.1} mm<small>as drawn {:.1}</small>", 1e3 * part(&e), 1e3 * part(&d))
+        }
+        _ => "–".to_owned(),
+    }));
     cells
 }
 

@@ -9,7 +9,12 @@ use crate::pictures;
 
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     let forgetting = facts.forgetting?;
-    let body = format!("{}{}{}", half_lives(forgetting), failures(&forgetting.ghost.per_w_max), PRICE);
+    let body = format!(
+        "{}{}{}",
+        half_lives(forgetting),
+        failures(&forgetting.ghost.per_w_max),
+        price(&forgetting.ghost.per_w_max)
+    );
     Some(Section {
         title: "The ghost of the chair, and what forgetting costs",
         body,
@@ -24,8 +29,8 @@ fn half_lives(forgetting: &Forgetting) -> String {
         &pictures::ghost(forgetting),
         "full",
         "Error of the moved chair's cells against re-observations",
-        "<b>Forgetting, counted in observations.</b> Left: cells that were saturated and are seen as free from then on; measured \
-         curves under the dashed prediction. Right: the cells that the prediction does not cover.",
+        "<b>Forgetting, counted in observations.</b> Left: cells that were saturated and are seen as free from then on, which \
+         follow from the gain (dashed). Right: the cells that the prediction does not cover.",
     );
     let restless = if runs.iter().all(|r| r.laps_until_saturated.is_none()) {
         "With none of the three clamps were <em>all</em> cells of the chair saturated by then: those deep inside it are only \
@@ -37,7 +42,8 @@ fn half_lives(forgetting: &Forgetting) -> String {
         "<p>The chair stands while the lap is driven up to {before} times; then it is moved, and the laps go on for three \
          predicted half-lives. Every cell of its old place is followed from observation to observation. {restless} A cell at its \
          clamp keeps <i>W<sub>max</sub></i> / (<i>W<sub>max</sub></i> + <i>w</i>) of its error in each step, so half of it is \
-         left after <i>n</i> = ln 2 / ln(1 + <i>w</i> / <i>W<sub>max</sub></i>) observations.</p>{table}\
+         left after <i>n</i> = ln 2 / ln(1 + <i>w</i> / <i>W<sub>max</sub></i>) observations. How long the map believes in the chair is \
+         measured over <em>all</em> cells of the place that were seen again; the kinds of cells are beside it.</p>{table}\
          <p>Half-lives are medians in re-observations, not in scans: a cell that the lap passes rarely haunts the map longer. \
          Where not all cells of a group had lost half of their error when the run ended, the table says how many had; “never” \
          is a median over as many that had not. The curves go on only as long as half of a group was still being observed.</p>{picture}",
@@ -46,11 +52,12 @@ fn half_lives(forgetting: &Forgetting) -> String {
     )
 }
 
-const HEADER: [&str; 8] = [
+const HEADER: [&str; 9] = [
     "W<sub>max</sub>",
     "saturated after",
-    "half-life: saturated cells",
-    "predicted",
+    "half-life: all cells left",
+    "saturated",
+    "by the gain",
     "not yet clamped",
     "tapered",
     "noise at rest",
@@ -67,15 +74,16 @@ fn row(run: &GhostRun) -> Vec<String> {
     let noise = run.static_noise.map_or(["–".into(), "–".into()], |n| {
         [n.measured, n.predicted].map(|v| format!("{:.2} mm", 1e3 * v))
     });
-    let m = &run.measured;
+    let m = &run.saturated;
     let mut row = vec![
         format!("{}", run.w_max),
         match run.laps_until_saturated {
             Some(laps) => format!("{laps} laps"),
             None => format!("moved after {}<small>not all saturated</small>", run.laps_before),
         },
+        format!("<b>{}</b>", cells(&run.left)),
         cells(m),
-        format!("<b>{}</b>", shown_half_life(m.half_life_predicted)),
+        shown_half_life(m.half_life_predicted),
         cells(&run.unclamped),
         cells(&run.tapered),
     ];
@@ -97,9 +105,9 @@ fn failures(runs: &[GhostRun]) -> String {
         None => String::new(),
     };
     format!(
-        "<p><b>How much the agreement is worth.</b> Little, and it should be said. The measured cells only ever receive +τ with \
-         weight 1 after the move: for them the half-life is nearly algebra, and the experiment tests the program, not the \
-         theory. What the theory leaves out shows in the cells that were sorted out.</p>\
+        "<p><b>Saturated cells are no measurement.</b> They only ever receive +τ with weight 1 after the move, and +τ is the truth \
+         there: their error after <i>n</i> looks <em>is</em> the product of what each look leaves, so that column tests the \
+         program, not the theory. What the theory leaves out shows in the other columns, and all of it in the first.</p>\
          <p><b>Where the prediction fails</b> (exercise 4), and why:</p><ul>\
          <li><b>Tapered weights.</b> Behind a surface the weight falls from 1 to 0 at −τ. A cell that is sometimes seen from \
          behind one learns with <i>w</i> &lt; 1 (here {weight:.2} in the median), and the half-life grows about as \
@@ -117,8 +125,18 @@ fn failures(runs: &[GhostRun]) -> String {
 }
 
 /// What forgetting costs.
-const PRICE: &str = "<p><b>What forgetting costs.</b> A map that forgets never comes to rest: where nothing moves, its cells keep the standard \
+fn price(runs: &[GhostRun]) -> String {
+    let noise = |run: &GhostRun| Some((run.w_max, run.static_noise?.measured));
+    let compared = match (runs.first().and_then(noise), runs.last().and_then(noise)) {
+        (Some((short, noisy)), Some((long, calm))) if long > short => {
+            format!("{:.0} times the memory, {:.2} of the noise", long / short, calm / noisy)
+        }
+        _ => "The longer the memory, the less noise".to_owned(),
+    };
+    format!(
+        "<p><b>What forgetting costs.</b> A map that forgets never comes to rest: where nothing moves, its cells keep the standard \
          deviation σ / √(2 <i>W<sub>max</sub></i> + <i>w</i>). The last two columns are the same three maps in a world that stands \
          still. The measured noise lies above the prediction, more so for large clamps: lost beams make the mix of views differ from \
-         lap to lap, and each view has a bias of its own. Sixteen times the memory, about a third of the noise: choose by how often \
-         things move.</p>";
+         lap to lap, and each view has a bias of its own. {compared}: choose by how often things move.</p>"
+    )
+}

@@ -3,6 +3,10 @@
 use super::page::{escaped, table};
 use super::{Facts, Section};
 
+/// The text's tree: leaves (meters), and the nodes that it counted.
+const TEXT_LEAF: f64 = 0.0625;
+const TEXT_NODES: u32 = 11_957;
+
 pub(super) fn section(facts: &Facts) -> Section {
     let gallery = facts.scene.gallery;
     let rows: Vec<Vec<String>> = gallery
@@ -20,6 +24,10 @@ pub(super) fn section(facts: &Facts) -> Section {
         .collect();
     let surface = facts.scene.world.map_or(gallery.contour.length(), |w| w.wall_length());
     let [w, h] = gallery.tsdf.grid().aabb().extent();
+    // Of our walls, which are as long as the text's.
+    let crossed = 2.0 * surface / TEXT_LEAF;
+    let stored = 2.0 * crossed;
+    let (ratio, rest) = (stored * 20.0 / 43_200.0, f64::from(TEXT_NODES) - stored);
     let header = ["node", "leaf", "breaks even at", "bytes against the dense array: formula", "measured"];
     let body = format!(
         "<p>A tree keeps cells refined only where surface is. With <i>S</i> = {surface:.1} m of wall faces in \
@@ -31,11 +39,12 @@ pub(super) fn section(facts: &Facts) -> Section {
          promises more than is measured, since a tree also refines where free space meets the unknown, and that frontier is a surface \
          too; furniture is not in <i>S</i> either.</p>\
          <p>The text explains its own gap, 5.5 measured against 4.2 by the formula, by that frontier alone. Most of it is \
-         arithmetic. The formula counts the nodes that surface runs through, 2 <i>S</i>/<i>r</i> = 5,780, and a node has three \
+         arithmetic. The formula counts the nodes that surface runs through, 2 <i>S</i>/<i>r</i> = {crossed:.0}, and a node has three \
          siblings which the tree of 20-byte nodes stores as well: two of every four children of a refined node hold no surface, so \
-         that 4 <i>S</i>/<i>r</i> = 11,560 is the count to expect. And 4.2 is against a dense array of the tree's own 6.25 cm \
+         that 4 <i>S</i>/<i>r</i> = {stored:.0} is the count to expect. And 4.2 is against a dense array of the tree's own 6.25 cm \
          cells, 5.5 against the 43.2 kB of a 5 cm grid. With siblings and the 5 cm grid the formula gives \
-         11,560 × 20 B / 43.2 kB = 5.35; only the rest, some 400 of 11,957 nodes, is left for the frontier. {}</p>",
+         {stored:.0} × 20 B / 43.2 kB = {ratio:.2}; only the rest, {rest:.0} of the text's {TEXT_NODES} nodes, is left for the \
+         frontier. {}</p>",
         w * h,
         table(&header, &rows, &[]),
         ours(facts)

@@ -63,7 +63,7 @@ fn introduction(facts: &Facts) -> String {
          once: {width} × {height} cells of 5 cm, truncation 15 cm, weights clamped at {clamp}. Then all of them are asked the \
          same three questions: <em>is this point occupied? how far is the nearest surface? where is the boundary?</em> \
          The simulator knows the truth, so each answer has an error beside its cost.</p>\
-         <p>Everything on this page was computed in {seconds:.1} s, on the machine that wrote it, by the command under \
+         <p>Every number of ours on this page was computed in {seconds:.1} s, on the machine that wrote it, by the command under \
          each section. Times vary from run to run by some ten percent; memory and errors do not.</p>{warnings}",
         scans = facts.scene.log.len(),
         poses = match facts.drift.chosen {

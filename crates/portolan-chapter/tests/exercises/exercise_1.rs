@@ -23,13 +23,15 @@ fn variance_after(w_max: f32, (sigma, w): (f64, f64), n: usize, runs: u64) -> f6
 }
 
 /// The variance of a clamped cell at rest, `n` long enough for the beginning to be forgotten to a part in 10,000, and
-/// the prediction.
+/// the prediction: `K sigma^2 / (w (2 - K))` with the gain at the clamp, where weights below 1 are taken for 1.
 fn settled(w_max: f32, (sigma, w): (f64, f64)) -> [f64; 2] {
     let n = (10.0 * (f64::from(w_max) / w + 1.0)) as usize;
-    [variance_after(w_max, (sigma, w), n, 8000), sigma * sigma / (2.0 * f64::from(w_max) + w)]
+    let unit = f64::max(w, 1.0);
+    let predicted = sigma * sigma * unit / w / (2.0 * f64::from(w_max) + unit);
+    [variance_after(w_max, (sigma, w), n, 8000), predicted]
 }
 
-/// Exercise 1 (a): a clamped cell never comes to rest, and its variance is `sigma^2 / (2 W_max + w)`.
+/// Exercise 1 (a): a clamped cell never comes to rest, and its variance is `sigma^2 / (2 W_max + w)` for weights of 1 and more.
 #[test]
 fn exercise_1_steady_state_variance() {
     for (w_max, w) in [(4.0f32, 1.0), (24.0, 1.0), (64.0, 1.0), (16.0, 2.0), (8.0, 0.5)] {

@@ -9,7 +9,7 @@ use portolan::map::{Tsdf2, TsdfConfig};
 fn fused_line(beams: &[(f64, f64, f64)], r: f64, tau: f64) -> Tsdf2 {
     let half = (tau / r).ceil();
     let grid = Grid::new([0.0, -r * half], r, [1, 2 * half as usize]);
-    let config = TsdfConfig { truncation: tau, w_max: f32::INFINITY, ..TsdfConfig::default() };
+    let config = TsdfConfig { truncation: tau, w_max: f32::INFINITY, ..TsdfConfig::textbook() };
     let mut map = Tsdf2::covering(&grid, config).unwrap();
     for j in 0..grid.shape[1] as i32 {
         let y = map.grid().lattice.center([0, j])[1];

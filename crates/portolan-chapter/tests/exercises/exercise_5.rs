@@ -60,7 +60,7 @@ fn exercise_5_on_the_page() {
     let cells = Grid::new([0.0; 2], R, [240, 180]);
     let mut grid = OccupancyGrid::covering(&cells, OccupancyModel::default()).unwrap();
     let mut tree = Quadtree::covering(&cells, OccupancyModel::default()).unwrap();
-    let mut tsdf = Tsdf2::covering(&cells, TsdfConfig::default()).unwrap();
+    let mut tsdf = Tsdf2::covering(&cells, TsdfConfig::textbook()).unwrap();
     for (pose, scan) in &log {
         grid.integrate(pose, scan).unwrap();
         tree.integrate(pose, scan).unwrap();

@@ -8,7 +8,7 @@ use portolan::field::EsdfGrid;
 use portolan::geom::Pose;
 use portolan::map::OccupancyGrid;
 use portolan::store::{Dense, Tree};
-use portolan::surface::{Contour, ContourSettings, marching_cubes, marching_squares};
+use portolan::surface::{Contour, ContourSettings, MeshSettings, marching_cubes, marching_squares};
 use portolan_io::{
     EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, write_esdf, write_map_server,
     write_octomap_bt, write_octomap_ot,
@@ -18,11 +18,11 @@ use serde_json::json;
 use self::arrays::ArrayArgs;
 use self::costs::CostArgs;
 use self::field::Field;
-use crate::arguments::{Bounds, bounds, length};
+use crate::arguments::{Bounds, bounds, length, thin};
 use crate::dimension::{Given, ONLY_3D};
 use crate::error::bad_call;
 use crate::esdf::{EsdfArg, esdf_of_cells, status_plane, tsdf_of_samples};
-use crate::mapping::{cells_for_map_server, mesh_settings, polylines, write_contour, write_mesh};
+use crate::mapping::{cells_for_map_server, polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
 
@@ -50,6 +50,10 @@ pub(crate) struct Args {
     /// Largest distance of the distance field (meters) [default: as the map was made]
     #[arg(long, value_name = "M", value_parser = length, help_heading = ONLY_3D)]
     max_distance: Option<f64>,
+    /// Share of the beams through a cell of a map.portolan that must end there to make it an obstacle where no surface is
+    /// found; 0: only surfaces are [default: as the map was made]
+    #[arg(long, value_name = "SHARE", value_parser = thin, allow_negative_numbers = true)]
+    thin: Option<f64>,
     /// Write only this box of the distance field: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (meters)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     bounds: Option<Bounds>,
@@ -196,7 +200,7 @@ fn convert_map3(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Resul
         }
         (Target::Mesh, _, Some(map)) => {
             let colors = file.color_bricks.as_ref().map(|c| &c.store);
-            return write_mesh(&args.out, &marching_cubes(&map.store, colors, &mesh_settings(map.weights)));
+            return write_mesh(&args.out, &marching_cubes(map, colors, &MeshSettings::default()));
         }
         _ => return Ok(false),
     }
@@ -308,6 +312,7 @@ impl Args {
             let given = [
                 ("--esdf", self.esdf.is_some()),
                 ("--max-distance", self.max_distance.is_some()),
+                ("--thin", self.thin.is_some()),
                 ("--bounds", self.bounds.is_some()),
                 ("--unknown", self.arrays.unknown.is_some()),
             ];

@@ -48,6 +48,10 @@ pub(crate) struct Args {
     poses: PosesArg,
     #[command(flatten)]
     forgetting: ForgettingArgs,
+    /// Accuracy is the median over worlds turned by these angles against the lattice, and shifted by parts of a cell
+    /// (degrees, separated by commas) [default: 0,10,17,30,45; a second or so for each]
+    #[arg(long, value_name = "DEGREES", value_delimiter = ',', allow_negative_numbers = true, value_parser = gallery::degrees)]
+    turn: Vec<f64>,
     /// Leave out the experiment with the moved chair
     #[arg(long)]
     no_ghost: bool,
@@ -104,9 +108,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (mut file, fusion) = run.timed("fuse", || fused(&settings, &grid, &scans, args.output))?;
     describe(&mut file, &settings, &config, &fusion.stats);
     let derived = run.timed("derive", || Derived::of(&file, &settings, usize::MAX));
-    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings)))?;
-    let gallery =
+    let turns = gallery::turns(&args.turn);
+    run.timed("pose_sets", || drift.measure_maps(&scans, &world, &config_of(&settings), &turns))?;
+    let mut gallery =
         run.timed("gallery", || gallery::measure(&scans, &grid, &settings, PROBES, Some(&world)))?;
+    let turned =
+        run.timed("turned", || gallery::measure_turned(&scans, &grid, &settings, &world, &args.turn))?;
+    gallery.turned = Some(turned);
 
     gallery::make_folder(&args.out)?;
     let scene = Scene { gallery: &gallery, log: &scans, poses: drift.chosen.poses(), world: Some(&world) };
@@ -120,7 +128,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
                 run.timed("gallery_files", || gallery::write_files(&args.out, &scene, &table, &title))?;
             run.files.extend(files);
             let title = format!("The Apartment · cells of 5 cm · {} scans", scans.len());
-            let artifacts = Artifacts { file: &file, derived: &derived, dense: None, camera: false, title };
+            let edge = RESOLUTION;
+            let artifacts =
+                Artifacts { file: &file, derived: &derived, dense: None, edge, camera: false, title };
             let written = run.timed("map_files", || {
                 file.write(&args.out.join("map.portolan"))?;
                 artifacts.write(&args.out)
@@ -226,12 +236,13 @@ fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), made)
 }
 
-/// Free space weighs as much as a surface, as in the textbook (`map` gives it less).
+/// The textbook's weights: free space weighs as much as a surface and the clamp is 64 (`map` has others).
 fn settings(lidar: &Lidar, w_max: Option<f32>) -> Settings {
     let mut settings = Settings::default();
     settings.shape.resolution = RESOLUTION;
     settings.shape.truncation = Some(TRUNCATION);
     settings.shape.carve_weight = 1.0;
+    settings.shape.forgetting = ForgettingArgs::of(TsdfConfig::<2>::textbook().w_max);
     settings.shape.range = RangeArgs { max_range: Some(lidar.max_range), ..RangeArgs::default() };
     if let Some(w_max) = w_max {
         settings.shape.forgetting = ForgettingArgs::of(w_max);
@@ -245,7 +256,7 @@ fn config_of(settings: &Settings) -> TsdfConfig<2> {
         resolution: settings.resolution(),
         truncation: settings.truncation(),
         w_max: settings.w_max(),
-        ..Default::default()
+        ..TsdfConfig::textbook()
     }
 }
 

@@ -11,13 +11,13 @@ use portolan::geom::{Grid, Pose};
 use portolan::map::TsdfConfig;
 use portolan::scan::Scan;
 use portolan::surface::ContourSettings;
-use portolan_chapter::gallery::{Gallery, GallerySettings, document};
+use portolan_chapter::gallery::{Gallery, GallerySettings, Turn, Turned, document};
 use portolan_chapter::pictures::{Scene, sheet};
 use portolan_io::write_atomic;
 use portolan_sim::{LapConfig, World};
 use serde_json::Value;
 
-use crate::arguments::{Bounds, bounds, bytes, length};
+use crate::arguments::{Bounds, ForgettingArgs, bounds, bytes, length};
 use crate::dimension::Dimension;
 use crate::error::bad_call;
 use crate::log::{self, LimitArgs, LogArgs, Selection};
@@ -42,6 +42,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=10_000_000))]
     #[arg(default_value = "100000")]
     probes: u32,
+    /// With demo: accuracy is the median over worlds turned by these angles against the lattice, and shifted by parts of a
+    /// cell (degrees, separated by commas) [default: 0,10,17,30,45; a second or so for each]
+    #[arg(long, value_name = "DEGREES", value_delimiter = ',', allow_negative_numbers = true, value_parser = degrees)]
+    turn: Vec<f64>,
     /// Folder for gallery.png, gallery.json and gallery.txt; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -99,7 +103,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     if scans.iter().all(|(_, scan)| scan.counts().hit == 0) {
         anyhow::bail!("{name}: no beam of {} scans hit anything; there is nothing to compare", scans.len());
     }
-    let gallery = measure(&scans, &grid, &settings, args.probes as usize, world.as_ref())?;
+    let mut gallery = measure(&scans, &grid, &settings, args.probes as usize, world.as_ref())?;
+    if let Some(world) = &world {
+        gallery.turned = Some(measure_turned(&scans, &grid, &settings, world, &args.turn)?);
+    } else if !args.turn.is_empty() {
+        return Err(bad_call("--turn is for demo: of a log's world nothing is known; leave it out"));
+    }
     let document = document(&gallery, &name, scans.len());
     if let Some(folder) = &args.out {
         make_folder(folder)?;
@@ -111,12 +120,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 impl Args {
-    /// As `demo` has them: free space weighs as much as a surface, as in the textbook (`map` gives it less).
+    /// As `demo` has them: the textbook's weights.
     fn settings(&self) -> Settings {
         let mut settings = Settings::default();
         settings.shape.resolution = self.resolution;
         settings.shape.truncation = Some(self.truncation.unwrap_or(3.0 * self.resolution));
         settings.shape.carve_weight = 1.0;
+        settings.shape.forgetting = ForgettingArgs::of(TsdfConfig::<2>::textbook().w_max);
         settings.every = self.every;
         settings.bounds = self.bounds;
         settings.resolved(Dimension::Two)
@@ -142,23 +152,59 @@ pub(crate) fn measure(
     probes: usize,
     world: Option<&World>,
 ) -> anyhow::Result<Gallery> {
-    let settings = GallerySettings {
+    let settings = gallery_settings(grid, made_with, probes, world);
+    let start = Instant::now();
+    let mut clock = || start.elapsed().as_secs_f64();
+    let truth = world.map(|w| w as &dyn portolan_sim::Truth<2>);
+    Ok(portolan_chapter::gallery::run(scans, &settings, truth, &mut clock)?)
+}
+
+/// How true the answers are in worlds that are turned by these angles (degrees); none given: the usual ones.
+pub(crate) fn measure_turned(
+    scans: &[(Pose<2>, Scan<2>)],
+    grid: &Grid<2>,
+    made_with: &Settings,
+    world: &World,
+    degrees: &[f64],
+) -> anyhow::Result<Turned> {
+    // Of the probes everywhere no more are held against the truth.
+    let settings = gallery_settings(grid, made_with, 20_000, Some(world));
+    Ok(portolan_chapter::gallery::turned(scans, &settings, world, &turns(degrees))?)
+}
+
+/// The poses of the world that these angles stand for (degrees); none given: the usual ones.
+pub(crate) fn turns(degrees: &[f64]) -> Vec<Turn> {
+    Turn::all(if degrees.is_empty() { &Turn::USUAL } else { degrees })
+}
+
+/// An angle.
+pub(crate) fn degrees(text: &str) -> Result<f64, String> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|d: &f64| d.is_finite())
+        .ok_or_else(|| "must be an angle in degrees".to_owned())
+}
+
+fn gallery_settings(
+    grid: &Grid<2>,
+    made_with: &Settings,
+    probes: usize,
+    world: Option<&World>,
+) -> GallerySettings {
+    GallerySettings {
         grid: *grid,
         tsdf: TsdfConfig {
             truncation: made_with.truncation(),
             w_max: made_with.w_max(),
-            ..Default::default()
+            ..TsdfConfig::textbook()
         },
         model: OccupancyModel::default(),
         contour: ContourSettings::default(),
         esdf: EsdfSettings::default(),
         probes,
         surface_length: world.map(World::wall_length),
-    };
-    let start = Instant::now();
-    let mut clock = || start.elapsed().as_secs_f64();
-    let truth = world.map(|w| w as &dyn portolan_sim::Truth<2>);
-    Ok(portolan_chapter::gallery::run(scans, &settings, truth, &mut clock)?)
+    }
 }
 
 /// What heads the picture.

@@ -89,7 +89,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let header = file.header();
     let title = title(&header.logs, settings.resolution(), header.scans);
     let (dense, camera) = (args.dense, log.is_of_camera());
-    let written = Artifacts { file: &file, derived: &derived, dense, camera, title }.write(&args.out)?;
+    let written =
+        Artifacts { file: &file, derived: &derived, dense, edge: settings.resolution(), camera, title }
+            .write(&args.out)?;
     let mut seconds = stages.total();
     seconds.extend(fusion.seconds.iter().chain(&derived.seconds).chain(&written.seconds));
     let mut files = written.files;

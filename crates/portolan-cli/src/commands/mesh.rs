@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::arguments::weight_or_zero;
 use crate::dimension::{Given, ONLY_2D};
 use crate::error::bad_call;
-use crate::mapping::{mesh_settings, polylines, write_contour, write_mesh};
+use crate::mapping::{polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
 
@@ -63,7 +63,7 @@ fn wrong_extension(args: &Args, names: &str) -> anyhow::Error {
 fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
     let ambiguity = if args.fixed_table { Ambiguity::FixedTable } else { Ambiguity::Decide };
-    let min_weight = args.min_weight.unwrap_or(tsdf.thresholds().surface);
+    let min_weight = args.min_weight.unwrap_or(tsdf.min_weight());
     let contour = marching_squares(tsdf, &ContourSettings { min_weight: Some(min_weight), ambiguity });
     let lines = polylines(&contour);
     if !write_contour(&args.out, &lines)? {
@@ -87,7 +87,7 @@ fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
 
 fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
     let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
-    let usual = mesh_settings(tsdf.weights);
+    let usual = MeshSettings::of(tsdf);
     let settings = MeshSettings { min_weight: args.min_weight.or(usual.min_weight), ..usual };
     let mesh = marching_cubes(&tsdf.store, file.color_bricks.as_ref().map(|c| &c.store), &settings);
     if !write_mesh(&args.out, &mesh)? {

@@ -5,46 +5,51 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Esdf, EsdfGrid, EsdfMethod, UnknownSpace};
+use portolan::field::{Esdf, EsdfGrid, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map;
 use portolan::store::Store;
 use portolan_io::{
     AnswerRow, EsdfFile, HELD_BACK, Input, MapFile, MapServerMap, OctomapTree, QueryPoints, certified_reach,
-    write_answer, write_answer_header,
+    unknown_word, write_answer, write_answer_header,
 };
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::convert::UnknownArg;
-use crate::arguments::length;
+use crate::arguments::{length, thin};
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, esdf_2d, esdf_of_cells};
-use crate::mapping::{Settings, esdf_settings};
+use crate::esdf::{EsdfArg, FieldHow, esdf_2d, esdf_3d, esdf_of_cells};
+use crate::mapping::Settings;
 use crate::output::Output;
 use crate::source::{Source, open};
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echo 1.5,2.0 | portolan query intel --points -")]
-/// Answers at points, as CSV: x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz]
+/// Answers at points, as CSV: x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz],unknown_as
 ///
-/// `status` is known, unknown, saturated or outside; it refers to `distance`, which is interpolated. The exact distance to
-/// the extracted surface, without its sign, is certified to lie between `lower` and `upper`; only a map.portolan with
-/// signed distances has these bounds. Where `status` is saturated, the surface is farther than `lower` and `upper` is
-/// empty.
+/// A row is one statement about the nearest obstacle. What is known of obstacles (the surface that `map` writes, and cells
+/// that stop beams without one, --thin) is `distance` away, certified to be no farther than `upper`. Nothing is nearer than
+/// `lower`, which counts unknown space as `unknown_as` has it (--unknown). The distance lies within its bounds; inside of
+/// obstacles all three are negative. `status` is known, unknown, saturated (obstacles are farther than `distance`, and
+/// `upper` is empty) or outside. gx,gy[,gz] is the gradient of the distance. Only a map.portolan with signed distances has
+/// bounds; of other files `distance` is interpolated.
 pub(crate) struct Args {
     /// A folder that `map` wrote, a map.portolan, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot
     map: PathBuf,
     /// CSV of x,y (2-D) or x,y,z (3-D) in meters; - reads standard input
     #[arg(long, value_name = "FILE")]
     points: PathBuf,
+    /// Share of the beams through a cell that must end there to make it an obstacle where no surface is found; 0: only
+    /// surfaces are [default: as the map was made]
+    #[arg(long, value_name = "SHARE", value_parser = thin, allow_negative_numbers = true)]
+    thin: Option<f64>,
     /// 3-D maps: largest distance to find (meters) [default: as the map was made]
     #[arg(long, value_name = "M", value_parser = length)]
     max_distance: Option<f64>,
     /// Method of the distances of a map.portolan; only accurate ones have bounds [default: accurate]
     #[arg(long, value_enum)]
     esdf: Option<EsdfArg>,
-    /// Whether lower and upper count unknown space as free (optimistic: distance to the surface, as in `distance`) or as an
-    /// obstacle (pessimistic: distance to the surface or to unknown space, whichever is nearer) [default: optimistic]
+    /// What unknown space counts as: an obstacle (pessimistic) or free (optimistic) [default: pessimistic]
     #[arg(long, value_enum)]
     unknown: Option<UnknownArg>,
     #[command(flatten)]
@@ -59,6 +64,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     }
     if args.unknown.is_some() && !matches!(source, Source::Map2(_) | Source::Map3(_)) {
         return Err(bad_call(format!("--unknown is only for a map.portolan; this is {}", source.describe())));
+    }
+    if args.thin.is_some() && !matches!(source, Source::Map2(_) | Source::Map3(_)) {
+        return Err(bad_call(format!("--thin is only for a map.portolan; this is {}", source.describe())));
     }
     if args.max_distance.is_some() && !matches!(source, Source::Map3(_)) {
         return Err(bad_call(format!(
@@ -120,6 +128,7 @@ fn row_json<const D: usize>(row: &AnswerRow<D>) -> Value {
         "lower": row.lower,
         "upper": row.upper,
         "gradient": row.gradient.map(|g| g.to_vec()),
+        "unknown_as": row.unknown.map(unknown_word),
     })
 }
 
@@ -152,7 +161,7 @@ struct Certified<const D: usize> {
 
 /// What a field in bricks answers. Only the accurate method certifies.
 fn sparse<const D: usize>(field: Esdf<D>, limit: f64, args: &Args) -> (Distance<D>, Option<Certified<D>>) {
-    let unknown = args.unknown.map_or(UnknownSpace::Optimistic, UnknownArg::space);
+    let unknown = args.unknown.map_or(UnknownSpace::default(), UnknownArg::space);
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
     let reach = certified_reach(&field);
     // Bricks are shared.
@@ -167,7 +176,7 @@ fn dense<const D: usize>(esdf: EsdfGrid<D>) -> Distance<D> {
 impl Fields {
     fn of(source: Source, args: &Args) -> anyhow::Result<Self> {
         Ok(match source {
-            Source::Map2(file) => Self::Two(of_map2(*file, args)),
+            Source::Map2(file) => Self::Two(of_map2(*file, args)?),
             Source::Esdf(EsdfFile::Two(field)) => Self::Two(of_esdf(field)),
             Source::Esdf(EsdfFile::Three(field)) => Self::Three(of_esdf(field)),
             Source::Server(map) => Self::Two(of_server(map)),
@@ -182,10 +191,20 @@ impl Fields {
     }
 }
 
-fn of_map2(file: MapFile<2>, args: &Args) -> Field<2> {
+/// As the map was made, but for what was asked for.
+fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
+    let saved = FieldHow::of(&Settings::of_saved(saved));
+    FieldHow {
+        method: args.esdf.unwrap_or_default(),
+        unknown: args.unknown != Some(UnknownArg::Optimistic),
+        thin: args.thin.unwrap_or(saved.thin),
+        max_distance: args.max_distance.unwrap_or(saved.max_distance),
+    }
+}
+
+fn of_map2(file: MapFile<2>, args: &Args) -> anyhow::Result<Field<2>> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
-        let pessimistic = args.unknown == Some(UnknownArg::Pessimistic);
-        let field = esdf_2d(t, args.esdf.unwrap_or_default(), pessimistic);
+        let field = esdf_2d(&file, t, &how(args, &file.header.settings))?;
         let (distance, clearance) = sparse(field, f64::INFINITY, args);
         // A 2-D map is a box: what lies outside does not depend on where something was seen.
         let bounds = t.grid().aabb();
@@ -194,14 +213,14 @@ fn of_map2(file: MapFile<2>, args: &Args) -> Field<2> {
             Answer::Outside => Answer::Unknown,
             answer => answer,
         });
-        (in_box, clearance)
+        anyhow::Ok((in_box, clearance))
     });
     let of_grid = || {
         let map = file.grid.as_ref()?;
         let occupied = |i: usize| map.store().at(i).map(|v| v.0 > 0);
         Some(EsdfGrid::from_mask(*map.store().grid(), occupied))
     };
-    let (distance, clearance) = match of_tsdf {
+    let (distance, clearance) = match of_tsdf.transpose()? {
         Some((distance, clearance)) => (Some(distance), clearance),
         None => (of_grid().map(dense), None),
     };
@@ -211,23 +230,20 @@ fn of_map2(file: MapFile<2>, args: &Args) -> Field<2> {
         (.., Some(map)) => Box::new(move |p| map.occupancy(p).map_or(Answer::Unknown, Answer::Known)),
         _ => Box::new(|_| Answer::Outside),
     };
-    Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY }
+    Ok(Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY })
 }
 
 fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
-    let max_distance =
-        args.max_distance.unwrap_or_else(|| Settings::of_saved(&file.header.settings).max_distance);
+    let mut how = how(args, &file.header.settings);
+    let max_distance = how.max_distance;
     let field = file.tsdf_bricks.as_ref().map(|map| {
-        let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
-        how.method = args.esdf.unwrap_or_default().method();
-        how.unknown = args.unknown == Some(UnknownArg::Pessimistic);
-        if how.method == EsdfMethod::Accurate {
+        if how.method == EsdfArg::Accurate {
             how.max_distance += HELD_BACK * map.store.lattice().resolution;
         }
-        sparse(Esdf::of(&map.store, &how), max_distance, args)
+        anyhow::Ok(sparse(esdf_3d(&file, map, &how)?, max_distance, args))
     });
     let (distance, clearance) =
-        field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
+        field.transpose()?.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
     let occupancy: Occupancy<3> = match (file.occupancy_bricks, file.tsdf_bricks) {
         (Some(map), _) => {
             let map = map::Occupancy::<3>::from_store(map.store, map.model)?;

@@ -24,6 +24,8 @@ pub(crate) struct Artifacts<'a> {
     pub(crate) derived: &'a Derived,
     /// The box of a 3-D distance field that goes into `esdf.bin`; `None`: all of it.
     pub(crate) dense: Option<Aabb<3>>,
+    /// Of a cell (meters).
+    pub(crate) edge: f64,
     /// Whether the sensor is a camera, which looks along z.
     pub(crate) camera: bool,
     /// Title of the picture.
@@ -48,6 +50,7 @@ impl Artifacts<'_> {
         self.write_surface(folder, &mut written)?;
         self.write_octree(folder, &mut written)?;
         self.write_esdf(folder, &mut written)?;
+        self.write_obstacles(folder, &mut written)?;
         self.write_map_server(folder, &mut written)?;
         written.files.push("map.portolan");
         written.seconds.insert("write", start.elapsed().as_secs_f64());
@@ -91,8 +94,8 @@ impl Artifacts<'_> {
         let path = folder.join("esdf.bin");
         match &self.derived.esdf {
             None => return Ok(()),
-            Some(DistanceField::Two(esdf)) => {
-                write_esdf(path, esdf.grid(), esdf.samples(), status_plane(esdf).as_deref())?;
+            Some(DistanceField::Two { cells, .. }) => {
+                write_esdf(path, cells.grid(), cells.samples(), status_plane(cells).as_deref())?;
             }
             Some(DistanceField::Three(esdf)) => match dense_esdf(esdf, self.dense.as_ref()) {
                 Ok(dense) => write_esdf(path, dense.grid(), dense.samples(), Some(&dense.status_bytes()))?,
@@ -103,6 +106,22 @@ impl Artifacts<'_> {
             },
         }
         written.files.push("esdf.bin");
+        Ok(())
+    }
+
+    /// `obstacles.csv`: what the distances are measured to beside the surface.
+    fn write_obstacles(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        let Some(esdf) = &self.derived.esdf else { return Ok(()) };
+        let axes = if matches!(self.file, SavedMap::Two(_)) { "x,y" } else { "x,y,z" };
+        write_atomic(folder.join("obstacles.csv"), |w| {
+            writeln!(w, "{axes},edge,kind")?;
+            for (center, kind) in esdf.points() {
+                center.iter().try_for_each(|v| write!(w, "{},", shortest(*v)))?;
+                writeln!(w, "{},{}", self.edge, kind.word())?;
+            }
+            Ok(())
+        })?;
+        written.files.push("obstacles.csv");
         Ok(())
     }
 
@@ -133,6 +152,11 @@ impl Artifacts<'_> {
         written.seconds.insert(stage, start.elapsed().as_secs_f64());
         Ok(())
     }
+}
+
+/// Without the rounding error of the product that a coordinate is: to a tenth of a nanometer.
+fn shortest(v: f64) -> f64 {
+    (v * 1e10).round() / 1e10
 }
 
 /// Title of the picture of a map: its logs, its cells, its scans.

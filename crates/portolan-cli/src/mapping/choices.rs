@@ -18,6 +18,8 @@ pub(crate) enum MapKind {
     Tree,
     /// Truncated signed distance field
     Tsdf,
+    /// Hits per meter: how many beams end in each cell, over the length of all
+    Attenuation,
     /// Euclidean signed distance field, derived from the tsdf
     Esdf,
     /// Contour, derived from the tsdf (2-D)
@@ -37,7 +39,7 @@ impl MapKind {
         match self {
             Self::Grid | Self::Contour => Some(Dimension::Two),
             Self::Mesh => Some(Dimension::Three),
-            Self::Tree | Self::Tsdf | Self::Esdf => None,
+            Self::Tree | Self::Tsdf | Self::Attenuation | Self::Esdf => None,
         }
     }
 }
@@ -50,11 +52,11 @@ pub(crate) enum SweepArg {
     CellCentre,
     /// 2-D: the textbook's march along beams
     March,
-    /// 3-D: projective where a scan has rows and columns, exact rays otherwise
+    /// 3-D: through rows and columns where a scan has them, or where they are found and keep its points; exact rays otherwise (summary.json says which, and why)
     Auto,
     /// 3-D: every ray is traced
     Exact,
-    /// 3-D: cells are projected into the range image
+    /// 3-D: the same as auto
     Projective,
 }
 

@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use anyhow::bail;
 use portolan::cell::LogOdds8;
-use portolan::field::{Esdf, EsdfGrid};
+use portolan::field::{Esdf, EsdfGrid, PointKind};
 use portolan::map::Tsdf2;
 use portolan::store::{Store, Tree};
-use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, ThinWalls};
+use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, MeshSettings, ThinWalls};
 use portolan::surface::{doubled_length, marching_cubes, marching_squares, thin_walls};
 use portolan_io::{MapFile, TsdfBricks};
 
-use super::recipe::{esdf_settings, mesh_settings};
 use super::{MapKind, Settings};
 use crate::arguments::shown_bytes;
-use crate::esdf::dense_esdf_2d;
+use crate::esdf::{FieldHow, esdf_2d, esdf_3d};
 use crate::saved::SavedMap;
 
 /// Contours nearer to each other than this and facing the same way are one wall seen twice (meters).
@@ -41,8 +41,8 @@ pub(crate) struct ContourChecked {
 
 /// The distance field of a map.
 pub(crate) enum DistanceField {
-    /// 2-D, its cells.
-    Two(EsdfGrid<2>),
+    /// 2-D: its cells, and where obstacles are that are no surface.
+    Two { cells: EsdfGrid<2>, points: Vec<([f64; 2], PointKind)> },
     /// 3-D.
     Three(Esdf<3>),
 }
@@ -64,8 +64,8 @@ impl Derived {
             derived.contour = Some(derived.timed("contour_checks", |_| ContourChecked::of(contour, tsdf)));
         }
         if settings.wants(MapKind::Esdf) {
-            let esdf = derived.timed("esdf", |_| dense_esdf_2d(tsdf, settings.esdf));
-            derived.esdf = Some(DistanceField::Two(esdf));
+            let made = derived.timed("esdf", |_| esdf_2d(file, tsdf, &FieldHow::of(settings)));
+            derived.hold_field(made.map(|field| DistanceField::two(tsdf, &field)));
         }
         derived
     }
@@ -81,35 +81,24 @@ impl Derived {
         let Some(tsdf) = &file.tsdf_bricks else { return derived };
         if settings.wants(MapKind::Mesh) {
             let colors = file.color_bricks.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
-            let how = mesh_settings(tsdf.weights);
-            derived.mesh = Some(derived.timed("mesh", |_| marching_cubes(&tsdf.store, colors, &how)));
+            let how = MeshSettings::default();
+            derived.mesh = Some(derived.timed("mesh", |_| marching_cubes(tsdf, colors, &how)));
         }
         if settings.wants(MapKind::Esdf) {
             let held = tsdf.store.memory_bytes()
                 + file.occupancy_bricks.as_ref().map_or(0, |o| o.store.memory_bytes());
-            derived.esdf = derived.timed("esdf", |derived| derived.esdf_3d(tsdf, settings, memory, held));
+            let made = derived.timed("esdf", |_| field_3d(file, tsdf, settings, memory.saturating_sub(held)));
+            derived.hold_field(made);
         }
         derived
     }
 
-    /// The field, where the memory beside what is held allows it; else a note.
-    fn esdf_3d(
-        &mut self,
-        tsdf: &TsdfBricks<3>,
-        settings: &Settings,
-        memory: usize,
-        held: usize,
-    ) -> Option<DistanceField> {
-        // The field, and as much again while it is made.
-        let needed = 2 * tsdf.store.len() * 512 * size_of::<f32>();
-        if held.saturating_add(needed) > memory {
-            let needed = shown_bytes(needed as f64);
-            self.notes.push(format!("the esdf was not made: it needs {needed} more than --memory leaves"));
-            return None;
+    /// The field, or a note why there is none.
+    fn hold_field(&mut self, made: anyhow::Result<DistanceField>) {
+        match made {
+            Ok(field) => self.esdf = Some(field),
+            Err(why) => self.notes.push(format!("the esdf was not made: {why}")),
         }
-        let mut how = esdf_settings(tsdf.weights, tsdf.carve_weight, settings.max_distance);
-        how.method = settings.esdf.method();
-        Some(DistanceField::Three(Esdf::of(&tsdf.store, &how)))
     }
 
     fn timed<T>(&mut self, name: &'static str, work: impl FnOnce(&mut Self) -> T) -> T {
@@ -129,6 +118,26 @@ impl Derived {
     }
 }
 
+/// The field of a 3-D map, where `memory` allows it.
+fn field_3d(
+    file: &MapFile<3>,
+    tsdf: &TsdfBricks<3>,
+    settings: &Settings,
+    memory: usize,
+) -> anyhow::Result<DistanceField> {
+    // The field, and as much again while it is made.
+    let needed = 2 * tsdf.store.len() * 512 * size_of::<f32>();
+    if needed > memory {
+        bail!("it needs {} more than --memory leaves", shown_bytes(needed as f64));
+    }
+    Ok(DistanceField::Three(esdf_3d(file, tsdf, &FieldHow::of(settings))?))
+}
+
+/// The obstacles of a field that are no surface.
+fn centers<const D: usize>(field: &Esdf<D>) -> Vec<([f64; D], PointKind)> {
+    field.point_obstacles().map(|(cell, kind)| (field.lattice().center(cell), kind)).collect()
+}
+
 impl ContourChecked {
     fn of(contour: Contour, tsdf: &Tsdf2) -> Self {
         let doubled = doubled_length(&contour, DOUBLED_REACH);
@@ -138,9 +147,25 @@ impl ContourChecked {
 }
 
 impl DistanceField {
+    fn two(tsdf: &Tsdf2, field: &Esdf<2>) -> Self {
+        Self::Two { cells: field.dense(tsdf.grid()), points: centers(field) }
+    }
+
+    /// Centers and kinds of the obstacles that are no surface: rows of a table.
+    pub(crate) fn points(&self) -> Vec<(Vec<f64>, PointKind)> {
+        match self {
+            Self::Two { points, .. } => {
+                points.iter().map(|(center, kind)| (center.to_vec(), *kind)).collect()
+            }
+            Self::Three(esdf) => {
+                centers(esdf).into_iter().map(|(center, kind)| (center.to_vec(), kind)).collect()
+            }
+        }
+    }
+
     fn memory_bytes(&self) -> usize {
         match self {
-            Self::Two(esdf) => esdf.memory_bytes(),
+            Self::Two { cells, .. } => cells.memory_bytes(),
             Self::Three(esdf) => esdf.memory_bytes(),
         }
     }

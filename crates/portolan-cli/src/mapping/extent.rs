@@ -30,7 +30,8 @@ impl Extent {
     pub(super) fn of_bricks(file: &MapFile<3>) -> Self {
         let occupancy = file.occupancy_bricks.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
         let tsdf = file.tsdf_bricks.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
-        Self::Three(occupancy.union(tsdf))
+        let attenuation = file.attenuation.as_ref().map_or(Aabb::EMPTY, |map| brick_extent(&map.store));
+        Self::Three(occupancy.union(tsdf).union(attenuation))
     }
 
     /// For `summary.json`.
@@ -43,7 +44,7 @@ impl Extent {
 }
 
 /// The box of all bricks of a store (meters).
-pub(crate) fn brick_extent<C: Cell>(store: &Bricks<C, 3>) -> Aabb<3> {
+pub(crate) fn brick_extent<C: Cell, const D: usize>(store: &Bricks<C, D>) -> Aabb<D> {
     let mut extent = Aabb::EMPTY;
     for (key, _) in store.bricks_by_age() {
         let first = key.first_cell();
@@ -116,6 +117,7 @@ pub(crate) fn check_memory(
         MapKind::Grid => 3.0,
         MapKind::Tree => 3.0,
         MapKind::Tsdf => 16.0,
+        MapKind::Attenuation => 20.0,
         MapKind::Esdf => 24.0,
         MapKind::Contour | MapKind::Mesh => 1.0,
     };

@@ -41,7 +41,8 @@ impl FusionReport {
     /// The maps have taken a scan, taken at this pose: notes what each did. The counts of the map that comes last.
     fn add<const D: usize>(&mut self, fused: &Fused) -> ScanStats {
         let occupancy = if D == 2 { "grid" } else { "tree" };
-        let maps = [(occupancy, fused.occupancy), ("tsdf", fused.distances)];
+        let maps =
+            [(occupancy, fused.occupancy), ("tsdf", fused.distances), ("attenuation", fused.attenuation)];
         for ((name, stats), seconds) in maps.into_iter().zip(fused.seconds) {
             if let Some(stats) = stats {
                 *self.seconds.entry(name).or_default() += seconds;

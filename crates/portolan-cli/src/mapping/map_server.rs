@@ -1,8 +1,9 @@
 //! Dense files of 2-D maps.
 
-use portolan::cell::{LogOdds8, LogOddsValue};
-use portolan::geom::Grid;
+use portolan::cell::{Cell, LogOdds8, LogOddsValue};
+use portolan::geom::{BLOCK_EDGE, Grid};
 use portolan::map::Quadtree;
+use portolan::store::{Bricks, Store};
 use portolan_io::{MapCell, MapFile};
 
 /// More likely occupied than this is occupied, less likely than the second is free.
@@ -63,4 +64,15 @@ pub(super) fn grid_of(file: &MapFile<2>) -> Option<Grid<2>> {
     dense
         .or_else(|| file.grid.as_ref().map(|m| *m.store().grid()))
         .or_else(|| file.tree.as_ref().and_then(seen_by_tree))
+        .or_else(|| file.attenuation.as_ref().and_then(|m| seen_by_bricks(&m.store)))
+}
+
+/// The grid of all bricks of a store; `None`: there are none.
+fn seen_by_bricks<C: Cell>(store: &Bricks<C, 2>) -> Option<Grid<2>> {
+    let keys = store.keys();
+    let first = [0, 1].map(|k| keys.iter().map(|key| key.first_cell()[k]).min());
+    let last = [0, 1].map(|k| keys.iter().map(|key| key.first_cell()[k]).max());
+    let ([Some(x), Some(y)], [Some(right), Some(top)]) = (first, last) else { return None };
+    let shape = [right - x, top - y].map(|cells| cells as usize + BLOCK_EDGE);
+    Some(Grid::new(store.lattice().corner([x, y]), store.lattice().resolution, shape))
 }

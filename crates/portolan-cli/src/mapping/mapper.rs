@@ -3,11 +3,12 @@
 use anyhow::{anyhow, bail};
 use portolan::Mapper;
 use portolan::geom::{Grid, Pose};
-use portolan::map::{Occupancy, OccupancyGrid, OccupancyTree, Tsdf, Tsdf2};
+use portolan::map::{Attenuation, Occupancy, OccupancyGrid, OccupancyTree, Tsdf, Tsdf2};
+use portolan::mapper::MapperMaps;
 use portolan::scan::Scan;
 use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan_io::scan_log::ScanLog;
-use portolan_io::{CarmenLog, ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
+use portolan_io::{AttenuationBricks, CarmenLog, ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
 use serde_json::Map;
 
 use super::extent::{Extent, check_memory, grid_over, seen, with_outlier};
@@ -180,6 +181,7 @@ pub(crate) fn mapper_2d(
         (MapKind::Grid, file.grid.is_some()),
         (MapKind::Tree, file.tree.is_some()),
         (MapKind::Tsdf, file.tsdf.is_some()),
+        (MapKind::Attenuation, file.attenuation.is_some()),
     ];
     if held.iter().all(|(_, held)| !held) {
         let mut mapper = Mapper::with(how);
@@ -205,7 +207,13 @@ pub(crate) fn mapper_2d(
         let store = Bricks::of_dense(map.store(), grid.lattice).ok_or_else(lost)?;
         anyhow::Ok(Tsdf::<2>::from_stores(store, None, *map.config())?)
     });
-    Ok(Mapper::of_maps(how, occupancy, tsdf.transpose()?)?)
+    let attenuation = file.attenuation.take().map(|map| {
+        let dense = Dense::of_bricks(&map.store, *grid).ok_or_else(lost)?;
+        let store = Bricks::of_dense(&dense, grid.lattice).ok_or_else(lost)?;
+        anyhow::Ok(Attenuation::<2>::from_store(store, how.attenuation.unwrap_or(map.rule))?)
+    });
+    let attenuation = attenuation.transpose()?;
+    Ok(Mapper::of_maps(how, MapperMaps { occupancy, tsdf: tsdf.transpose()?, attenuation })?)
 }
 
 /// Puts the maps into a file, as arrays over the grid and as a tree over it.
@@ -216,7 +224,8 @@ pub(crate) fn store_2d(
     file: &mut MapFile<2>,
 ) -> anyhow::Result<()> {
     let lost = || anyhow!("the maps do not fit their grid");
-    let (occupancy, tsdf) = mapper.into_maps();
+    let MapperMaps { occupancy, tsdf, attenuation } = mapper.into_maps();
+    file.attenuation = attenuation.map(attenuation_bricks);
     if let Some(map) = occupancy {
         let model = *map.model();
         let store = map.into_store();
@@ -247,8 +256,11 @@ fn mapper_3d(
 ) -> anyhow::Result<Mapper<3>> {
     let bounds = settings.bounds.map(|bounds| bounds.in_3d("the log")).transpose()?;
     let how = recipe::mapper_settings(settings, None, bounds, limits.memory);
-    let held =
-        [(MapKind::Tree, file.occupancy_bricks.is_some()), (MapKind::Tsdf, file.tsdf_bricks.is_some())];
+    let held = [
+        (MapKind::Tree, file.occupancy_bricks.is_some()),
+        (MapKind::Tsdf, file.tsdf_bricks.is_some()),
+        (MapKind::Attenuation, file.attenuation.is_some()),
+    ];
     if held.iter().all(|(_, held)| !held) {
         let mut mapper = Mapper::with(how);
         mapper.prepare(first.translation)?;
@@ -260,12 +272,26 @@ fn mapper_3d(
         let config = how.tsdf(t.store.lattice().origin);
         Tsdf::<3>::from_stores(t.store, file.color_bricks.take().map(|c| c.store), config)
     });
-    Ok(Mapper::of_maps(how, occupancy.transpose()?, tsdf.transpose()?)?)
+    let attenuation = file
+        .attenuation
+        .take()
+        .map(|map| Attenuation::<3>::from_store(map.store, how.attenuation.unwrap_or(map.rule)))
+        .transpose()?;
+    Ok(Mapper::of_maps(
+        how,
+        MapperMaps { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()?, attenuation },
+    )?)
+}
+
+fn attenuation_bricks<const D: usize>(map: Attenuation<D>) -> AttenuationBricks<D> {
+    let rule = *map.rule();
+    AttenuationBricks { store: map.into_store(), rule, more: Map::new() }
 }
 
 /// Puts the maps into a file.
 fn store_3d(mapper: Mapper<3>, file: &mut MapFile<3>) {
-    let (occupancy, tsdf) = mapper.into_maps();
+    let MapperMaps { occupancy, tsdf, attenuation } = mapper.into_maps();
+    file.attenuation = attenuation.map(attenuation_bricks);
     file.occupancy_bricks = occupancy.map(|map| {
         let model = *map.model();
         OccupancyBricks { store: map.into_store(), model, more: Map::new() }

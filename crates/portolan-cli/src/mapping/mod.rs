@@ -34,6 +34,5 @@ pub(crate) use fuse::{FusionReport, fuse_2d};
 pub(crate) use map_server::cells_for_map_server;
 pub(crate) use mapper::{Limits, OccupancyKinds, Run, mapper_2d, store_2d};
 pub(crate) use memory::available_memory;
-pub(crate) use recipe::{esdf_settings, mesh_settings};
 pub(crate) use settings::Settings;
 pub(crate) use summary::{Summary, report};

@@ -6,7 +6,7 @@ use portolan::geom::{Aabb, Grid};
 use portolan_draw::{Anchor, Canvas, Color, Entry, Font, Pen, PixelRect, Swatch, View, color};
 use portolan_io::{MapCell, MapFile};
 
-use super::{Derived, cells_for_map_server};
+use super::{Derived, DistanceField, cells_for_map_server};
 
 /// The longer edge of the map on the picture is at most this long (pixels).
 const LARGEST: f64 = 2400.0;
@@ -38,6 +38,15 @@ pub(crate) fn of_map(file: &MapFile<2>, derived: &Derived, title: &str) -> Optio
         let pen = Pen::new(color::SURFACE, (0.5 * scale * r).clamp(1.2, 2.5));
         canvas.segments(&view, &segments, pen);
         legend.push(Entry::new(Swatch::Line(Pen::new(color::SURFACE, 2.5)), "contour"));
+    }
+    if let Some(DistanceField::Two { points, .. }) = &derived.esdf
+        && !points.is_empty()
+    {
+        for (center, _) in points {
+            let corner = |sign: f64| center.map(|v| v + sign * 0.5 * r);
+            canvas.rect(&view, corner(-1.0), corner(1.0), Some(color::SURFACE), None);
+        }
+        legend.push(Entry::new(Swatch::Area(color::SURFACE), "obstacle without a surface"));
     }
     draw_path(&mut canvas, &view, file, &mut legend);
     let heading = Font::new(24).bold();

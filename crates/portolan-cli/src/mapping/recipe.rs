@@ -1,12 +1,8 @@
 //! The settings of `map` as the library's recipe, and what a recipe alone does not say.
 
-use portolan::cell::OccupancyModel;
-use portolan::field::EsdfSettings;
+use portolan::cell::{AttenuationRule, OccupancyModel, TsdfRule};
 use portolan::geom::Aabb;
-use portolan::map::Thresholds;
 use portolan::mapper::MapperSettings;
-use portolan::surface::MeshSettings;
-use portolan::sweep::WeightModel;
 
 use super::choices::SweepArg;
 use super::{MapKind, Settings};
@@ -32,23 +28,19 @@ pub(super) fn mapper_settings<const D: usize>(
         beams: settings.sweep().beams(),
         exact: settings.sweep() == SweepArg::Exact,
         occupancy: occupancy.then(OccupancyModel::default),
+        attenuation: settings.wants(MapKind::Attenuation).then(|| attenuation_rule(settings)),
         distances: settings.wants(MapKind::Tsdf),
         color: settings.shape.color,
         bounds,
         memory,
         max_distance: settings.max_distance,
+        thin: settings.thin,
         ..MapperSettings::new(settings.resolution())
     }
 }
 
-/// A mesh of signed distances with these weights.
-pub(crate) fn mesh_settings(weights: WeightModel) -> MeshSettings {
-    let min_weight = Some(Thresholds::of(weights, 1.0).surface);
-    MeshSettings { min_weight, ..MeshSettings::default() }
-}
-
-/// The 3-D distance field of signed distances with these weights.
-pub(crate) fn esdf_settings(weights: WeightModel, carve_weight: f32, max_distance: f64) -> EsdfSettings {
-    let min_weight = Some(Thresholds::of(weights, carve_weight).observed);
-    EsdfSettings { min_weight, max_distance, ..EsdfSettings::default() }
+/// Counts forget as the filter of distances does: the same half-life, for beams of weight 1.
+pub(super) fn attenuation_rule(settings: &Settings) -> AttenuationRule {
+    let filter = TsdfRule { truncation: settings.truncation() as f32, w_max: settings.w_max() };
+    AttenuationRule::of_half_life(filter.half_life(1.0))
 }

@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::choices::{MapKind, SweepArg, WeightsArg, word};
-use crate::arguments::{Bounds, ForgettingArgs, bodies, body, bounds, length, share};
+use crate::arguments::{Bounds, ForgettingArgs, bodies, body, bounds, length, share, thin};
 use crate::dimension::{Dimension, ONLY_3D, option};
 use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::log::{LimitArgs, NoReturnArgs, RangeArgs, Selection};
-use portolan::mapper::{CARVE_WEIGHT, MapperSettings};
+use portolan::map::{CARVE_WEIGHT, W_MAX};
+use portolan::mapper::{MapperSettings, THIN};
 
 /// What shapes the cells: a map can only be gone on with under the same values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
@@ -43,8 +44,8 @@ pub(crate) struct Shape {
     /// Do not fuse the free space in front of surfaces into the signed distances: faster, but free space stays unknown
     #[arg(long = "no-carve", action = clap::ArgAction::SetFalse)]
     pub(crate) carve: bool,
-    /// Weight of free space relative to that of a surface, above 0 and at most 1. A lower weight keeps thin objects, but
-    /// objects that have moved away fade more slowly [default: 0.3; the textbook uses 1]
+    /// Weight of free space relative to that of a surface, above 0 and at most 1. A lower weight keeps thin objects;
+    /// what has gone fades as fast with any [default: 0.2; the textbook uses 1]
     #[arg(long, value_name = "W", value_parser = share, allow_negative_numbers = true, conflicts_with = "carve")]
     #[arg(required = false)]
     #[serde(serialize_with = "four_digits")]
@@ -84,12 +85,17 @@ pub(crate) struct Settings {
     #[serde(skip_deserializing)]
     pub(crate) bounds: Option<Bounds>,
     /// Maps to make, separated by commas; esdf, contour and mesh are derived from the tsdf, which is then made too
-    /// [default: grid,tree,tsdf,esdf,contour in 2-D; tree,tsdf,esdf,mesh in 3-D]
+    /// [default: all: grid,tree,tsdf,attenuation,esdf,contour in 2-D; tree,tsdf,attenuation,esdf,mesh in 3-D]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     pub(crate) maps: Vec<MapKind>,
     /// Method of the esdf [default: accurate]
     #[arg(long, value_enum, required = false)]
     pub(crate) esdf: EsdfArg,
+    /// Share of the beams through a cell that must end there to make it an obstacle of the esdf where no surface is found
+    /// (poles, table legs); what is more likely occupied than free is one, too. 0: only surfaces are obstacles [default:
+    /// 0.145]
+    #[arg(long, value_name = "SHARE", value_parser = thin, allow_negative_numbers = true, required = false)]
+    pub(crate) thin: f64,
     /// Largest distance of the esdf (meters) [default: 1]
     #[arg(long, value_name = "M", value_parser = length, required = false, help_heading = ONLY_3D)]
     pub(crate) max_distance: f64,
@@ -113,8 +119,6 @@ impl Default for Shape {
     }
 }
 
-/// Clamp of the weight of distances.
-const W_MAX: f32 = 64.0;
 /// Distances of 3-D fields are found up to here (meters).
 const MAX_DISTANCE: f64 = 1.0;
 
@@ -128,6 +132,7 @@ impl Default for Settings {
             bounds: None,
             maps: Vec::new(),
             esdf: EsdfArg::default(),
+            thin: THIN,
             max_distance: MAX_DISTANCE,
         }
     }
@@ -216,7 +221,7 @@ impl Settings {
         Selection { every: self.every, hold_out: self.shape.hold_out }
     }
 
-    /// Observations of weight 1 after which a saturated cell has lost half the error of a stale estimate.
+    /// Observations, of any weight up to 1, after which a saturated cell has lost half the error of a stale estimate.
     fn half_life(&self) -> f64 {
         TsdfRule { truncation: self.truncation() as f32, w_max: self.w_max() }.half_life(1.0)
     }

@@ -3,7 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use portolan::field::{PointKind, UnknownSpace};
+use portolan_io::unknown_word;
 use serde_json::{Value, json};
+
+use portolan::scan::{Way, WhyRays};
 
 use super::extent::Extent;
 use super::memory::peak_memory;
@@ -116,6 +120,7 @@ impl Summary<'_> {
             "beams": stats["beams"],
             "refused_beams": stats["refused_beams"],
             "observations": self.fusion.observations,
+            "obstacles": self.obstacles_json(),
             "extent": self.extent.to_json(),
             "bytes": self.bytes,
             "peak_memory": peak_memory(),
@@ -135,10 +140,23 @@ impl Summary<'_> {
                         .as_ref()
                         .map(|t| { json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }) })
                 );
+                document["sweeps"] = json::ways(&self.fusion.stats.ways);
                 document["points_without_pixel"] = json!(self.fusion.without_pixel);
             }
         }
         document
+    }
+
+    /// What the distances are measured to beside the surface.
+    fn obstacles_json(&self) -> Value {
+        let Some(esdf) = &self.derived.esdf else { return Value::Null };
+        let points = esdf.points();
+        let count = |kind| points.iter().filter(|(_, k)| *k == kind).count();
+        json!({
+            "thin_cells": count(PointKind::Thin),
+            "loose_cells": count(PointKind::Loose),
+            "unknown_as": unknown_word(UnknownSpace::default()),
+        })
     }
 
     fn contour_json(&self) -> Value {
@@ -173,6 +191,20 @@ impl Summary<'_> {
     }
 }
 
+/// How a 3-D scan became evidence, and why.
+fn way_words(way: Way) -> &'static str {
+    match way {
+        Way::Stated => "through their rows and columns",
+        Way::Found => "through rows and columns that were found in their points",
+        Way::Rays(WhyRays::Asked) => "ray by ray, as asked for",
+        Way::Rays(WhyRays::OwnOrigins) => "ray by ray: each point has an origin of its own",
+        Way::Rays(WhyRays::Colors) => "ray by ray: their points have colors, and no rows and columns",
+        Way::Rays(WhyRays::NoRows) => "ray by ray: no rows and columns were found in their points",
+        Way::Rays(WhyRays::SharedPixels) => "ray by ray: rows and columns would lose points",
+        Way::Rays(WhyRays::Gaps) => "ray by ray: rows and columns would have gaps",
+    }
+}
+
 /// The summary for people.
 pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     let mut text = String::new();
@@ -200,6 +232,10 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         }
     };
     let _ = writeln!(text, "{}", summary.settings.forgetting());
+    let ways = Way::ALL.map(|way| (stats.ways.count(way), way_words(way)));
+    for (scans, words) in ways.into_iter().filter(|(scans, _)| *scans > 0) {
+        let _ = writeln!(text, "{scans} scans {words}");
+    }
     let sizes: Vec<_> =
         summary.bytes.iter().map(|(name, &n)| format!("{name} {}", shown_bytes(n as f64))).collect();
     let _ = writeln!(text, "{}", sizes.join(", "));
@@ -207,6 +243,10 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         let doubled = 100.0 * checked.doubled.share();
         let (n, length) = (checked.contour.segments.len(), checked.contour.length() + 0.0);
         let _ = writeln!(text, "contour of {n} segments, {length:.1} m, {doubled:.2} % doubled");
+    }
+    if let Some(esdf) = &summary.derived.esdf {
+        let points = esdf.points().len();
+        let _ = writeln!(text, "distances to the surface and to {points} cells that stop beams without one");
     }
     if let Some(mesh) = &summary.derived.mesh {
         let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area());

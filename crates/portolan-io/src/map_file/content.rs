@@ -1,8 +1,10 @@
 //! What a `map.portolan` holds.
 
-use portolan::cell::{Color, LogOdds8, OccupancyModel, SignedDistance};
+use std::borrow::Cow;
+
+use portolan::cell::{AttenuationRule, Color, HitLength, LogOdds8, OccupancyModel, SignedDistance};
 use portolan::geom::Pose;
-use portolan::map::{DenseTsdf, OccupancyGrid, OccupancyTree};
+use portolan::map::{DenseTsdf, DistanceMap, OccupancyGrid, OccupancyTree, least_weight};
 use portolan::store::Bricks;
 use portolan::sweep::WeightModel;
 use serde_json::{Map, Value};
@@ -26,6 +28,8 @@ pub struct MapFile<const D: usize> {
     pub tsdf_bricks: Option<TsdfBricks<D>>,
     /// Colors of the surface in bricks.
     pub color_bricks: Option<ColorBricks<D>>,
+    /// Hits per meter in bricks, in 2-D and 3-D.
+    pub attenuation: Option<AttenuationBricks<D>>,
     /// Poses of the sensor at the fused scans, `world_from_sensor`.
     pub poses: Vec<Pose<D>>,
     pub(super) unknown_maps: Vec<Value>,
@@ -38,7 +42,7 @@ impl<const D: usize> MapFile<D> {
         self.grid.is_some() || self.tree.is_some() || self.tsdf.is_some()
     }
 
-    /// Whether a map of it is in bricks.
+    /// Whether a map of it is in bricks, besides hits per meter, which always are.
     pub fn has_bricks(&self) -> bool {
         self.occupancy_bricks.is_some() || self.tsdf_bricks.is_some() || self.color_bricks.is_some()
     }
@@ -72,6 +76,16 @@ pub struct TsdfBricks<const D: usize> {
     pub more: Map<String, Value>,
 }
 
+impl<const D: usize> DistanceMap<D> for TsdfBricks<D> {
+    fn min_weight(&self) -> f32 {
+        least_weight(self.weights, self.carve_weight)
+    }
+
+    fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>> {
+        Cow::Borrowed(&self.store)
+    }
+}
+
 /// Colors in bricks, and how they were fused.
 #[derive(Clone, Debug)]
 pub struct ColorBricks<const D: usize> {
@@ -79,6 +93,17 @@ pub struct ColorBricks<const D: usize> {
     pub store: Bricks<Color, D>,
     /// Clamp of the weight.
     pub w_max: f32,
+    /// Further settings.
+    pub more: Map<String, Value>,
+}
+
+/// Hits per meter in bricks, and how they forget.
+#[derive(Clone, Debug)]
+pub struct AttenuationBricks<const D: usize> {
+    /// The cells.
+    pub store: Bricks<HitLength, D>,
+    /// How they forget.
+    pub rule: AttenuationRule,
     /// Further settings.
     pub more: Map<String, Value>,
 }

@@ -11,6 +11,7 @@ pub(super) enum Kind {
     OccupancyBricks,
     TsdfBricks,
     ColorBricks,
+    Attenuation,
 }
 
 /// The names of a kind in a file.
@@ -24,8 +25,15 @@ pub(super) struct Names {
 }
 
 impl Kind {
-    const ALL: [Self; 6] =
-        [Self::Grid, Self::Tree, Self::Tsdf, Self::OccupancyBricks, Self::TsdfBricks, Self::ColorBricks];
+    const ALL: [Self; 7] = [
+        Self::Grid,
+        Self::Tree,
+        Self::Tsdf,
+        Self::OccupancyBricks,
+        Self::TsdfBricks,
+        Self::ColorBricks,
+        Self::Attenuation,
+    ];
 
     /// The kind of an entry of the header; `None`: this version does not read it.
     pub(super) fn of<const D: usize>(entry: &Value) -> Option<Self> {
@@ -43,6 +51,7 @@ impl Kind {
             Self::OccupancyBricks => ("occupancy-bricks", "log-odds-i8", "OBRICKS"),
             Self::TsdfBricks => ("tsdf-bricks", "signed-distance-f32", "TBRICKS"),
             Self::ColorBricks => ("color-bricks", "color-u16", "CBRICKS"),
+            Self::Attenuation => ("attenuation-bricks", "hits-lengths-u32", "ABRICKS"),
         };
         Names { map, cell, chunk }
     }

@@ -8,10 +8,11 @@
 //! | `GRID` | `occupancy` | dense: i8 log odds, x fastest, -128 never observed |
 //! | `TREE` | `occupancy` | i8 value of the root; per inner record, depth first, a mask of children; then `2^D` i8 values per record |
 //! | `TSDF` | `distance`, `weight` | dense: f32 each, x fastest; weight 0: never observed |
-//! | `OBRICKS`, `TBRICKS`, `CBRICKS` | `keys` | i32 x, y (and z) of each brick of 8 cells along each axis: index of its first cell, divided by 8; ascending, the last index first |
+//! | `OBRICKS`, `TBRICKS`, `CBRICKS`, `ABRICKS` | `keys` | i32 x, y (and z) of each brick of 8 cells along each axis: index of its first cell, divided by 8; ascending, the last index first |
 //! | `OBRICKS` | `occupancy` | in the order of the keys, the cells of each brick, x fastest: i8 log odds, -128 never observed |
 //! | `TBRICKS` | `distance`, `weight` | in the order of the keys: f32 each; weight 0: never observed |
 //! | `CBRICKS` | `color` | in the order of the keys: u16 red, green, blue, weight of each cell; weight 0: never observed, else `w`: 2^(w / 2048 - 24) * (1 + w % 2048 / 2048) |
+//! | `ABRICKS` | `hits`, `length`, `looks` | in the order of the keys: u32 beams that ended in each cell; u32 length of all beams inside of it, `length_units` to a cell's edge; u16 scans that looked, 0: never observed |
 //! | `POSES` | `sensor` | per fused scan: f64 rows of the rotation, then the translation (`world_from_sensor`) |
 //!
 //! Long planes go on in chunks of the same name followed by `.1`, `.2`, ..; each part of a plane of bricks holds whole
@@ -30,7 +31,7 @@ mod settings;
 mod tests;
 mod write;
 
-pub use content::{ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
+pub use content::{AttenuationBricks, ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
 pub use header::MapHeader;
 pub use read::map_dimension;
 pub use settings::{sweep_of, sweep_word, weights_of, weights_word};

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use portolan::cell::{
-    Cell, ColorBrick, DistanceBrick, DistancePlanes, LogOdds8, LogOddsValue, Planes, SignedDistance, TsdfRule,
+    AttenuationRule, Cell, ColorBrick, DistanceBrick, DistancePlanes, HitLengthBrick, HitLengthPlanes,
+    LENGTH_UNITS, LogOdds8, LogOddsValue, Planes, SignedDistance, TsdfRule,
 };
 use portolan::geom::Grid;
 use portolan::map::{DenseTsdf, OccupancyGrid, OccupancyTree, TsdfConfig};
@@ -13,8 +14,8 @@ use serde_json::Value;
 use super::header::Entry;
 use super::kind::Kind;
 use super::reading::{AGAIN, MEMORY, Reading};
-use super::settings::{ColorSettings, OccupancySettings, SWEEP, TsdfSettings};
-use super::{ColorBricks, MapFile, OccupancyBricks, TsdfBricks, sweep_of, weights_of};
+use super::settings::{AttenuationSettings, ColorSettings, OccupancySettings, SWEEP, TsdfSettings};
+use super::{AttenuationBricks, ColorBricks, MapFile, OccupancyBricks, TsdfBricks, sweep_of, weights_of};
 use crate::error::shown;
 use crate::{Container, Result};
 
@@ -131,6 +132,21 @@ impl Reading<'_> {
                 let store = self.bricks(&entry, [("color", 8)], |[cells]| Some(color_brick(cells)))?;
                 file.color_bricks = Some(ColorBricks { store, w_max, more });
             }
+            Kind::Attenuation => {
+                let AttenuationSettings { half_life, length_units, more } = self.typed(map, settings)?;
+                self.possible(map, AttenuationRule { half_life }.validate())?;
+                if length_units != LENGTH_UNITS {
+                    let field = format!("the length_units of map {map}");
+                    return Err(self.bad(field, length_units, format!("this program reads {LENGTH_UNITS}")));
+                }
+                let planes = [("hits", 4), ("length", 4), ("looks", 2)];
+                let store = self.bricks(&entry, planes, |[hits, length, looks]| {
+                    let planes = HitLengthPlanes::from_parts(counts(hits), counts(length), looks_of(looks));
+                    planes.map(HitLengthBrick::of)
+                })?;
+                file.attenuation =
+                    Some(AttenuationBricks { store, rule: AttenuationRule { half_life }, more });
+            }
         }
         Ok(())
     }
@@ -219,4 +235,12 @@ fn log_odds(bytes: Vec<u8>) -> Vec<LogOdds8> {
 
 fn floats(bytes: &[u8]) -> Vec<f32> {
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
+fn counts(bytes: &[u8]) -> Vec<u32> {
+    bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
+fn looks_of(bytes: &[u8]) -> Vec<u16> {
+    bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect()
 }

@@ -62,6 +62,17 @@ pub(super) struct ColorSettings {
     pub(super) more: Map<String, Value>,
 }
 
+/// Settings of a map of hits per meter.
+#[derive(Serialize, Deserialize)]
+pub(super) struct AttenuationSettings {
+    /// Scans; `None`, `null` in JSON: never forget.
+    pub(super) half_life: Option<u16>,
+    /// Units of length in a cell's edge.
+    pub(super) length_units: u32,
+    #[serde(flatten)]
+    pub(super) more: Map<String, Value>,
+}
+
 /// The word for a sweep in files and on the command line.
 pub fn sweep_word(sweep: BeamSweep) -> &'static str {
     match sweep {

@@ -1,7 +1,8 @@
 //! One body for 2-D and 3-D files.
 
 use portolan::cell::{
-    Cell, ColorBrick, DistanceBrick, DistancePlanes, LogOdds8, OccupancyModel, Planes, SignedDistance,
+    AttenuationRule, Cell, ColorBrick, DistanceBrick, DistancePlanes, HitLengthBrick, HitLengthPlanes,
+    LogOdds8, OccupancyModel, Planes, SignedDistance,
 };
 use portolan::geom::{BlockKey, Grid, Lattice, Pose, block_cells};
 use portolan::map::{DenseTsdf, OccupancyGrid, OccupancyTree, TsdfConfig};
@@ -29,6 +30,7 @@ in_2d_and_3d! {
     the_dimension_is_checked
     the_claims_of_the_header_are_checked
     the_content_of_chunks_is_checked
+    a_file_without_hits_per_meter_still_reads
     parts_hold_the_same_whole_bricks
     memory_is_limited
     no_bytes_make_it_panic
@@ -98,6 +100,19 @@ fn bricks<const D: usize>(seed: u64) -> (OccupancyBricks<D>, TsdfBricks<D>, Colo
 }
 
 /// Every kind of map, unknown ones too.
+fn attenuation<const D: usize>(seed: u64) -> AttenuationBricks<D> {
+    let n = block_cells::<D>();
+    let store = store(seed, |random| {
+        let looks: Vec<u16> = (0..n).map(|_| (random.below(4) * 1000) as u16).collect();
+        let mut any = |most: usize| -> Vec<u32> {
+            looks.iter().map(|l| if *l > 0 { random.below(most) as u32 } else { 0 }).collect()
+        };
+        let (hits, length) = (any(7), any(u32::MAX as usize));
+        HitLengthBrick::of(HitLengthPlanes::from_parts(hits, length, looks).unwrap())
+    });
+    AttenuationBricks { store, rule: AttenuationRule { half_life: Some(44) }, more: Map::new() }
+}
+
 fn full<const D: usize>(seed: u64) -> MapFile<D> {
     let grid =
         Grid::new(std::array::from_fn(|k| [-2.0, -1.5, 0.25][k]), 0.1, std::array::from_fn(|k| 13 - k));
@@ -113,7 +128,7 @@ fn full<const D: usize>(seed: u64) -> MapFile<D> {
         near.insert(BlockKey([i; D]), brick).unwrap();
     }
     let model = OccupancyModel::default();
-    let config = TsdfConfig { truncation: 0.3, weights: WeightModel::CosIncidence, ..Default::default() };
+    let config = TsdfConfig { truncation: 0.3, weights: WeightModel::CosIncidence, ..TsdfConfig::textbook() };
     let (occupancy, tsdf, colors) = bricks(seed);
     MapFile {
         header: MapHeader {
@@ -129,6 +144,7 @@ fn full<const D: usize>(seed: u64) -> MapFile<D> {
         occupancy_bricks: Some(occupancy),
         tsdf_bricks: Some(tsdf),
         color_bricks: Some(colors),
+        attenuation: Some(attenuation(seed)),
         poses: vec![
             Pose::IDENTITY,
             Pose { translation: std::array::from_fn(|k| [1e6, -2.5, 0.125][k]), ..Pose::IDENTITY },
@@ -172,6 +188,8 @@ fn saved_again_the_bytes_are_the_same<const D: usize>() {
     assert!(same_bricks(&a.store, &b.store) && a.model == b.model);
     let (a, b) = (file.color_bricks.unwrap(), back.color_bricks.unwrap());
     assert!(same_bricks(&a.store, &b.store) && b.w_max == 64.0);
+    let (a, b) = (file.attenuation.unwrap(), back.attenuation.unwrap());
+    assert!(same_bricks(&a.store, &b.store) && a.rule == b.rule);
     let (a, b) = (file.tsdf_bricks.unwrap(), back.tsdf_bricks.unwrap());
     assert!(same_bricks(&a.store, &b.store));
     assert_eq!(
@@ -196,7 +214,7 @@ fn a_map_without_bricks_is_a_map<const D: usize>() {
 }
 
 fn infinite_weights_survive<const D: usize>() {
-    let config = TsdfConfig { w_max: f32::INFINITY, ..Default::default() };
+    let config = TsdfConfig { w_max: f32::INFINITY, ..TsdfConfig::textbook() };
     let file = MapFile {
         tsdf: Some(DenseTsdf::covering(&Grid::new([0.0; D], config.resolution, [4; D]), config).unwrap()),
         ..Default::default()
@@ -257,6 +275,9 @@ fn the_claims_of_the_header_are_checked<const D: usize>() {
         (impossible("tsdf-bricks", "truncation"), "/maps/4/truncation", json!(0)),
         (impossible("tsdf-bricks", "carve_weight"), "/maps/4/carve_weight", json!(-1)),
         (impossible("color-bricks", "w_max"), "/maps/5/w_max", json!(0)),
+        (impossible("attenuation-bricks", "half_life"), "/maps/6/half_life", json!(0)),
+        ("the length_units of map attenuation-bricks is 9; this".into(), "/maps/6/length_units", json!(9)),
+        ("the length of chunk \"TBRICKS\" hits is 0".into(), "/maps/6/chunk", json!("TBRICKS")),
         ("the weight model of map tsdf-bricks is \"heavy\"".into(), "/maps/4/weights", json!("heavy")),
         ("the length of chunk \"CBRICKS\" distance is 0".into(), "/maps/4/chunk", json!("CBRICKS")),
         ("the length of chunk \"OBRICKS\" color is 0".into(), "/maps/5/chunk", json!("OBRICKS")),
@@ -299,6 +320,16 @@ fn the_content_of_chunks_is_checked<const D: usize>() {
     }
 }
 
+fn a_file_without_hits_per_meter_still_reads<const D: usize>() {
+    let mut file = full::<D>(1);
+    file.attenuation = None;
+    let back = parse::<D>(file.to_bytes().unwrap()).unwrap();
+    assert!(back.attenuation.is_none() && back.tsdf_bricks.is_some());
+    // Hits of a cell that was never looked at are no state of the filter.
+    let hits = vec![1; full::<D>(1).attenuation.unwrap().store.len() * block_cells::<D>() * 4];
+    assert!(with_chunk::<D>("ABRICKS", "hits", &hits).contains("a cell of brick"));
+}
+
 fn parts_hold_the_same_whole_bricks<const D: usize>() {
     let container = Container::parse(full::<D>(1).to_bytes().unwrap(), "m".as_ref()).unwrap();
     let weights = container.get("TBRICKS", "weight").unwrap().unwrap();
@@ -326,7 +357,7 @@ fn memory_is_limited<const D: usize>() {
     let container = Container::parse(full::<D>(1).to_bytes().unwrap(), "m".as_ref()).unwrap();
     // The content of all chunks, and what bricks take beside their planes.
     let content: u64 = container.chunks().iter().map(|c| c.length).sum();
-    let needed = content + 3 * 96 * keys::<D>(1).len() as u64;
+    let needed = content + 4 * 96 * keys::<D>(1).len() as u64;
     let error = |memory| MapFile::<D>::from_container(&container, memory).err().map(|e| e.to_string());
     assert_eq!(error(needed), None);
     for memory in [2_000, needed / 4, needed / 2, needed - 1] {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use portolan::cell::{LogOdds8, LogOddsValue, Planes};
+use portolan::cell::{LENGTH_UNITS, LogOdds8, LogOddsValue, Planes};
 use portolan::geom::Pose;
 use portolan::store::{Store, Tree};
 use serde_json::{Map, Value, json};
@@ -10,8 +10,10 @@ use serde_json::{Map, Value, json};
 use super::bricks::{write_bricks, write_keys};
 use super::header::{Entry, Place};
 use super::kind::Kind;
-use super::settings::{ColorSettings, OccupancySettings, SWEEP, TsdfSettings, sweep_word};
-use super::{ColorBricks, MapFile, OccupancyBricks, TsdfBricks, VERSION, part_name};
+use super::settings::{
+    AttenuationSettings, ColorSettings, OccupancySettings, SWEEP, TsdfSettings, sweep_word,
+};
+use super::{AttenuationBricks, ColorBricks, MapFile, OccupancyBricks, TsdfBricks, VERSION, part_name};
 use crate::{ContainerWriter, IoError, Result};
 
 /// A dense plane is cut into chunks of this many bytes.
@@ -97,6 +99,12 @@ impl<const D: usize> MapFile<D> {
             let place = Place::of_lattice(store.lattice());
             entries.push(Entry::new::<D>(Kind::ColorBricks, place, &settings)?);
         }
+        if let Some(AttenuationBricks { store, rule, more }) = &self.attenuation {
+            let (half_life, length_units) = (rule.half_life, LENGTH_UNITS);
+            let settings = AttenuationSettings { half_life, length_units, more: more.clone() };
+            let place = Place::of_lattice(store.lattice());
+            entries.push(Entry::new::<D>(Kind::Attenuation, place, &settings)?);
+        }
         Ok(entries)
     }
 
@@ -139,6 +147,17 @@ impl<const D: usize> MapFile<D> {
             write_keys(writer, tag, &map.store)?;
             write_bricks(writer, tag, "color", &map.store, |brick, bytes| {
                 bytes.extend(brick.words().as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+            })?;
+        }
+        if let Some(map) = &self.attenuation {
+            let tag = Kind::Attenuation.names::<D>().chunk;
+            write_keys(writer, tag, &map.store)?;
+            let counts =
+                |v: &[u32], bytes: &mut Vec<u8>| bytes.extend(v.iter().flat_map(|v| v.to_le_bytes()));
+            write_bricks(writer, tag, "hits", &map.store, |b, bytes| counts(b.planes().hits(), bytes))?;
+            write_bricks(writer, tag, "length", &map.store, |b, bytes| counts(b.planes().lengths(), bytes))?;
+            write_bricks(writer, tag, "looks", &map.store, |b, bytes| {
+                bytes.extend(b.planes().looks().iter().flat_map(|v| v.to_le_bytes()));
             })?;
         }
         Ok(())

@@ -4,10 +4,13 @@
 
 mod truth;
 
+use portolan::field::{ClearanceField, Esdf, EsdfSettings, UnknownSpace};
 use portolan::geom::Lattice;
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
+use portolan::mapper::{Mapper, MapperSettings};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan::sweep::OccupancySweep;
+use portolan_sim::ErrorSummary;
 use portolan_sim::building::{BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, building_log};
 use std::sync::LazyLock;
 use truth::{free_points, score_free, score_surface, seen_surface, surface_errors, surface_points};
@@ -40,11 +43,15 @@ fn assert_labels(resolution: f64, sweep: OccupancySweep, most_lost: f64) {
     let lost = [0.26, 0.0].map(|least_cos| {
         let seen = seen_surface(&log.world, &surface, &log.scans, 0.5 * resolution, least_cos);
         let lost = score_surface(&seen, resolution, is_free);
+        let at_the_point = score_surface(&seen, 0.0, is_free);
         println!(
-            "  of {} points of surface seen with a cosine of {least_cos} or more {:.3} % called free, {:.2} % occupied",
+            "  of {} points of surface seen with a cosine of {least_cos} or more {:.3} % called free, {:.2} % occupied, within a \
+             voxel along the axes; at the very point {:.2} % free, {:.2} % occupied",
             seen.len(),
             100.0 * lost.free_share(),
             100.0 * lost.occupied_share(),
+            100.0 * at_the_point.free_share(),
+            100.0 * at_the_point.occupied_share(),
         );
         lost
     });
@@ -90,10 +97,72 @@ fn tsdf_of(log: &BuildingLog, config: TsdfConfig<3>) -> Tsdf3 {
 #[test]
 fn the_surface_of_lidar_scans_is_3_mm_off_in_the_median() {
     let log = &*LIDAR;
-    let map = tsdf_of(log, TsdfConfig { truncation: 0.15, ..Default::default() });
+    let map = tsdf_of(log, TsdfConfig { truncation: 0.15, ..TsdfConfig::textbook() });
     let errors = surface_errors(&log.world, vertices(&map).into_iter()).unwrap();
     println!("lidar, 5 cm, noise 1 cm: {errors:?}");
     assert!(errors.count > 50_000 && errors.median <= 3e-3, "{errors:?}");
+}
+
+/// Clearance against the true walls, everywhere in free space that was seen and not only beside surfaces.
+#[test]
+fn distances_of_lidar_scans_are_those_to_the_true_walls() {
+    let log = &*LIDAR;
+    let map = tsdf_of(log, TsdfConfig { truncation: 0.15, ..TsdfConfig::textbook() });
+    let esdf = Esdf::of(&map, &EsdfSettings::of(&map));
+    let probes = free_points(&log.world, &log.scans, 0.05, 20_000, 3);
+    let errors: Vec<f64> = probes
+        .iter()
+        .filter_map(|&p| Some(esdf.distance(p).known()? - log.world.signed_distance(p)))
+        .collect();
+    let errors = ErrorSummary::of(errors).unwrap();
+    println!("clearance in 3-D, 5 cm, noise 1 cm: {errors:?} of {} probes", probes.len());
+    assert!(errors.count > probes.len() / 2 && errors.median <= 5e-3, "{errors:?}");
+}
+
+/// Floor and ceiling that were met at grazing angles, too sparse for a surface, are obstacles all the same: distances are
+/// seldom far too large, and the default bound, with unknown space an obstacle, hardly ever is.
+#[test]
+fn distances_keep_what_was_met_at_a_slant() {
+    let log = building_log(&BuildingConfig { scans: 20, ..Default::default() });
+    let mut mapper = Mapper::with(MapperSettings { max_distance: 2.0, ..MapperSettings::<3>::new(0.1) });
+    for (pose, frame) in &log.scans {
+        mapper.integrate(pose, frame).unwrap();
+    }
+    let probes = free_points(&log.world, &log.scans, 0.05, 20_000, 3);
+    let figures = |esdf: &Esdf<3>| {
+        let (mut errors, mut bounds) = (Vec::new(), Vec::new());
+        for &p in &probes {
+            let truth = log.world.signed_distance(p);
+            let (Some(d), Some(c)) =
+                (esdf.distance(p).value(), esdf.clearance(p, UnknownSpace::Pessimistic).value())
+            else {
+                continue;
+            };
+            if truth < 1.5 {
+                errors.push(d - truth);
+                bounds.push(c.lower - truth);
+            }
+        }
+        let share = |v: &[f64], over: f64| v.iter().filter(|e| **e > over).count() as f64 / v.len() as f64;
+        let mut sizes: Vec<f64> = errors.iter().map(|e| e.abs()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        (sizes.len(), sizes[sizes.len() / 2], share(&errors, 0.2), share(&bounds, 0.1))
+    };
+    let (count, median, far, unsafe_bounds) = figures(mapper.esdf().unwrap());
+    let settings = mapper.esdf_settings().unwrap();
+    let alone = figures(&Esdf::of(mapper.tsdf().unwrap(), &settings));
+    println!(
+        "building at 10 cm, 20 scans, {count} probes: median error {:.1} mm, more than 20 cm too large {:.2} %, default lower \
+         bound more than 10 cm too large {:.2} %; of the surface alone {:.1} mm, {:.2} %, {:.2} %",
+        1e3 * median,
+        100.0 * far,
+        100.0 * unsafe_bounds,
+        1e3 * alone.1,
+        100.0 * alone.2,
+        100.0 * alone.3,
+    );
+    assert!(count > 10_000 && far < alone.2);
+    assert!(median <= 1e-2 && far <= 0.005 && unsafe_bounds <= 0.001, "{median} {far} {unsafe_bounds}");
 }
 
 #[test]
@@ -104,7 +173,7 @@ fn the_surface_and_colours_of_depth_images_are_right() {
         sensor: BuildingSensor::Camera(camera),
         ..Default::default()
     });
-    let map = tsdf_of(&log, TsdfConfig { color: true, truncation: 0.15, ..Default::default() });
+    let map = tsdf_of(&log, TsdfConfig { color: true, truncation: 0.15, ..TsdfConfig::textbook() });
     let points = vertices(&map);
     let errors = surface_errors(&log.world, points.iter().copied()).unwrap();
     println!("depth camera, 5 cm, noise 1 cm: {errors:?}");

@@ -6,15 +6,15 @@ const HINT =
   "Drag the chair anywhere, or press the button: the map keeps the old one until enough scans have " +
   "contradicted it.";
 const PREDICTED =
-  "The prediction ln 2 / ln(1 + w / W_max) is for cells that were saturated when the chair was moved " +
-  "and have been seen as free ever since.";
+  "Cells that were saturated when the chair was moved and have been seen as free ever since follow from " +
+  "the gain, ln 2 / ln(1 + 1 / W_max): arithmetic. What the map makes of the chair is the row of all cells.";
 const UNPREDICTED =
   "No cell of the old place was saturated when the chair was moved, or seen again since: choose a " +
   "smaller W_max, or drive more laps before.";
 
 const number = (/** @type {number | null} */ v) => (v === null ? "–" : v.toFixed(2));
 
-/** The ghost of the chair: half-life measured and predicted. */
+/** The ghost of the chair: how soon half of it is gone, over all of its cells and by kind of cell. */
 export class ChairPanel {
   /** @param {{move: () => void, toCell: () => void}} o */
   constructor({ move, toCell }) {
@@ -24,10 +24,11 @@ export class ChairPanel {
       "To the chosen cell",
     );
     this.numbers = facts([
-      ["ghost-measured", "half-life measured (obs.)"],
-      ["ghost-predicted", "half-life predicted (obs.)"],
+      ["ghost-left", "half gone, all cells left (obs.)"],
+      ["ghost-measured", "half-life, saturated cells (obs.)"],
+      ["ghost-predicted", "by the gain alone (obs.)"],
       ["ghost-off", "apart"],
-      ["ghost-cells", "cells the prediction is for"],
+      ["ghost-cells", "saturated cells"],
       ["ghost-unclamped", "cells not yet at W_max"],
       ["ghost-tapered", "cells behind a surface"],
       ["ghost-laps", "laps since"],
@@ -60,13 +61,14 @@ export class ChairPanel {
   show(ghost) {
     this.details.hidden = !ghost;
     if (!ghost) return;
-    const { measured: m, unclamped, tapered } = ghost;
+    const { left, saturated: m, unclamped, tapered } = ghost;
     const waiting = m.cells ? `not yet (${m.halved} of ${m.cells} cells)` : "–";
     const [half, predicted] = [m.half_life_measured, m.half_life_predicted];
     const off = half !== null && predicted ? `${(100 * Math.abs(half / predicted - 1)).toFixed(1)} %` : "–";
     const others = (/** @type {any} */ g) =>
       g.cells ? `${g.cells}: ${number(g.half_life_measured)} obs.` : "none";
     this.numbers.set({
+      "ghost-left": others(left),
       "ghost-measured": half === null ? waiting : number(half),
       "ghost-predicted": number(predicted),
       "ghost-off": off,

@@ -147,7 +147,7 @@ export class SettingsPanel {
     const note =
       halfLife === null
         ? "The map never forgets."
-        : `A saturated cell forgets half of an error in ${halfLife.toFixed(2)} observations of weight 1.`;
+        : `A saturated cell forgets half of an error in ${halfLife.toFixed(2)} observations, whatever they weigh.`;
     if (this.note.textContent !== note) this.note.textContent = note;
   }
 

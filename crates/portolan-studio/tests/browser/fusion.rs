@@ -78,7 +78,7 @@ fn the_main_thread_has_little_to_do() {
 
 /// What the library says that scans did to a cell, with the page's settings.
 fn events(cell: [i32; 2], scans: usize) -> Vec<(usize, FusionEvent)> {
-    let config = TsdfConfig::default();
+    let config = TsdfConfig::textbook();
     let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, [240, 180]), config).unwrap();
     tsdf.watch([cell]);
     let mut events = Vec::new();

@@ -134,7 +134,7 @@ fn gyroid() -> Tsdf3 {
         let distances: Vec<f32> = (0..512).map(value).collect();
         store.insert(key, DistanceBrick::from_parts(&distances, &[4.0; 512]).unwrap()).unwrap();
     }
-    Tsdf3::from_stores(store, None, TsdfConfig::default()).unwrap()
+    Tsdf3::from_stores(store, None, TsdfConfig::textbook()).unwrap()
 }
 
 #[test]

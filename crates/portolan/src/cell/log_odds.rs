@@ -47,10 +47,14 @@ impl LogOddsRule<i8> {
     /// The rule of a model, rounded to bytes.
     ///
     /// # Errors
-    /// Where the model is not valid.
+    /// Where the model is not valid, or its lower clamp is further from one half than its upper one.
     pub fn new(model: &OccupancyModel) -> Result<Self, OccupancyModelError> {
         model.validate()?;
         let quantum = logit(model.p_max) / 127.0;
+        // Rounding may use up half a unit, and no more may be lost in silence.
+        if logit(model.p_min) < -127.5 * quantum {
+            return Err(OccupancyModelError::TooSure { p_min: model.p_min, p_max: model.p_max });
+        }
         let prior = logit(model.p_prior);
         let byte = |l: f64| (l / quantum).round().clamp(-127.0, 127.0) as i8;
         Ok(Self {
@@ -372,6 +376,18 @@ mod tests {
     use super::*;
     use crate::cell::Evidence;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_byte_refuses_a_lower_clamp_that_it_cannot_hold() {
+        let sure = OccupancyModel { p_min: 0.001, ..Default::default() };
+        let error = LogOddsRule::<i8>::new(&sure).unwrap_err();
+        assert_eq!(error, OccupancyModelError::TooSure { p_min: 0.001, p_max: 0.97 });
+        assert!((LogOddsRule::<f32>::new(&sure).unwrap().min - (0.001f32 / 0.999).ln()).abs() < 1e-5);
+        // As far below as above is held, and comes back.
+        let even = OccupancyModel { p_min: 0.03, ..Default::default() };
+        let rule = LogOddsRule::<i8>::new(&even).unwrap();
+        assert!((LogOdds8(rule.min).probability(&rule) - 0.03).abs() < 1e-9);
+    }
 
     #[test]
     fn the_default_model_in_bytes() {

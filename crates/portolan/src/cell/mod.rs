@@ -7,19 +7,27 @@
 mod brick;
 mod color;
 mod distances;
+mod hit_length;
+mod hit_length_brick;
+mod hit_lengths;
 mod hit_miss;
 mod log_odds;
 mod model;
 mod packed;
 mod signed_distance;
+mod stop_rule;
 
 pub use brick::{DistanceBrick, LogOddsBrick};
 pub use color::{Color, ColorBrick, ColorObservation, ColorRule, Colors};
 pub use distances::{DistanceObservation, Distances};
+pub use hit_length::{AttenuationRule, HitLength};
+pub use hit_length_brick::{HitLengthBrick, HitLengthPlanes};
+pub use hit_lengths::{HitLengthObservation, HitLengths, LENGTH_UNITS};
 pub use hit_miss::{Endpoint, HitMiss};
 pub use log_odds::{LogOdds8, LogOdds32, LogOddsEvent, LogOddsRule, LogOddsValue, ProbabilityTable};
 pub use model::{OccupancyModel, OccupancyModelError};
 pub use signed_distance::{DistancePlanes, FusionEvent, SignedDistance, TsdfRule, TsdfRuleError};
+pub use stop_rule::{StopRule, mean_chord};
 
 /// What one scan says about the cells of a block: at most one observation per cell.
 pub trait Evidence: Clone + Send + Sync {

@@ -35,6 +35,16 @@ pub enum OccupancyModelError {
         "occupancy model: need 0 < p_min <= p_miss < p_prior < p_hit <= p_max < 1 and p_min < 0.5 < p_max, got {0:?}"
     )]
     Order(OccupancyModel),
+    /// A byte does not hold the lower clamp: it holds log odds as far below zero as above.
+    #[error(
+        "occupancy model: a byte holds no p_min of {p_min} beside p_max {p_max}; it must be at least 1 - p_max (cells of f32 hold any)"
+    )]
+    TooSure {
+        /// The lower clamp.
+        p_min: f64,
+        /// The upper one.
+        p_max: f64,
+    },
     /// The wall depth is negative or not finite.
     #[error("occupancy model: wall_depth must be finite and not negative, got {0}")]
     WallDepth(f64),

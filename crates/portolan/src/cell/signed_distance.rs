@@ -8,7 +8,8 @@ use multiversion::multiversion;
 pub struct TsdfRule {
     /// Truncation tau (meters): observations are clamped to +-tau.
     pub truncation: f32,
-    /// Clamp of the accumulated weight. Infinity: the batch weighted mean, which never forgets.
+    /// Clamp of the accumulated weight, in observations of the weight that a cell receives, where that is at most 1: what
+    /// was there before never counts for more than so many of them. Infinity: the batch weighted mean, which never forgets.
     pub w_max: f32,
 }
 
@@ -39,35 +40,53 @@ impl TsdfRule {
         Ok(())
     }
 
-    /// The weight clamp under which a stale estimate loses half its error in `observations` observations of
-    /// weight `weight`: `W_max = w / (2^(1/n) - 1)`, the inverse of [`TsdfRule::half_life`].
+    /// The weight clamp under which a stale estimate loses half its error in `observations` observations of weight
+    /// `weight`: `W_max = max(w, 1) / (2^(1/n) - 1)`, the inverse of [`TsdfRule::half_life`].
     pub fn w_max_for_half_life(observations: f64, weight: f64) -> f64 {
-        weight / ((2f64).powf(1.0 / observations) - 1.0)
+        weight.max(1.0) / ((2f64).powf(1.0 / observations) - 1.0)
     }
 
     /// Number of observations of weight `weight` after which a saturated cell has lost half the error of a
-    /// stale estimate: `ln 2 / ln(1 + w / W_max)`. Infinite where nothing is forgotten.
+    /// stale estimate: `ln 2 / ln(1 + max(w, 1) / W_max)`, the same for every weight up to 1. It holds for observations
+    /// in front of a surface; behind it the weight falls to 0 at the truncation, and so does the gain. Infinite where
+    /// nothing is forgotten.
     pub fn half_life(&self, weight: f64) -> f64 {
-        std::f64::consts::LN_2 / (weight / f64::from(self.w_max)).ln_1p()
+        std::f64::consts::LN_2 / (weight.max(1.0) / f64::from(self.w_max)).ln_1p()
     }
 
     /// The filter itself on `f64` numbers (Curless & Levoy 1996, read as a scalar information filter):
     /// `K = w / (W + w)`, `D <- D + K (clamp(d, -tau, tau) - D)`, `W <- min(W + w, W_max)`. `W = 0` gives
     /// `K = 1`, so an unobserved cell adopts its first observation without a special case.
+    ///
+    /// Weights below 1 (of free space, of far or grazing beams) would reach a clamp in units of weight late or never, and
+    /// a surface that has gone would stay for thousands of them. So the clamp is in units of what the cell receives:
+    ///
+    /// - `K` is never below `1 / (1 + W_max)`, the gain of an observation of weight 1 at the clamp. Behind a surface, where
+    ///   sweeps taper weights, this bound falls to 0 at `-tau` as they do: else the far side of a thin wall would wear
+    ///   away what the near side says of itself.
+    /// - In front of a surface `W` is clamped to `w W_max`, so that heavier observations regain what they outweigh the
+    ///   lighter ones by; but never below 1, so that no far look makes a cell unknown.
+    ///
+    /// Where weights are 1, tapered or not, both do nothing, and the filter is the textbook's.
     #[inline(always)]
     pub fn step(&self, before: f64, weight_before: f64, observation: f64, weight: f64) -> FusionEvent {
-        let truncation = f64::from(self.truncation);
+        let (truncation, w_max) = (f64::from(self.truncation), f64::from(self.w_max));
         // max/min instead of clamp: the compiler turns them into two vector instructions.
         let observation = observation.max(-truncation).min(truncation);
+        // Divided by settings alone, and so outside of the loop over cells.
+        let (least, per_tau) = (1.0 / (1.0 + w_max), 1.0 / truncation);
+        let taper = (1.0 + observation * per_tau).min(1.0);
         let total = weight_before + weight;
-        let gain = weight / total;
+        let gain = (weight / total).max(least * taper);
         let after = before + gain * (observation - before);
+        let clamp = if observation >= 0.0 { (weight * w_max).max(1.0).min(w_max) } else { w_max };
         FusionEvent {
             before,
             weight_before,
             observation,
+            weight,
             after,
-            weight_after: total.min(f64::from(self.w_max)),
+            weight_after: total.min(clamp),
             gain,
         }
     }
@@ -82,11 +101,13 @@ pub struct FusionEvent {
     pub weight_before: f64,
     /// The observation, clamped to the truncation (meters).
     pub observation: f64,
+    /// Its weight `w`.
+    pub weight: f64,
     /// Posterior distance (meters).
     pub after: f64,
-    /// Posterior weight, clamped to `W_max`.
+    /// Posterior weight, clamped.
     pub weight_after: f64,
-    /// The gain `K`: the scalar Kalman gain.
+    /// The gain `K`: the scalar Kalman gain, `w / (W + w)`, or the least that forgetting asks for.
     pub gain: f64,
 }
 
@@ -258,8 +279,10 @@ mod tests {
     fn half_lives_invert() {
         for w_max in [4.0f32, 16.0, 24.0, 64.0, 128.0] {
             let rule = TsdfRule { truncation: 0.2, w_max };
-            let back = TsdfRule::w_max_for_half_life(rule.half_life(1.0), 1.0);
-            assert!((back - f64::from(w_max)).abs() < 1e-9 * f64::from(w_max));
+            for weight in [0.001, 0.3, 1.0, 2.0] {
+                let back = TsdfRule::w_max_for_half_life(rule.half_life(weight), weight);
+                assert!((back - f64::from(w_max)).abs() < 1e-9 * f64::from(w_max));
+            }
         }
         let rule = TsdfRule { truncation: 0.2, w_max: 16.0 };
         assert!((rule.half_life(1.0) - 11.4).abs() < 0.1);
@@ -278,6 +301,53 @@ mod tests {
         }
     }
 
+    /// Looks of weight `weight` at +tau until a cell that `stale` looks of weight `before` had put to -0.1 m has lost half
+    /// of its error, and its weight then.
+    fn looks_until_half(w_max: f32, (before, stale): (f64, u32), weight: f64) -> (u32, f64) {
+        let rule = TsdfRule { truncation: 0.15, w_max };
+        let (mut d, mut w) = (-0.1, before);
+        for _ in 1..stale {
+            let event = rule.step(d, w, -0.1, before);
+            (d, w) = (event.after, event.weight_after);
+        }
+        let half = 0.5 * (0.15 + 0.1);
+        for n in 1..10_000 {
+            let event = rule.step(d, w, 0.3, weight);
+            (d, w) = (event.after, event.weight_after);
+            if 0.15 - d <= half + 1e-6 {
+                return (n, w);
+            }
+        }
+        (u32::MAX, w)
+    }
+
+    #[test]
+    fn what_is_stale_halves_in_as_many_looks_whatever_they_weigh() {
+        let w_max = TsdfRule::w_max_for_half_life(10.0, 1.0) as f32;
+        for weight in [1.0, 0.3, 0.05, 1.0 / 81.0, 1e-5] {
+            let (looks, left) = looks_until_half(w_max, (1.0, 1500), weight);
+            assert_eq!(looks, 10, "{weight}");
+            // No look makes a cell unknown: what counts as observed weighs 0.5 at most.
+            assert!(left >= 1.0, "{weight}: {left}");
+        }
+        // A heavier look counts for more, and so does any look at what was hardly seen.
+        assert!(looks_until_half(w_max, (1.0, 1500), 2.0).0 < 7);
+        assert_eq!(looks_until_half(w_max, (1.0, 2), 1.0).0, 2);
+    }
+
+    #[test]
+    fn looks_in_front_of_a_surface_keep_the_ratio_of_their_weights() {
+        let rule = TsdfRule { truncation: 0.15, w_max: 64.0 };
+        let light = rule.step(0.0, 64.0, 0.15, 0.25);
+        assert_eq!((light.gain, light.weight_after), (1.0 / 65.0, 16.0));
+        let heavy = rule.step(0.0, light.weight_after, 0.0, 1.0);
+        assert!((heavy.gain / light.gain - 65.0 / 17.0).abs() < 1e-12);
+        // Behind a surface neither holds: a thin wall's far side would be worn away.
+        let behind = rule.step(0.0, 64.0, -0.12, 0.01);
+        assert_eq!(behind.weight_after, 64.0);
+        assert!((behind.gain - 0.2 / 65.0).abs() < 1e-6);
+    }
+
     #[test]
     fn nonsense_settings_are_refused() {
         for (truncation, w_max) in
@@ -288,6 +358,26 @@ mod tests {
     }
 
     proptest! {
+        /// With the textbook's weights, 1 and tapered behind the surface, the filter is the textbook's.
+        #[test]
+        fn weights_of_1_know_no_other_clamp(
+            looks in prop::collection::vec(-0.15f32..0.3, 1..200),
+            w_max in prop_oneof![Just(f32::INFINITY), 1f32..64.0],
+        ) {
+            let rule = TsdfRule { truncation: 0.15, w_max };
+            let (mut d, mut w) = (0.0, 0.0);
+            for look in looks.into_iter().map(f64::from) {
+                let weight = (1.0 + look / f64::from(0.15f32)).min(1.0);
+                let event = rule.step(d, w, look, weight);
+                let observation = look.min(f64::from(0.15f32));
+                let gain = weight / (w + weight);
+                prop_assert!((event.gain - gain).abs() < 1e-15, "{} {}", event.gain, gain);
+                prop_assert!((event.after - (d + gain * (observation - d))).abs() < 1e-15);
+                prop_assert_eq!(event.weight_after, (w + weight).min(f64::from(w_max)));
+                (d, w) = (event.after, event.weight_after);
+            }
+        }
+
         #[test]
         fn a_run_is_many_single_steps(
             scans in prop::collection::vec(prop::collection::vec((-0.4f32..0.4, 0.0f32..2.0, any::<bool>()), 64), 1..20),

@@ -26,9 +26,9 @@ impl Default for FrontierSettings {
 }
 
 impl FrontierSettings {
-    /// The default, with the weight that fits a map ([`Thresholds::observed`](crate::map::Thresholds::observed)).
+    /// The default, with the weight that fits a map ([`DistanceMap::min_weight`](crate::map::DistanceMap::min_weight)).
     pub fn of<const D: usize>(map: &impl DistanceMap<D>) -> Self {
-        Self { min_weight: Some(map.thresholds().observed), ..Self::default() }
+        Self { min_weight: Some(map.min_weight()), ..Self::default() }
     }
 }
 

@@ -32,9 +32,9 @@ impl<const D: usize> Default for GainSettings<D> {
 }
 
 impl<const D: usize> GainSettings<D> {
-    /// The default, with the weight that fits a map ([`Thresholds::observed`](crate::map::Thresholds::observed)).
+    /// The default, with the weight that fits a map ([`DistanceMap::min_weight`](crate::map::DistanceMap::min_weight)).
     pub fn of(map: &impl DistanceMap<D>) -> Self {
-        Self { min_weight: Some(map.thresholds().observed), ..Self::default() }
+        Self { min_weight: Some(map.min_weight()), ..Self::default() }
     }
 }
 

@@ -18,10 +18,11 @@ mod clearance;
 mod esdf;
 mod grid;
 mod mask;
+mod on_nodes;
 mod smooth;
 
 pub use clearance::{Clearance, ClearanceField, UnknownSpace};
-pub use esdf::{Esdf, EsdfMethod, EsdfSettings, EsdfUpdate, SurfaceNoise};
+pub use esdf::{Esdf, EsdfMethod, EsdfSettings, EsdfUpdate, ObstacleCells, PointKind, SurfaceNoise};
 pub use grid::{EsdfError, EsdfGrid, esdf_from_tsdf, squared_distance_transform};
 pub use mask::{MaskCell, MaskError, MaskTransform};
 pub use smooth::{FieldSlots, Interpolation, Smooth};

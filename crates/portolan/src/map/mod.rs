@@ -1,5 +1,6 @@
 //! The maps: named combinations of sweep, cell and store, and the thin view that compares them.
 
+mod attenuation;
 mod cloud;
 mod error;
 mod integrate;
@@ -20,15 +21,17 @@ mod tsdf_config;
 mod tsdf_tests;
 mod watch;
 
+pub use attenuation::Attenuation;
+pub(crate) use attenuation::hits_per_cell;
 pub use cloud::Cloud;
 pub use error::MapError;
 pub use integrate::integrate;
 pub use occupancy::Occupancy;
 pub use occupancy_tree::CoarseOccupancy;
 pub use scan_kind::ScanKind;
-pub use thresholds::{DistanceMap, Thresholds};
+pub use thresholds::{DistanceMap, least_weight};
 pub use tsdf::Tsdf;
-pub use tsdf_config::{BeamSweep, PointSweep, TsdfConfig};
+pub use tsdf_config::{BeamSweep, CARVE_WEIGHT, PointSweep, TsdfConfig, W_MAX};
 
 use crate::cell::{LogOdds8, SignedDistance};
 use crate::store::{Dense, Tree};

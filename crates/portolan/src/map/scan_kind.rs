@@ -1,8 +1,8 @@
 //! What a map can fuse: beams in any dimension, range images and points in 3-D.
 
 use super::tsdf::BEAM_CELL_BYTES;
-use super::{BeamSweep, MapError, Occupancy, Tsdf};
-use crate::cell::{LogOddsValue, SignedDistance};
+use super::{Attenuation, BeamSweep, MapError, Occupancy, Tsdf};
+use crate::cell::{HitLength, LogOddsValue, SignedDistance};
 use crate::geom::{Pose, block_cells};
 use crate::scan::{Frame, PointScan, RangeImage, Scan, ScanStats};
 use crate::store::Store;
@@ -29,6 +29,16 @@ pub trait ScanKind<const D: usize> {
         map: &mut Occupancy<D, V, S>,
         world_from_sensor: &Pose<D>,
     ) -> Result<ScanStats, MapError>;
+
+    /// Fuses the scan into a map of hits per meter; see [`Attenuation::integrate`].
+    ///
+    /// # Errors
+    /// As [`Attenuation::integrate`].
+    fn fuse_attenuation<S: Store<HitLength, D>>(
+        &self,
+        map: &mut Attenuation<D, S>,
+        world_from_sensor: &Pose<D>,
+    ) -> Result<ScanStats, MapError>;
 }
 
 impl<const D: usize> ScanKind<D> for Scan<D> {
@@ -51,6 +61,14 @@ impl<const D: usize> ScanKind<D> for Scan<D> {
     ) -> Result<ScanStats, MapError> {
         map.sweep(|sweeps| &mut sweeps.beams, world_from_sensor, self)
     }
+
+    fn fuse_attenuation<S: Store<HitLength, D>>(
+        &self,
+        map: &mut Attenuation<D, S>,
+        world_from_sensor: &Pose<D>,
+    ) -> Result<ScanStats, MapError> {
+        map.sweep(|sweeps| &mut sweeps.beams, world_from_sensor, self)
+    }
 }
 
 impl ScanKind<3> for RangeImage {
@@ -69,6 +87,14 @@ impl ScanKind<3> for RangeImage {
     ) -> Result<ScanStats, MapError> {
         map.sweep(|sweeps| &mut sweeps.images, world_from_sensor, self)
     }
+
+    fn fuse_attenuation<S: Store<HitLength, 3>>(
+        &self,
+        map: &mut Attenuation<3, S>,
+        world_from_sensor: &Pose<3>,
+    ) -> Result<ScanStats, MapError> {
+        map.sweep(|sweeps| &mut sweeps.images, world_from_sensor, self)
+    }
 }
 
 impl ScanKind<3> for PointScan {
@@ -83,6 +109,14 @@ impl ScanKind<3> for PointScan {
     fn fuse_occupancy<V: LogOddsValue, S: Store<V, 3>>(
         &self,
         map: &mut Occupancy<3, V, S>,
+        world_from_sensor: &Pose<3>,
+    ) -> Result<ScanStats, MapError> {
+        map.sweep(|sweeps| &mut sweeps.points, world_from_sensor, self)
+    }
+
+    fn fuse_attenuation<S: Store<HitLength, 3>>(
+        &self,
+        map: &mut Attenuation<3, S>,
         world_from_sensor: &Pose<3>,
     ) -> Result<ScanStats, MapError> {
         map.sweep(|sweeps| &mut sweeps.points, world_from_sensor, self)
@@ -109,6 +143,17 @@ impl ScanKind<3> for Frame {
         match self {
             Self::Image(image) => image.fuse_occupancy(map, world_from_sensor),
             Self::Points(scan) => scan.fuse_occupancy(map, world_from_sensor),
+        }
+    }
+
+    fn fuse_attenuation<S: Store<HitLength, 3>>(
+        &self,
+        map: &mut Attenuation<3, S>,
+        world_from_sensor: &Pose<3>,
+    ) -> Result<ScanStats, MapError> {
+        match self {
+            Self::Image(image) => image.fuse_attenuation(map, world_from_sensor),
+            Self::Points(scan) => scan.fuse_attenuation(map, world_from_sensor),
         }
     }
 }

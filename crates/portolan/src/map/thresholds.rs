@@ -6,33 +6,22 @@ use crate::store::{Bricks, Dense, Store};
 use crate::sweep::WeightModel;
 use std::borrow::Cow;
 
-/// The least weights of cells that count. Everything that is derived of a map takes them where its settings say
-/// `min_weight: None`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thresholds {
-    /// For surfaces: half of what one ordinary beam weighs, so that what was seen once is a surface.
-    pub surface: f32,
-    /// For distances, rays and frontiers: half of what one ordinary observation of free space weighs, so that what was
-    /// seen free once is known.
-    pub observed: f32,
-}
-
-impl Thresholds {
-    /// Any weight above 0: for cells whose weights have no known scale.
-    pub const ANY: Self = Self { surface: 0.0, observed: 0.0 };
-
-    /// Of a map whose beams weigh as this model has it, and `carve_weight` times that beyond the truncation. 0.5 for
-    /// both where everything weighs 1.
-    pub fn of(weights: WeightModel, carve_weight: f32) -> Self {
-        let surface = 0.5 * weights.typical_low();
-        Self { surface, observed: surface * carve_weight }
-    }
+/// The least weight of cells that count, in a map whose beams weigh as this model has it, and `carve_weight` times that
+/// beyond the truncation: half of what one ordinary observation of free space weighs, so that what was seen once is known.
+/// 0.5 where everything weighs 1.
+///
+/// There is one such weight, for surfaces, distances, rays and frontiers alike: what is certified of a surface holds for
+/// the surface that is written.
+pub fn least_weight(weights: WeightModel, carve_weight: f32) -> f32 {
+    // More weight on free space than on surfaces must not hide surfaces.
+    0.5 * weights.typical_low() * carve_weight.min(1.0)
 }
 
 /// Signed distances that fields, surfaces and rays are derived from: a map, or its cells alone.
 pub trait DistanceMap<const D: usize> {
-    /// How much its cells must weigh to count. Of cells alone, [`Thresholds::ANY`]: how they were weighed is not known.
-    fn thresholds(&self) -> Thresholds;
+    /// How much its cells must weigh to count. Of cells alone 0, any weight: how they were weighed is not known. Everything
+    /// that is derived of a map takes it where its settings say `min_weight: None`.
+    fn min_weight(&self) -> f32;
 
     /// Its cells in bricks; of a dense map a copy, O(cells).
     fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>>;
@@ -44,8 +33,8 @@ pub trait DistanceMap<const D: usize> {
 }
 
 impl<const D: usize> DistanceMap<D> for Bricks<SignedDistance, D> {
-    fn thresholds(&self) -> Thresholds {
-        Thresholds::ANY
+    fn min_weight(&self) -> f32 {
+        0.0
     }
 
     fn bricks(&self) -> Cow<'_, Self> {
@@ -54,8 +43,8 @@ impl<const D: usize> DistanceMap<D> for Bricks<SignedDistance, D> {
 }
 
 impl<const D: usize> DistanceMap<D> for Tsdf<D> {
-    fn thresholds(&self) -> Thresholds {
-        self.thresholds()
+    fn min_weight(&self) -> f32 {
+        self.min_weight()
     }
 
     fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>> {
@@ -64,8 +53,8 @@ impl<const D: usize> DistanceMap<D> for Tsdf<D> {
 }
 
 impl<const D: usize> DistanceMap<D> for DenseTsdf<D> {
-    fn thresholds(&self) -> Thresholds {
-        self.thresholds()
+    fn min_weight(&self) -> f32 {
+        self.min_weight()
     }
 
     fn bricks(&self) -> Cow<'_, Bricks<SignedDistance, D>> {
@@ -79,7 +68,7 @@ impl<const D: usize> DistanceMap<D> for DenseTsdf<D> {
 
 impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
     /// How much cells must weigh to count, by what beams weigh in this map.
-    pub fn thresholds(&self) -> Thresholds {
-        Thresholds::of(self.config().weights, self.config().carve_weight)
+    pub fn min_weight(&self) -> f32 {
+        least_weight(self.config().weights, self.config().carve_weight)
     }
 }

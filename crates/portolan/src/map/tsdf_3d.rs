@@ -3,7 +3,7 @@
 use super::{MapError, PointSweep, Tsdf};
 use crate::cell::SignedDistance;
 use crate::geom::Pose;
-use crate::scan::{Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{Origin, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays};
 use crate::store::Store;
 use crate::sweep::PointRays;
 
@@ -16,15 +16,17 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
         world_from_image: &Pose<3>,
         image: &RangeImage,
     ) -> Result<ScanStats, MapError> {
-        self.sweep(|s| &mut s.image, IMAGE_BLOCK_BYTES, world_from_image, image)
+        Ok(self.sweep(|s| &mut s.image, IMAGE_BLOCK_BYTES, world_from_image, image)?.by(Way::Stated))
     }
 
     pub(super) fn integrate_rays(
         &mut self,
         world_from_scan: &Pose<3>,
         scan: &PointScan,
+        why: WhyRays,
     ) -> Result<ScanStats, MapError> {
-        self.sweep(|s| &mut s.points, PointRays::BLOCK_BYTES, world_from_scan, scan)
+        let stats = self.sweep(|s| &mut s.points, PointRays::BLOCK_BYTES, world_from_scan, scan)?;
+        Ok(stats.by(Way::Rays(why)))
     }
 
     pub(super) fn integrate_point_scan(
@@ -39,41 +41,40 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
                 let stats = self.integrate_image(world_from_sensor, image)?;
                 return Ok(ScanStats { refused: stats.refused + scan.refused, ..stats });
             }
-            _ => return self.integrate_rays(world_from_sensor, scan),
+            (_, _, PointSweep::Rays) => return self.integrate_rays(world_from_sensor, scan, WhyRays::Asked),
+            _ => return self.integrate_rays(world_from_sensor, scan, WhyRays::OwnOrigins),
         };
         let at = Pose { translation: world_from_sensor.transform_point(origin), ..*world_from_sensor };
-        let found = match &scan.image {
-            Some(_) => None,
-            None => self.organise(scan, origin),
-        };
-        let Some(image) = scan.image.as_ref().or(found.as_ref()) else {
-            return self.integrate_rays(world_from_sensor, scan);
-        };
-        let mut stats = self.integrate_image(&at, image)?;
-        stats.refused += scan.refused;
-        if found.is_some() {
-            // Pixels without a point are no readings; points beside another of their pixel are.
-            let used = stats.beams.hit + stats.beams.max_range;
-            stats.beams.dropped = ((scan.points.len() + scan.free_ends.len()) as u64).saturating_sub(used);
+        if let Some(image) = &scan.image {
+            let stats = self.integrate_image(&at, image)?;
+            return Ok(ScanStats { refused: stats.refused + scan.refused, ..stats });
         }
+        let image = match self.organise(scan, origin) {
+            Ok(image) => image,
+            Err(why) => return self.integrate_rays(world_from_sensor, scan, why),
+        };
+        let mut stats = self.integrate_image(&at, &image)?.by(Way::Found);
+        stats.refused += scan.refused;
+        // Pixels without a point are no readings; points beside another of their pixel are.
+        let used = stats.beams.hit + stats.beams.max_range;
+        stats.beams.dropped = ((scan.points.len() + scan.free_ends.len()) as u64).saturating_sub(used);
         Ok(stats)
     }
 
     /// The image of a scan without rows and columns, where it can be given them. Not where points have colors to be fused:
     /// pixels have lost which point they come from.
-    fn organise(&mut self, scan: &PointScan, origin: [f64; 3]) -> Option<RangeImage> {
+    fn organise(&mut self, scan: &PointScan, origin: [f64; 3]) -> Result<RangeImage, WhyRays> {
         if self.config.color && !scan.colors.is_empty() {
-            return None;
+            return Err(WhyRays::Colors);
         }
-        let mut image = self.layout.image(&scan.points, origin)?;
-        let layout = self.layout.layout()?;
-        if !scan.free_ends.is_empty() {
+        let mut image = self.layout.image(&scan.points, origin, self.config.resolution)?;
+        if let (Some(layout), false) = (self.layout.layout(), scan.free_ends.is_empty()) {
             let free = layout.image(&scan.free_ends, origin);
             for (value, free) in image.values.iter_mut().zip(free.values) {
                 *value = if *value == 0.0 { -free } else { *value };
             }
         }
-        Some(image)
+        Ok(image)
     }
 
     /// Fuses points (world, meters) seen from `origin_world`, in one call. Points that are not finite or lie on the origin
@@ -92,7 +93,7 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
         let at = Pose { translation: origin_world, ..Pose::IDENTITY };
         self.watch.clear();
         // Ray by ray: which way the sensor's axis points is not known.
-        self.integrate_rays(&at, &scan)
+        self.integrate_rays(&at, &scan, WhyRays::Asked)
     }
 
     /// Gives scans of points without rows and columns these from now on. Without this call they are looked for, and kept

@@ -15,7 +15,7 @@ fn fan(k: u32) -> (Pose<2>, Scan<2>) {
 const GRID: [usize; 2] = [60, 60];
 
 fn config(beams: BeamSweep) -> TsdfConfig<2> {
-    TsdfConfig { origin: [-1.5, -1.5], w_max: 3.0, beams, ..Default::default() }
+    TsdfConfig { origin: [-1.5, -1.5], w_max: 3.0, beams, ..TsdfConfig::textbook() }
 }
 
 fn grid() -> Grid<2> {
@@ -91,7 +91,7 @@ fn a_scan_that_reaches_too_far_is_refused_with_a_clear_error() {
     let bearings: Vec<f64> = (0..90).map(|i| f64::from(i) * 0.07 - 3.1).collect();
     let limits = RangeLimits { max: 1e9, ..Default::default() };
     let far = Scan::from_laser(&bearings, &[1e8; 90], &limits);
-    let mut map = Tsdf::<2>::new(TsdfConfig::default()).unwrap();
+    let mut map = Tsdf::<2>::new(TsdfConfig::textbook()).unwrap();
     let error = map.integrate(&Pose::<2>::IDENTITY, &far).unwrap_err();
     assert!(matches!(error, MapError::TooFar { .. }), "{error}");
     let mut grid =
@@ -105,7 +105,7 @@ fn a_scan_that_reaches_too_far_is_refused_with_a_clear_error() {
     // Pixels that look almost aside: what they see is a meter deep and a hundred thousand kilometers wide.
     let camera = Pinhole { fx: 1e-8, fy: 1e-8, cx: 0.5, cy: 0.5 };
     let image = RangeImage::from_depth(camera, 2, 2, [1.0; 4]);
-    let mut map = Tsdf3::new(TsdfConfig::default()).unwrap();
+    let mut map = Tsdf3::new(TsdfConfig::textbook()).unwrap();
     let error = map.integrate(&Pose::IDENTITY, &Frame::Image(image)).unwrap_err();
     assert!(matches!(error, MapError::TooFar { .. }), "{error}");
     assert!(map.store().is_empty());
@@ -113,7 +113,7 @@ fn a_scan_that_reaches_too_far_is_refused_with_a_clear_error() {
 
 #[test]
 fn rays_take_no_more_memory_than_the_limit_allows_for() {
-    let config = TsdfConfig { max_range: 2000.0, points: PointSweep::Rays, ..Default::default() };
+    let config = TsdfConfig { max_range: 2000.0, points: PointSweep::Rays, ..TsdfConfig::textbook() };
     let points = (0..20).map(|i| {
         let a = 0.7 * i as f32;
         [1900.0 * a.cos(), 1900.0 * a.sin(), 0.0]

@@ -2,14 +2,14 @@
 
 use super::MapperSettings;
 use super::derived::Derived;
-use crate::geom::{Lattice, Pose};
-use crate::map::{MapError, Occupancy, ScanKind, Tsdf};
+use crate::geom::{Aabb, Lattice, Pose};
+use crate::map::{Attenuation, MapError, Occupancy, ScanKind, Tsdf};
 use crate::parallel;
 use crate::scan::ScanStats;
 use crate::store::Store;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// An occupancy map and signed distances of the same scans, and what is derived from them.
+/// An occupancy map, signed distances and hits per meter of the same scans, and what is derived from them.
 ///
 /// ```
 /// use portolan::{Mapper, geom::Pose, scan::{RangeLimits, Scan}};
@@ -31,17 +31,45 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[derive(Clone, Debug)]
 pub struct Mapper<const D: usize> {
     settings: MapperSettings<D>,
-    maps: Maps<D>,
+    maps: MapperMaps<D>,
+    /// Whether the maps are there: the first scan says where their lattice begins.
+    made: bool,
     stats: ScanStats,
     pub(super) derived: Derived<D>,
 }
 
-/// The maps; none before the first scan has said where the lattice begins.
+/// The maps of a mapper; `None`: no such map.
 #[derive(Clone, Debug, Default)]
-struct Maps<const D: usize> {
-    occupancy: Option<Occupancy<D>>,
-    tsdf: Option<Tsdf<D>>,
-    made: bool,
+pub struct MapperMaps<const D: usize> {
+    /// Log odds of being occupied.
+    pub occupancy: Option<Occupancy<D>>,
+    /// Signed distances.
+    pub tsdf: Option<Tsdf<D>>,
+    /// Hits per meter.
+    pub attenuation: Option<Attenuation<D>>,
+}
+
+impl<const D: usize> MapperMaps<D> {
+    /// Bytes of each map, in the order of the fields.
+    fn bytes(&self) -> [usize; 3] {
+        [
+            self.occupancy.as_ref().map_or(0, Occupancy::<D>::memory_bytes),
+            self.tsdf.as_ref().map_or(0, Tsdf::memory_bytes),
+            self.attenuation.as_ref().map_or(0, Attenuation::<D>::memory_bytes),
+        ]
+    }
+
+    fn set_limits(&mut self, [a, b, c]: [usize; 3]) {
+        self.occupancy.iter_mut().for_each(|map| map.set_limit(a));
+        self.tsdf.iter_mut().for_each(|map| map.set_limit(b));
+        self.attenuation.iter_mut().for_each(|map| map.set_limit(c));
+    }
+
+    fn set_bounds(&mut self, bounds: Option<Aabb<D>>) {
+        self.occupancy.iter_mut().for_each(|map| map.set_bounds(bounds));
+        self.tsdf.iter_mut().for_each(|map| map.set_bounds(bounds));
+        self.attenuation.iter_mut().for_each(|map| map.set_bounds(bounds));
+    }
 }
 
 /// What a scan did to each map.
@@ -51,20 +79,28 @@ pub struct Fused {
     pub occupancy: Option<ScanStats>,
     /// To the signed distances, if there are any.
     pub distances: Option<ScanStats>,
-    /// Seconds that each of the two took, by the caller's clock.
-    pub seconds: [f64; 2],
+    /// To the hits per meter, if there are any.
+    pub attenuation: Option<ScanStats>,
+    /// Seconds that each of the three took, by the caller's clock.
+    pub seconds: [f64; 3],
 }
 
 impl Fused {
-    fn of(occupancy: Option<Timed>, distances: Option<Timed>) -> Result<Self, MapError> {
-        let seconds = [&occupancy, &distances].map(|timed| timed.as_ref().map_or(0.0, |timed| timed.1));
-        let occupancy = occupancy.map(|timed| timed.0).transpose()?;
-        Ok(Self { occupancy, distances: distances.map(|timed| timed.0).transpose()?, seconds })
+    fn of([occupancy, distances, attenuation]: [Option<Timed>; 3]) -> Result<Self, MapError> {
+        let seconds = [&occupancy, &distances, &attenuation];
+        let seconds = seconds.map(|timed| timed.as_ref().map_or(0.0, |timed| timed.1));
+        let stats = |timed: Option<Timed>| timed.map(|timed| timed.0).transpose();
+        Ok(Self {
+            occupancy: stats(occupancy)?,
+            distances: stats(distances)?,
+            attenuation: stats(attenuation)?,
+            seconds,
+        })
     }
 
-    /// Of the map that comes last; what became of the beams is the same in both.
+    /// Of the signed distances, else of another map; what became of the beams is the same in all.
     pub fn stats(&self) -> ScanStats {
-        self.distances.or(self.occupancy).unwrap_or_default()
+        self.distances.or(self.occupancy).or(self.attenuation).unwrap_or_default()
     }
 }
 
@@ -77,7 +113,8 @@ impl<const D: usize> Mapper<D> {
 
     /// A mapper with these settings.
     pub fn with(settings: MapperSettings<D>) -> Self {
-        Self { settings, maps: Maps::default(), stats: ScanStats::default(), derived: Derived::default() }
+        let (maps, stats, derived) = Default::default();
+        Self { settings, maps, made: false, stats, derived }
     }
 
     /// A mapper that goes on with these maps; missing ones are not made. The maps keep their lattices and filters: resolution,
@@ -85,32 +122,32 @@ impl<const D: usize> Mapper<D> {
     ///
     /// # Errors
     /// Where a setting is not possible.
-    pub fn of_maps(
-        settings: MapperSettings<D>,
-        occupancy: Option<Occupancy<D>>,
-        tsdf: Option<Tsdf<D>>,
-    ) -> Result<Self, MapError> {
+    pub fn of_maps(settings: MapperSettings<D>, maps: MapperMaps<D>) -> Result<Self, MapError> {
         settings.check()?;
-        let resolution = occupancy.as_ref().map(|map| map.store().lattice().resolution);
+        let MapperMaps { occupancy, tsdf, attenuation } = maps;
+        let of_occupancy = occupancy.as_ref().map(|map| map.store().lattice().resolution);
+        let resolution = attenuation.as_ref().map(|map| map.store().lattice().resolution).or(of_occupancy);
         let settings = MapperSettings { resolution: resolution.unwrap_or(settings.resolution), ..settings };
         let settings = tsdf.as_ref().map_or(settings, |map| settings.with_filter(map.config()));
         let mut mapper = Self::with(settings);
         let occupancy = occupancy.map(|map| map.with_sweep(settings.occupancy_sweep()));
+        let attenuation = attenuation.map(|map| map.with_sweep(settings.occupancy_sweep()));
         let tsdf = tsdf.map(|map| {
             let config = settings.tsdf(map.lattice().origin);
             let (distances, colors) = map.into_stores();
             Tsdf::from_stores(distances, colors, config)
         });
-        mapper.maps = Maps { occupancy, tsdf: tsdf.transpose()?, made: true };
-        mapper.bound();
+        mapper.maps = MapperMaps { occupancy, tsdf: tsdf.transpose()?, attenuation };
+        mapper.made = true;
+        mapper.maps.set_bounds(settings.bounds);
         Ok(mapper)
     }
 
-    /// Fuses one scan, taken at a known pose, into the maps. Both hold the same bytes for any number of threads.
+    /// Fuses one scan, taken at a known pose, into the maps. All hold the same bytes for any number of threads.
     ///
     /// # Errors
-    /// Where a setting is not possible; else as [`Tsdf::integrate`] and [`Occupancy::integrate`]. Where one map is full, the
-    /// other may hold the scan.
+    /// Where a setting is not possible; else as [`Tsdf::integrate`], [`Occupancy::integrate`] and
+    /// [`Attenuation::integrate`]. Where one map is full, the others may hold the scan.
     pub fn integrate(
         &mut self,
         world_from_sensor: &Pose<D>,
@@ -145,7 +182,7 @@ impl<const D: usize> Mapper<D> {
     /// # Errors
     /// Where a setting is not possible.
     pub fn prepare(&mut self, first: [f64; D]) -> Result<(), MapError> {
-        if self.maps.made {
+        if self.made {
             return Ok(());
         }
         let settings = &self.settings;
@@ -156,21 +193,23 @@ impl<const D: usize> Mapper<D> {
             Occupancy::<D>::new(lattice, model).map(|map| map.with_sweep(settings.occupancy_sweep()))
         });
         let tsdf = settings.distances.then(|| Tsdf::<D>::new(settings.tsdf(origin)));
-        self.maps = Maps { occupancy: occupancy.transpose()?, tsdf: tsdf.transpose()?, made: true };
-        self.bound();
+        let attenuation = settings.attenuation.map(|rule| {
+            Attenuation::<D>::new(lattice, rule).map(|map| map.with_sweep(settings.occupancy_sweep()))
+        });
+        self.maps = MapperMaps {
+            occupancy: occupancy.transpose()?,
+            tsdf: tsdf.transpose()?,
+            attenuation: attenuation.transpose()?,
+        };
+        self.made = true;
+        self.maps.set_bounds(self.settings.bounds);
         Ok(())
-    }
-
-    fn bound(&mut self) {
-        let bounds = self.settings.bounds;
-        self.maps.occupancy.iter_mut().for_each(|map| map.set_bounds(bounds));
-        self.maps.tsdf.iter_mut().for_each(|map| map.set_bounds(bounds));
     }
 
     /// Fuses scans in their order, as [`Mapper::integrate`] does one by one: the same bytes. In 2-D, where a scan is planned
     /// on one thread, each map goes through all of them on a thread of its own. `clock` as for [`Mapper::integrate_timed`].
     ///
-    /// A result a scan. A map that is full ends the list, with that error; the other map may hold a few scans more.
+    /// A result a scan. A map that is full ends the list, with that error; the others may hold a few scans more.
     pub fn integrate_all(
         &mut self,
         scans: &[(Pose<D>, impl ScanKind<D> + Sync)],
@@ -179,7 +218,7 @@ impl<const D: usize> Mapper<D> {
         let memory = self.settings.memory;
         let first = scans.iter().find(|(pose, _)| pose.is_rigid());
         let ready = first.map_or(Ok(()), |(pose, _)| self.prepare(pose.translation));
-        let (true, Ok(())) = (D == 2 && self.maps.made, ready) else {
+        let (true, Ok(())) = (D == 2 && self.made, ready) else {
             let mut full = false;
             let mut one = |(pose, scan): &(Pose<D>, _)| {
                 let fused = self.integrate_timed(pose, scan, clock);
@@ -188,20 +227,39 @@ impl<const D: usize> Mapper<D> {
             };
             return scans.iter().map_while(&mut one).collect();
         };
-        let Maps { occupancy, tsdf, .. } = &mut self.maps;
-        let [a, b] = bytes(occupancy, tsdf);
-        // Each may use half of what is left.
-        let half = memory.saturating_sub(a + b) / 2;
-        occupancy.iter_mut().for_each(|map| map.set_limit(a.saturating_add(half)));
-        tsdf.iter_mut().for_each(|map| map.set_limit(b.saturating_add(half)));
+        let held = self.maps.bytes();
+        // Each may use a part of what is left.
+        let count = held.len() - self.missing();
+        let part = memory.saturating_sub(held.iter().sum()) / count.max(1);
+        self.maps.set_limits(held.map(|bytes| bytes.saturating_add(part)));
         let full = AtomicUsize::new(usize::MAX);
-        let (occupancy, distances) = parallel::join(
-            || fuse_all(occupancy, scans, clock, &full, |map, pose, scan| map.integrate(pose, scan)),
+        let MapperMaps { occupancy, tsdf, attenuation } = &mut self.maps;
+        let (distances, (occupancy, attenuation)) = parallel::join(
             || fuse_all(tsdf, scans, clock, &full, |map, pose, scan| map.integrate(pose, scan)),
+            || {
+                parallel::join(
+                    || fuse_all(occupancy, scans, clock, &full, |map, pose, scan| map.integrate(pose, scan)),
+                    || {
+                        fuse_all(attenuation, scans, clock, &full, |map, pose, scan| {
+                            map.integrate(pose, scan)
+                        })
+                    },
+                )
+            },
         );
-        let fused: Vec<_> = occupancy.into_iter().zip(distances).map(|(a, b)| Fused::of(a, b)).collect();
+        let all = occupancy.into_iter().zip(distances).zip(attenuation);
+        let fused: Vec<_> = all.map(|((a, b), c)| Fused::of([a, b, c])).collect();
         fused.iter().flatten().for_each(|fused| self.stats += fused.stats());
         fused
+    }
+
+    /// Number of maps that there are not.
+    fn missing(&self) -> usize {
+        let maps = &self.maps;
+        [maps.occupancy.is_none(), maps.tsdf.is_none(), maps.attenuation.is_none()]
+            .map(usize::from)
+            .iter()
+            .sum()
     }
 
     fn fuse(
@@ -211,18 +269,19 @@ impl<const D: usize> Mapper<D> {
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, MapError> {
         let memory = self.settings.memory;
-        let Maps { occupancy, tsdf, .. } = &mut self.maps;
-        let [_, b] = bytes(occupancy, tsdf);
-        let of_occupancy = occupancy.as_mut().map(|map| {
-            map.set_limit(memory.saturating_sub(b));
-            timed(clock, || map.integrate(pose, scan))
-        });
-        let [a, _] = bytes(occupancy, tsdf);
-        let of_distances = tsdf.as_mut().map(|map| {
-            map.set_limit(memory.saturating_sub(a));
-            timed(clock, || map.integrate(pose, scan))
-        });
-        Fused::of(of_occupancy, of_distances)
+        // Each map may use what the others leave, as they are when it comes to its turn.
+        let left = |maps: &MapperMaps<D>| {
+            let held = maps.bytes();
+            held.map(|own| memory.saturating_sub(held.iter().sum::<usize>() - own))
+        };
+        self.maps.set_limits(left(&self.maps));
+        let occupancy = self.maps.occupancy.as_mut().map(|map| timed(clock, || map.integrate(pose, scan)));
+        self.maps.set_limits(left(&self.maps));
+        let distances = self.maps.tsdf.as_mut().map(|map| timed(clock, || map.integrate(pose, scan)));
+        self.maps.set_limits(left(&self.maps));
+        let attenuation =
+            self.maps.attenuation.as_mut().map(|map| timed(clock, || map.integrate(pose, scan)));
+        Fused::of([occupancy, distances, attenuation])
     }
 
     /// The occupancy map; `None` where there is none, or before the first scan.
@@ -240,12 +299,17 @@ impl<const D: usize> Mapper<D> {
         self.maps.tsdf.as_mut()
     }
 
-    /// The maps themselves: occupancy, signed distances.
-    pub fn into_maps(self) -> (Option<Occupancy<D>>, Option<Tsdf<D>>) {
-        (self.maps.occupancy, self.maps.tsdf)
+    /// Hits per meter; `None` where there are none, or before the first scan.
+    pub fn attenuation(&self) -> Option<&Attenuation<D>> {
+        self.maps.attenuation.as_ref()
     }
 
-    /// Allows no more than `bytes` for both maps from now on.
+    /// The maps themselves.
+    pub fn into_maps(self) -> MapperMaps<D> {
+        self.maps
+    }
+
+    /// Allows no more than `bytes` for all maps from now on.
     pub fn set_memory(&mut self, bytes: usize) {
         self.settings.memory = bytes;
     }
@@ -262,21 +326,14 @@ impl<const D: usize> Mapper<D> {
 
     /// Bytes of the maps and of what is derived from them: measured, not estimated.
     pub fn memory_bytes(&self) -> usize {
-        self.occupancy().map_or(0, Occupancy::<D>::memory_bytes)
-            + self.tsdf().map_or(0, Tsdf::memory_bytes)
-            + self.derived.memory_bytes()
+        self.maps.bytes().iter().sum::<usize>() + self.derived.memory_bytes()
     }
 }
 
 /// What a map said to a scan, and the seconds that it took.
 type Timed = (Result<ScanStats, MapError>, f64);
 
-/// Bytes of the two maps.
-fn bytes<const D: usize>(occupancy: &Option<Occupancy<D>>, tsdf: &Option<Tsdf<D>>) -> [usize; 2] {
-    [occupancy.as_ref().map_or(0, Occupancy::<D>::memory_bytes), tsdf.as_ref().map_or(0, Tsdf::memory_bytes)]
-}
-
-/// All scans into one map, up to the one that it, or the other one, had no room for: `None` for each where there is no map.
+/// All scans into one map, up to the one that it, or another one, had no room for: `None` for each where there is no map.
 fn fuse_all<M, S, const D: usize>(
     map: &mut Option<M>,
     scans: &[(Pose<D>, S)],

@@ -1,6 +1,6 @@
 //! The recipe: the maps that are asked for, made so that they fit each other, and what is derived from them.
 //!
-//! [`Mapper`] holds an occupancy map and a field of distances, fuses scans into both, and derives surface and Euclidean
+//! [`Mapper`] holds an occupancy map, a field of distances and hits per meter, fuses scans into all, and derives surface and Euclidean
 //! distances with thresholds that follow from the weights of its own cells. Everything below it can be used by itself.
 
 mod derived;
@@ -9,5 +9,5 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use maps::{Fused, Mapper};
-pub use settings::{CARVE_WEIGHT, MapperSettings};
+pub use maps::{Fused, Mapper, MapperMaps};
+pub use settings::{MapperSettings, THIN};

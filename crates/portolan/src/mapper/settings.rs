@@ -1,14 +1,13 @@
 //! What maps a mapper makes, and how.
 
-use crate::cell::OccupancyModel;
+use crate::cell::{AttenuationRule, OccupancyModel, TsdfRule};
 use crate::geom::Aabb;
-use crate::map::{BeamSweep, MapError, PointSweep, TsdfConfig};
+use crate::map::{BeamSweep, CARVE_WEIGHT, MapError, PointSweep, TsdfConfig, W_MAX};
 use crate::sweep::{LONGEST_RAY_CELLS, OccupancySweep, WeightModel};
 
-/// Weight of free space against a surface's 1: on real logs, full of table legs, surfaces that weigh as much as the beams
-/// that pass beside them are carved away (Intel Research Lab at 5 cm: 85.0 % of held-out ranges within two cells, 82.1 with
-/// a weight of 1).
-pub const CARVE_WEIGHT: f32 = 0.3;
+/// Share of the beams through a cell that says that something stands there: on real logs the least that keeps table legs and
+/// poles without calling grazed floor an obstacle.
+pub const THIN: f64 = 0.145;
 
 /// Settings of a [`Mapper`](super::Mapper).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +19,7 @@ pub struct MapperSettings<const D: usize> {
     pub origin: Option<[f64; D]>,
     /// Truncation of the signed distances (meters); `None`: three cells.
     pub truncation: Option<f64>,
-    /// Clamp of the weight of signed distances. Infinity: never forget.
+    /// Clamp of the weight of signed distances, in observations ([`TsdfConfig::w_max`]). Infinity: never forget.
     pub w_max: f32,
     /// Whether free space goes into the signed distances. Without it is unknown there.
     pub carve: bool,
@@ -34,6 +33,8 @@ pub struct MapperSettings<const D: usize> {
     pub exact: bool,
     /// The occupancy map to make; `None`: no such map.
     pub occupancy: Option<OccupancyModel>,
+    /// The map of hits per meter to make, and how it forgets; `None`: no such map.
+    pub attenuation: Option<AttenuationRule>,
     /// Whether signed distances are made: surface and Euclidean distances are derived from them.
     pub distances: bool,
     /// Whether colors are fused beside distances, where scans have them.
@@ -44,28 +45,38 @@ pub struct MapperSettings<const D: usize> {
     pub memory: usize,
     /// Euclidean distances are kept up to here (meters).
     pub max_distance: f64,
+    /// Share of the beams through a cell that must end in it for the cell to be an obstacle of Euclidean distances without
+    /// being surface; whatever is more likely occupied than not is one, too. 0: the surface alone is an obstacle.
+    pub thin: f64,
+}
+
+/// Counts forget as the filter of distances does with the clamp [`W_MAX`].
+fn usual_attenuation() -> AttenuationRule {
+    AttenuationRule::of_half_life(TsdfRule { truncation: 1.0, w_max: W_MAX }.half_life(1.0))
 }
 
 impl<const D: usize> MapperSettings<D> {
-    /// Both maps with cells of this edge (meters): truncation three cells, free space at [`CARVE_WEIGHT`], clamp 64,
+    /// All maps with cells of this edge (meters): truncation three cells, free space at [`CARVE_WEIGHT`], clamp [`W_MAX`],
     /// Euclidean distances up to a meter, no limit of memory.
     pub fn new(resolution: f64) -> Self {
         Self {
             resolution,
             origin: None,
             truncation: None,
-            w_max: 64.0,
+            w_max: W_MAX,
             carve: true,
             carve_weight: CARVE_WEIGHT,
             weights: WeightModel::default(),
             beams: BeamSweep::default(),
             exact: false,
             occupancy: Some(OccupancyModel::default()),
+            attenuation: Some(usual_attenuation()),
             distances: true,
             color: false,
             bounds: None,
             memory: usize::MAX,
             max_distance: 1.0,
+            thin: THIN,
         }
     }
 
@@ -111,7 +122,7 @@ impl<const D: usize> MapperSettings<D> {
         Self { resolution, truncation: Some(truncation), w_max, carve_weight, weights, ..self }
     }
 
-    /// How the occupancy map reads 3-D scans.
+    /// How the maps of occupancy and of hits per meter read 3-D scans.
     pub fn occupancy_sweep(&self) -> OccupancySweep {
         if self.exact { OccupancySweep::Exact } else { OccupancySweep::Auto }
     }

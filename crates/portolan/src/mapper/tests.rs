@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::answer::Status;
-use crate::field::Esdf;
+use crate::field::{Esdf, ObstacleCells};
 use crate::geom::{Pose, vector};
 use crate::map::{MapError, Occupancy, ScanKind, Tsdf};
 use crate::scan::{Beam, BeamKind, Scan};
@@ -95,7 +95,11 @@ fn makes_what_its_parts_make<const D: usize>() {
     assert!(!ours.is_empty() && ours.keys() == theirs.keys());
     assert!(ours.keys().iter().all(|&key| ours.brick(key) == theirs.brick(key)));
     let settings = mapper.esdf_settings().unwrap();
-    let anew = Esdf::of(&tsdf, &settings);
+    let mut cells = ObstacleCells::of_occupancy(occupancy.store());
+    cells.follow_attenuation(mapper.attenuation().unwrap().store(), mapper.settings().thin);
+    assert_eq!(mapper.obstacle_cells().agreement(), cells.agreement());
+    assert!(cells.agreement()[2] > 0);
+    let anew = Esdf::with_obstacles(&tsdf, &cells, &settings);
     let field = mapper.esdf().unwrap();
     for key in anew.keys() {
         assert!(
@@ -158,11 +162,13 @@ where
     let all = mapper.integrate_all(&scans, &|| 0.0);
     assert_eq!(all.iter().map(|fused| fused.clone().map(|f| f.stats())).collect::<Vec<_>>(), one_by_one);
     assert_eq!(mapper.stats(), expected.stats());
-    let ((a, b), (c, d)) = (mapper.into_maps(), expected.into_maps());
-    let (a, c) = (a.unwrap().into_store(), c.unwrap().into_store());
+    let (ours, theirs) = (mapper.into_maps(), expected.into_maps());
+    let (a, c) = (ours.occupancy.unwrap().into_store(), theirs.occupancy.unwrap().into_store());
     assert!(a.keys() == c.keys() && a.keys().iter().all(|&key| a.brick(key) == c.brick(key)));
-    let (b, d) = (b.unwrap().into_stores().0, d.unwrap().into_stores().0);
+    let (b, d) = (ours.tsdf.unwrap().into_stores().0, theirs.tsdf.unwrap().into_stores().0);
     assert!(b.keys() == d.keys() && b.keys().iter().all(|&key| b.brick(key) == d.brick(key)));
+    let (e, f) = (ours.attenuation.unwrap().into_store(), theirs.attenuation.unwrap().into_store());
+    assert!(e.keys() == f.keys() && e.keys().iter().all(|&key| e.brick(key) == f.brick(key)));
 
     // A full map ends the list.
     let mut small = Mapper::with(MapperSettings { memory: 100_000, ..MapperSettings::<D>::new(0.02) });
@@ -186,7 +192,7 @@ fn settings_that_are_not_possible_are_refused_before_anything_is_made() {
         let refused = mapper.integrate(&pose, &scan);
         assert!(matches!(refused, Err(MapError::MaxDistance(_))), "{max_distance}: {refused:?}");
         assert!(mapper.esdf().is_none() && mapper.tsdf().is_none());
-        assert!(Mapper::of_maps(*mapper.settings(), None, None).is_err());
+        assert!(Mapper::of_maps(*mapper.settings(), MapperMaps::default()).is_err());
     }
     for resolution in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let refused = Mapper::<2>::new(resolution).integrate(&pose, &scan);
@@ -203,12 +209,15 @@ where
     let made_with =
         MapperSettings { weights, w_max: 9.0, truncation: Some(0.4), ..MapperSettings::<D>::new(0.1) };
     let mut expected = fused(made_with);
-    let (occupancy, tsdf) = expected.clone().into_maps();
-    let mut mapper = Mapper::of_maps(MapperSettings::new(0.05), occupancy, tsdf).unwrap();
+    let mut mapper = Mapper::of_maps(MapperSettings::new(0.05), expected.clone().into_maps()).unwrap();
     let (pose, scan) = scan::<D>(POSES);
     let stats = [&mut mapper, &mut expected].map(|mapper| mapper.integrate(&pose, &scan).unwrap());
     assert_eq!(stats[0], stats[1]);
     let [ours, theirs] = [&mapper, &expected].map(|mapper| mapper.tsdf().unwrap().store());
+    assert!(
+        ours.keys() == theirs.keys() && ours.keys().iter().all(|&key| ours.brick(key) == theirs.brick(key))
+    );
+    let [ours, theirs] = [&mapper, &expected].map(|mapper| mapper.attenuation().unwrap().store());
     assert!(
         ours.keys() == theirs.keys() && ours.keys().iter().all(|&key| ours.brick(key) == theirs.brick(key))
     );

@@ -1,18 +1,19 @@
 //! Rows and columns found once and kept while they explain what the sensor delivers.
 
-use super::{RangeImage, SphericalLayout};
+use super::{RangeImage, SphericalLayout, WhyRays};
 
 /// Searches are at most this many scans apart.
 const LONGEST_REST: u32 = 64;
 
-/// Gives scans of points their rows and columns: searches for a layout in the first scan and keeps it while nine tenths
-/// of a scan's points lie in its rows.
+/// Gives scans of points their rows and columns: searches for a layout in the first scan and keeps it while it is good
+/// for what comes ([`SphericalLayout`] says when).
 ///
-/// A search costs many times what it costs to use its layout. Where it fails, or finds nothing better than what
-/// is there, the next one has to wait for one scan, then two, four and so on: a log of clouds without rows is not searched scan by scan.
+/// A search costs many times what it costs to use its layout. Where it fails, the next one has to wait for one scan, then two, four and so on: a log of clouds without rows is not searched scan by scan.
 #[derive(Clone, Debug, Default)]
 pub struct LayoutFinder {
     layout: Option<SphericalLayout>,
+    /// Why the last search failed.
+    why: Option<WhyRays>,
     failed: u32,
     rest: u32,
 }
@@ -28,37 +29,35 @@ impl LayoutFinder {
         self.layout.as_ref()
     }
 
-    /// The range image of points about `origin`, both in the sensor's frame. `None` where the points have no rows and columns:
-    /// none were found, or most points do not fit those that were. O(n); O(n log n) where it searches.
-    pub fn image(&mut self, points: &[[f32; 3]], origin: [f64; 3]) -> Option<RangeImage> {
-        let known = self.layout.as_ref().map(|layout| layout.image_and_placed(points, origin));
-        let placed = known.as_ref().map_or(0, |k| k.1);
-        if known.is_some() && 10 * placed >= 9 * points.len() {
-            return useful(known, points.len());
+    /// The range image of points about `origin`, both in the sensor's frame, for a map with cells of this edge (meters): the
+    /// coarser they are, the better rays alone show a surface, and the fewer pixels may be missing. O(n); O(n log n) where it searches.
+    ///
+    /// # Errors
+    /// Why points have to be followed ray by ray: they have no rows and columns, or those would lose what the points show.
+    /// Of scans that are not searched, why the last one that was had none.
+    pub fn image(&mut self, points: &[[f32; 3]], origin: [f64; 3], cell: f64) -> Result<RangeImage, WhyRays> {
+        let known = self.layout.as_ref().map(|layout| layout.good_image(points, origin, cell));
+        if let Some(Ok(image)) = known {
+            return Ok(image);
         }
         if self.rest > 0 {
             self.rest -= 1;
-            return useful(known, points.len());
+            return known.unwrap_or(Err(self.why.unwrap_or(WhyRays::NoRows)));
         }
-        let found = SphericalLayout::of(points, origin);
-        let better = found.map(|layout| (layout.image_and_placed(points, origin), layout));
-        match better.filter(|((_, now), _)| *now > placed) {
-            Some((image, layout)) => {
+        match SphericalLayout::found(points, origin) {
+            Ok(layout) => {
+                let image = layout.good_image(points, origin, cell);
                 *self = Self::of(layout);
-                useful(Some(image), points.len())
+                image
             }
-            None => {
+            Err(why) => {
                 self.rest = (1 << self.failed.min(31)).min(LONGEST_REST);
                 self.failed += 1;
-                useful(known, points.len())
+                self.why = Some(why);
+                Err(why)
             }
         }
     }
-}
-
-/// An image that holds at least half of its points: another sensor's layout does not.
-fn useful(image: Option<(RangeImage, usize)>, points: usize) -> Option<RangeImage> {
-    image.map(|(image, _)| image).filter(|image| 2 * image.hits() >= points)
 }
 
 #[cfg(test)]
@@ -79,13 +78,24 @@ mod tests {
     fn a_layout_is_kept_while_it_explains_points_and_replaced_when_not() {
         let mut finder = LayoutFinder::default();
         let narrow = scan(16, 0.2);
-        assert_eq!(finder.image(&narrow, [0.0; 3]).unwrap().hits(), narrow.len());
+        assert_eq!(finder.image(&narrow, [0.0; 3], 0.1).unwrap().hits(), narrow.len());
         let first = finder.layout().cloned();
-        assert!(finder.image(&narrow[..4000], [0.0; 3]).is_some());
+        assert!(finder.image(&narrow[..4000], [0.0; 3], 0.1).is_ok());
         assert_eq!(finder.layout().cloned(), first, "part of a scan");
         let wide = scan(32, 0.6);
-        assert_eq!(finder.image(&wide, [0.0; 3]).unwrap().hits(), wide.len());
+        assert_eq!(finder.image(&wide, [0.0; 3], 0.1).unwrap().hits(), wide.len());
         assert_eq!(finder.layout().unwrap().spherical().elevations.len(), 32);
+    }
+
+    #[test]
+    fn a_scan_that_the_layout_would_lose_is_followed_ray_by_ray() {
+        let mut finder = LayoutFinder::default();
+        let whole = scan(32, 0.6);
+        assert!(finder.image(&whole, [0.0; 3], 0.1).is_ok());
+        // One point in forty, on all rings: holes everywhere.
+        let thin: Vec<_> = whole.iter().copied().step_by(41).collect();
+        assert!(finder.image(&thin, [0.0; 3], 0.1).is_err());
+        assert!(finder.image(&whole, [0.0; 3], 0.1).is_ok(), "the layout is kept");
     }
 
     #[test]
@@ -96,7 +106,7 @@ mod tests {
         cloud.extend(cloud.clone().iter().map(|p| p.map(|v| 2.0 * v)));
         let rests: Vec<u32> = (0..8)
             .map(|_| {
-                assert!(finder.image(&cloud, [0.0; 3]).is_none());
+                assert_eq!(finder.image(&cloud, [0.0; 3], 0.1), Err(WhyRays::SharedPixels));
                 finder.rest
             })
             .collect();

@@ -12,6 +12,7 @@
 
 mod angles;
 mod beam;
+mod bridges;
 mod frame_filter;
 mod incidence;
 mod laser;
@@ -24,9 +25,11 @@ mod record;
 mod rings;
 mod spherical_layout;
 mod stats;
+mod ways;
 
 pub(crate) use angles::atan2;
 pub use beam::{Beam, BeamKind};
+pub(crate) use bridges::{Bridge, Bridges};
 pub use frame_filter::{Body, FrameFilter};
 pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, MAX_SLOPE, connected};
@@ -41,3 +44,4 @@ pub use range_surface::orthographic_image;
 pub use record::{BeamOrder, Scan};
 pub use spherical_layout::SphericalLayout;
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};
+pub use ways::{ScanWays, Way, WhyRays};

@@ -1,22 +1,34 @@
 //! Rows and columns for points that came without them.
 
 use super::angles::atan2;
-use super::rings::{columns, extent, rings};
-use super::{RangeImage, Spherical};
+use super::bridges::Holds;
+use super::rings::{columns, rings};
+use super::{RangeImage, Spherical, WhyRays};
 use crate::parallel;
 use std::f64::consts::TAU;
 
 /// Fewer points than this have no rows and columns.
 const FEWEST_POINTS: usize = 512;
-/// Share of points that may lie well behind another point of their pixel: silhouettes, not a cloud of many scans.
-const MOST_BEHIND: f64 = 0.25;
+/// Share of the points that need a pixel of their own: the nearest of several points in a pixel wins, the others are lost.
+const FEWEST_KEPT: f64 = 0.8;
+/// Share of the neighbors of pixels, bridges counted, that must have a value too: an image full of holes shows less surface
+/// than its points.
+const FEWEST_NEIGHBORS: f64 = 0.8;
+/// The same where points are so dense that rays alone show their surface: closer than [`DENSE`] cells.
+const FEWEST_NEIGHBORS_OF_DENSE: f64 = 0.95;
+const DENSE: f64 = 0.8;
+/// Share of the pixels with a value that need a reading of their own; the others are bridges.
+const FEWEST_OWN: f64 = 0.2;
 
 /// Where the rows and columns of a turning lidar look, found in the points of one scan and good for all scans of the
 /// same sensor.
 ///
-/// Lidar logs mostly keep points without rows and columns. What sees free space through a range image needs them back.
-/// Rings are found as clusters of elevations, columns from the steps of azimuth along rings. Where points have been
-/// moved (the sensor's motion taken out) and rings are blurred, a grid is fitted to the measured density instead.
+/// Lidar logs mostly keep points without rows and columns. What sees space between rays through a range image needs them back.
+/// Rings are found as clusters of elevations, columns from the steps of azimuth along rings.
+///
+/// A layout is only good for points that it keeps: four fifths have a pixel of their own, and four fifths of the pixels beside one
+/// with a value, in rows and in columns, have a value too, where gaps of a few pixels within a surface are bridged. Points of
+/// other origins (grids, clouds of several scans, meshes, blurred rings) fail, and are better followed ray by ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphericalLayout {
     spherical: Spherical,
@@ -33,17 +45,41 @@ const NO_PIXEL: u32 = u32::MAX;
 
 impl SphericalLayout {
     /// The layout of a scan of points about `origin`, both in one frame whose z is the sensor's axis of rotation. `None`
-    /// where the points are no such scan: too few, or many of them hidden behind others. O(n log n); once a log.
+    /// where the points are no such scan: too few, without rings, or not good for it. O(n log n); once a log.
     pub fn of(points: &[[f32; 3]], origin: [f64; 3]) -> Option<Self> {
+        Self::found(points, origin).ok()
+    }
+
+    /// The same, or why there is none.
+    pub(super) fn found(points: &[[f32; 3]], origin: [f64; 3]) -> Result<Self, WhyRays> {
         if points.len() < FEWEST_POINTS {
-            return None;
+            return Err(WhyRays::NoRows);
         }
         let polar = Polar::of(points, origin);
         if polar.ranges.iter().any(|r| !r.is_finite()) {
-            return None;
+            return Err(WhyRays::NoRows);
         }
-        let layout = Self::of_rings(&polar).or_else(|| Self::fitted(&polar))?;
-        layout.shares_of_hidden(&polar).then_some(layout)
+        let layout = Self::of_rings(&polar).ok_or(WhyRays::NoRows)?;
+        layout.good_image(points, origin, 0.0)?;
+        Ok(layout)
+    }
+
+    /// The image of points that the layout is good for in cells of this edge (meters), else why it is not. O(points + pixels).
+    pub(super) fn good_image(
+        &self,
+        points: &[[f32; 3]],
+        origin: [f64; 3],
+        cell: f64,
+    ) -> Result<RangeImage, WhyRays> {
+        let image = self.image(points, origin);
+        if (image.hits() as f64) < FEWEST_KEPT * points.len() as f64 {
+            return Err(WhyRays::SharedPixels);
+        }
+        let holds = Holds::of(&image, &self.spherical);
+        let dense = holds.spacing < DENSE * cell;
+        let fewest = if dense { FEWEST_NEIGHBORS_OF_DENSE } else { FEWEST_NEIGHBORS };
+        let whole = holds.across.min(holds.down) >= fewest && holds.own >= FEWEST_OWN;
+        if whole { Ok(image) } else { Err(WhyRays::Gaps) }
     }
 
     /// The layout of rows at `elevations` (radians, strictly descending) and `columns` for a full turn from `first_azimuth`
@@ -84,38 +120,6 @@ impl SphericalLayout {
         Self::from_parts(elevations, columns, first)
     }
 
-    /// Bins of such a size that most of those in sight of the sensor hold a point.
-    fn fitted(polar: &Polar) -> Option<Self> {
-        let (low, high) = extent(&polar.elevations)?;
-        const COARSE: f32 = 0.035;
-        let across = (TAU as f32 / COARSE) as usize + 1;
-        let down = ((high - low) / COARSE) as usize + 1;
-        let mut seen = vec![0u32; across * down];
-        for (&e, &a) in polar.elevations.iter().zip(&polar.azimuths) {
-            let column = (((a + std::f32::consts::PI) / COARSE) as usize).min(across - 1);
-            seen[((e - low) / COARSE) as usize * across + column] += 1;
-        }
-        let filled = seen.iter().filter(|n| **n > 0).count();
-        let density = polar.elevations.len() as f32 / (filled as f32 * COARSE * COARSE);
-        // Two points a pixel: a random pixel then stays empty once in seven times, one of a regular pattern hardly ever.
-        let step = (2.0 / density).sqrt();
-        if step > COARSE {
-            return None;
-        }
-        let rows = ((high - low) / step).ceil().max(2.0) as usize;
-        let elevation = |row: usize| high - (row as f32 + 0.5) * (high - low) / rows as f32;
-        let columns = (TAU as f32 / step).round() as usize;
-        Self::from_parts((0..rows).map(elevation).collect(), columns, -std::f64::consts::PI)
-    }
-
-    /// Whether few points are hidden behind others of their pixel.
-    fn shares_of_hidden(&self, polar: &Polar) -> bool {
-        let values = self.nearest(polar);
-        let hidden = |i: usize| self.pixel(polar, i).is_some_and(|p| values[p] < 0.9 * polar.ranges[i]);
-        let count = (0..polar.ranges.len()).filter(|&i| hidden(i)).count();
-        (count as f64) < MOST_BEHIND * polar.ranges.len() as f64
-    }
-
     #[inline(always)]
     fn row(&self, elevation: f32) -> u16 {
         // A negative number becomes the first entry, which is why what lies below is sorted out first.
@@ -136,26 +140,10 @@ impl SphericalLayout {
         (row != NO_ROW && (0..n).contains(&column)).then(|| usize::from(row) * self.columns + column as usize)
     }
 
-    fn nearest(&self, polar: &Polar) -> Vec<f32> {
-        let mut values = vec![0.0f32; self.columns * self.spherical.elevations.len()];
-        for i in 0..polar.ranges.len() {
-            if let Some(pixel) = self.pixel(polar, i) {
-                let (value, range) = (&mut values[pixel], polar.ranges[i]);
-                *value = if *value == 0.0 || range < *value { range } else { *value };
-            }
-        }
-        values
-    }
-
     /// The range image of a scan about `origin` (its pixels look from there, in the axes of the points' frame). The nearest
     /// of several points in a pixel wins; pixels without one are 0: nothing is known. Points above the first and below
     /// the last row have no pixel. O(n).
     pub fn image(&self, points: &[[f32; 3]], origin: [f64; 3]) -> RangeImage {
-        self.image_and_placed(points, origin).0
-    }
-
-    /// The same, and how many points have a pixel.
-    pub(super) fn image_and_placed(&self, points: &[[f32; 3]], origin: [f64; 3]) -> (RangeImage, usize) {
         const TOGETHER: usize = 4096;
         let chunks: Vec<_> = points.chunks(TOGETHER).collect();
         let parts = parallel::map(&chunks, 1, |points| {
@@ -165,14 +153,12 @@ impl SphericalLayout {
             (pixels, polar.ranges)
         });
         let mut values = vec![0.0f32; self.columns * self.spherical.elevations.len()];
-        let mut placed = 0;
         for (pixel, range) in parts.into_iter().flat_map(|(pixels, ranges)| pixels.into_iter().zip(ranges)) {
             if let Some(value) = values.get_mut(pixel as usize) {
                 *value = if *value == 0.0 || range < *value { range } else { *value };
-                placed += 1;
             }
         }
-        (RangeImage::from_ranges(self.spherical.clone(), self.columns, values), placed)
+        RangeImage::from_ranges(self.spherical.clone(), self.columns, values)
     }
 
     /// Rows and the first column.
@@ -253,16 +239,42 @@ mod tests {
     }
 
     #[test]
-    fn blurred_rings_keep_most_points() {
-        for (scatter, fewest) in [(0.001, 0.95), (0.02, 0.3)] {
-            let points = scan(64, 1024, scatter, [0.0; 3]);
-            let layout = SphericalLayout::of(&points, [0.0; 3]).unwrap();
-            let rows = layout.spherical().elevations.len();
-            assert!(scatter > 0.01 || rows == 64);
-            let image = layout.image(&points, [0.0; 3]);
-            assert!(image.hits() as f64 > fewest * points.len() as f64, "{scatter}: {}", image.hits());
-            // Most pixels know something.
-            assert!(image.hits() as f64 > 0.7 * image.values.len() as f64, "{scatter}: {rows}");
+    fn blurred_rings_keep_most_points_or_are_no_rings() {
+        let points = scan(64, 1024, 0.001, [0.0; 3]);
+        let layout = SphericalLayout::of(&points, [0.0; 3]).unwrap();
+        assert_eq!(layout.spherical().elevations.len(), 64);
+        let image = layout.image(&points, [0.0; 3]);
+        assert!(image.hits() as f64 > 0.95 * points.len() as f64, "{}", image.hits());
+        // Most pixels know something.
+        assert!(image.hits() as f64 > 0.7 * image.values.len() as f64);
+        // An image of these keeps a third of the points.
+        assert_eq!(SphericalLayout::of(&scan(64, 1024, 0.02, [0.0; 3]), [0.0; 3]), None);
+    }
+
+    /// Points of a wall, a few on each line of sight at best: an image of them has a pixel for each point and holes between.
+    #[test]
+    fn grids_of_points_are_no_scan() {
+        for (edge, x) in [(0.05, 2.03), (0.02, 2.07), (0.1, 5.03), (0.05, 4.07)] {
+            let wall =
+                |i: usize| [x, (i % 101) as f32 * edge - 50.0 * edge, (i / 101) as f32 * edge - 20.0 * edge];
+            let points: Vec<_> = (0..101 * 41).map(wall).collect();
+            assert_eq!(SphericalLayout::of(&points, [0.0; 3]), None, "{edge} {x}");
+            let few: Vec<_> = (0..101 * 41).filter(|i| i % 3 != 0).map(wall).collect();
+            assert_eq!(SphericalLayout::of(&few, [0.0; 3]), None, "{edge} {x}");
+        }
+    }
+
+    #[test]
+    fn a_scan_that_was_thinned_out_is_still_one() {
+        let mut seed = 7u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let whole = scan(64, 1024, 0.0, [0.0; 3]);
+        for (share, is_scan) in [(0.9, true), (0.7, true), (0.5, true), (0.03, false)] {
+            let points: Vec<_> = whole.iter().copied().filter(|_| random() < share).collect();
+            assert_eq!(SphericalLayout::of(&points, [0.0; 3]).is_some(), is_scan, "{share}");
         }
     }
 

@@ -1,6 +1,6 @@
 //! What became of the beams: whatever is dropped is counted.
 
-use super::BeamKind;
+use super::{BeamKind, ScanWays, Way};
 
 /// Beams by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -98,12 +98,20 @@ pub struct ScanStats {
     pub cells: u64,
     /// Hits whose end point lies outside the map's bounds; their beams free what is inside.
     pub hits_outside: u64,
+    /// 3-D scans by how they became evidence, and why.
+    pub ways: ScanWays,
 }
 
 impl ScanStats {
     /// What a scan leaves whose pose is refused.
     pub fn refused_pose() -> Self {
         Self { refused_poses: 1, ..Self::default() }
+    }
+
+    /// The same, of a scan that became evidence in this way, if it did.
+    pub(crate) fn by(self, way: Way) -> Self {
+        let ways = if self.scans > 0 { ScanWays::one(way) } else { ScanWays::default() };
+        Self { ways, ..self }
     }
 
     /// Moves one beam to the dropped ones, because it is too long to be followed.
@@ -123,6 +131,7 @@ impl std::ops::AddAssign for ScanStats {
         self.refused += o.refused;
         self.cells += o.cells;
         self.hits_outside += o.hits_outside;
+        self.ways += o.ways;
     }
 }
 

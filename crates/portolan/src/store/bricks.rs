@@ -108,8 +108,19 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
         }
     }
 
+    /// Bytes by which what finds bricks grows with the next one: tables double when they are full.
+    fn growth(&self) -> usize {
+        let keys = if self.keys.len() == self.keys.capacity() { self.keys.capacity().max(4) } else { 0 };
+        let full = self.slots.len() == self.slots.capacity();
+        keys * Self::SLOT + if full { (self.slots.capacity() + 4) * 8 / 7 * Self::BUCKET } else { 0 }
+    }
+
+    const SLOT: usize = size_of::<BlockKey<D>>() + size_of::<C::Brick>() + size_of::<u64>();
+    /// A hash table keeps a byte of control per bucket and an eighth of its buckets empty.
+    const BUCKET: usize = size_of::<(BlockKey<D>, u32)>() + 1;
+
     fn add(&mut self, key: BlockKey<D>, brick: C::Brick) -> Result<(), StoreFull> {
-        let room = self.limit.checked_sub(self.memory_bytes() + brick.bytes());
+        let room = self.limit.checked_sub(self.memory_bytes() + brick.bytes() + self.growth());
         if room.is_none() {
             return Err(StoreFull { limit: self.limit, bytes: self.memory_bytes() });
         }
@@ -148,7 +159,9 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
                 // Taken out, so that every brick is changed in place by one worker alone.
                 let brick = slot.map(|s| std::mem::replace(&mut self.bricks[s as usize], empty.clone()));
                 let bytes = brick.as_ref().map_or(0, Planes::bytes);
-                Work { position: chunk * TOGETHER + i, slot, bytes, brick, cells: 0 }
+                // What takes no memory yet may come to take some: then the limit is asked first.
+                let before = brick.clone().filter(|_| bytes == 0);
+                Work { position: chunk * TOGETHER + i, slot, bytes, before, brick, cells: 0 }
             }));
             parallel::change_each(&mut work, CELLS_A_TASK / block_cells::<D>(), &scratch, |w, s| {
                 w.cells = change(w.position, &mut w.brick, s)
@@ -158,6 +171,13 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
                 match (w.slot, w.brick) {
                     (Some(slot), Some(brick)) => {
                         let slot = slot as usize;
+                        let grown = brick.bytes().saturating_sub(w.bytes);
+                        let fits = grown == 0 || full.is_ok() && self.limit >= self.memory_bytes() + grown;
+                        if let (false, Some(before)) = (fits, w.before) {
+                            self.bricks[slot] = before;
+                            full = full.and(Err(StoreFull { limit: self.limit, bytes: self.memory_bytes() }));
+                            continue;
+                        }
                         self.bytes = self.bytes - w.bytes + brick.bytes();
                         self.bricks[slot] = brick;
                         if w.cells > 0 {
@@ -195,6 +215,8 @@ struct Work<C: Cell> {
     position: usize,
     slot: Option<u32>,
     bytes: usize,
+    /// The brick as it was, where it took no memory.
+    before: Option<C::Brick>,
     brick: Option<C::Brick>,
     cells: usize,
 }
@@ -222,6 +244,13 @@ impl<C: Cell, const D: usize> Store<C, D> for Bricks<C, D> {
     #[inline]
     fn cell(&self, cell: [i32; D]) -> Option<C> {
         self.brick(BlockKey::of_cell(cell))?.get(BlockKey::offset(cell))
+    }
+
+    fn blocks_with(&self, holds: impl Fn(C) -> bool) -> Vec<BlockKey<D>> {
+        let has = |key: &BlockKey<D>| {
+            self.brick(*key).is_some_and(|b| (0..b.len()).any(|i| b.get(i).is_some_and(&holds)))
+        };
+        self.keys().into_iter().filter(has).collect()
     }
 
     fn apply(&mut self, key: BlockKey<D>, evidence: &C::Evidence, rule: &C::Rule) -> Result<(), StoreFull> {
@@ -252,10 +281,8 @@ impl<C: Cell, const D: usize> Store<C, D> for Bricks<C, D> {
     }
 
     fn memory_bytes(&self) -> usize {
-        let slot = size_of::<BlockKey<D>>() + size_of::<C::Brick>() + size_of::<u64>();
-        // A hash table keeps a byte of control per bucket and an eighth of its buckets empty.
-        let bucket = size_of::<(BlockKey<D>, u32)>() + 1;
-        self.bytes + self.keys.capacity() * slot + self.slots.capacity() * 8 / 7 * bucket + size_of::<Self>()
+        let tables = self.keys.capacity() * Self::SLOT + self.slots.capacity() * 8 / 7 * Self::BUCKET;
+        self.bytes + tables + size_of::<Self>()
     }
 }
 

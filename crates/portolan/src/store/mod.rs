@@ -21,7 +21,7 @@ pub use tree_levels::Summary;
 pub use tree_records::{Slot, TreeRecords, TreeRecordsError};
 
 use crate::cell::{Cell, Evidence};
-use crate::geom::{Aabb, BlockKey, Lattice};
+use crate::geom::{Aabb, BlockKey, Lattice, block_cells};
 use crate::sweep::Swept;
 
 /// A map's memory: cells addressed by lattice index, changed by blocks of evidence.
@@ -40,6 +40,28 @@ pub trait Store<C: Cell, const D: usize> {
     /// Whether a cell lies within the store's bounds.
     fn contains(&self, _cell: [i32; D]) -> bool {
         true
+    }
+
+    /// The blocks with an observed cell for which this holds, ascending. O(cells). Of stores without bounds none, unless they
+    /// know their blocks.
+    fn blocks_with(&self, holds: impl Fn(C) -> bool) -> Vec<BlockKey<D>> {
+        let lattice = self.lattice();
+        let Some(bounds) = self.bounds() else { return Vec::new() };
+        let (Some(low), Some(high)) = (lattice.cell_of(bounds.min), lattice.cell_of(bounds.max)) else {
+            return Vec::new();
+        };
+        let (low, high) = (BlockKey::of_cell(low), BlockKey::of_cell(high));
+        let edges: [usize; D] = std::array::from_fn(|k| (high.0[k] - low.0[k] + 1).max(0) as usize);
+        let key = |mut n: usize| {
+            BlockKey(std::array::from_fn(|k| {
+                let at = n % edges[k];
+                n /= edges[k];
+                low.0[k] + at as i32
+            }))
+        };
+        let has =
+            |key: &BlockKey<D>| (0..block_cells::<D>()).any(|i| self.cell(key.cell(i)).is_some_and(&holds));
+        (0..edges.iter().product()).map(key).filter(has).collect()
     }
 
     /// Fuses one scan's evidence about a block; cells outside of the store are passed over.

@@ -22,6 +22,7 @@ pub use mesh::{EdgeCounts, Mesh};
 pub use nearest::NearestSurface;
 pub(crate) use nearest::point_triangle_sq;
 pub use polyline::Polyline;
+pub(crate) use predict::hit_rays;
 pub use predict::{PredictionScore, RangeNoise, RangePredictions};
 pub use ray_cast::{RayCast, RayCastSettings, RayTrace, cast_ray, trace_ray};
 pub use ray_caster::RayCaster;

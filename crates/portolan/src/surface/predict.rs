@@ -136,7 +136,7 @@ impl RangePredictions {
 }
 
 /// Origin and end of every ray of a frame with a hit, in the sensor's frame.
-fn hit_rays(frame: &Frame) -> Vec<([f64; 3], [f64; 3])> {
+pub(crate) fn hit_rays(frame: &Frame) -> Vec<([f64; 3], [f64; 3])> {
     match frame {
         Frame::Image(image) if image.check().is_err() => Vec::new(),
         Frame::Image(image) => image.readings().filter(|r| r.2).map(|r| (r.0, r.1)).collect(),

@@ -34,7 +34,7 @@ pub struct RayTrace<const D: usize> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayCastSettings {
     /// Cells of smaller weight are unknown. `None`: what fits the map
-    /// ([`Thresholds::observed`](crate::map::Thresholds::observed)), and any weight above 0 where cells alone are given.
+    /// ([`DistanceMap::min_weight`](crate::map::DistanceMap::min_weight)), and any weight above 0 where cells alone are given.
     pub min_weight: Option<f32>,
     /// Maximum length of a ray (meters).
     pub max_range: f64,
@@ -57,7 +57,7 @@ impl RayCastSettings {
     }
 
     fn fitted<const D: usize>(self, map: &impl DistanceMap<D>) -> Self {
-        Self { min_weight: self.min_weight.or(Some(map.thresholds().observed)), ..self }
+        Self { min_weight: self.min_weight.or(Some(map.min_weight())), ..self }
     }
 
     #[inline(always)]

@@ -20,7 +20,7 @@ pub enum Ambiguity {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContourSettings {
     /// Cells of smaller weight are unknown; a square with an unknown corner gets no segment. `None`: what fits the map
-    /// ([`Thresholds::surface`](crate::map::Thresholds::surface)).
+    /// ([`DistanceMap::min_weight`](crate::map::DistanceMap::min_weight)).
     pub min_weight: Option<f32>,
     /// Treatment of ambiguous squares.
     pub ambiguity: Ambiguity,
@@ -29,7 +29,7 @@ pub struct ContourSettings {
 impl ContourSettings {
     /// The default, with the weight that fits a map written out.
     pub fn of(map: &impl DistanceMap<2>) -> Self {
-        Self { min_weight: Some(map.thresholds().surface), ..Self::default() }
+        Self { min_weight: Some(map.min_weight()), ..Self::default() }
     }
 }
 
@@ -62,7 +62,7 @@ impl Row {
 /// The corners of a square are the centers of four neighboring cells; a vertex is placed on an edge by linear interpolation,
 /// `t = D_a / (D_a - D_b)`. Negative is inside, zero is free. O(cells of the box around what was observed).
 pub fn marching_squares(map: &impl DistanceMap<2>, settings: &ContourSettings) -> Contour {
-    let min_weight = settings.min_weight.unwrap_or(map.thresholds().surface);
+    let min_weight = settings.min_weight.unwrap_or(map.min_weight());
     let is_observed = |weight: f32| weight > 0.0 && weight >= min_weight;
     if let Some(dense) = map.dense() {
         let planes = dense.planes();

@@ -8,12 +8,15 @@
 //! | [`Projective`] | distances | the center of every 3-D cell, against a range image |
 //! | [`PointRays`] | distances | every 3-D cell that a ray to a point passes through; the nearest ray counts |
 //! | [`HitMissSweep`] | hits and misses | 3-D cells that rays pass through, exactly or through a range image |
+//! | [`BeamLengths`] | hits and lengths | every cell that a beam passes through, exactly |
+//! | [`HitLengthSweep`] | hits and lengths | 3-D cells that rays pass through, exactly or in closed form through a range image |
 
 mod cell_centre;
 mod fan;
 mod fan_plan;
 mod image;
 mod inside;
+mod lengths;
 mod march;
 mod nearest_ray;
 mod occupancy;
@@ -26,6 +29,8 @@ mod weight;
 pub use cell_centre::CellCentre;
 pub use image::{Projective, ProjectiveSettings};
 pub(crate) use inside::Inside;
+pub use lengths::{BeamLengths, HitLengthSweep};
+pub(crate) use lengths::{HitBlocks, KnowsHits};
 pub use march::March;
 pub use occupancy::{HitMissSweep, OccupancySweep};
 pub use plan::{LONGEST_RAY_CELLS, PlanError, PlanLimits};

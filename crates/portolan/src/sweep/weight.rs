@@ -59,3 +59,38 @@ impl WeightModel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::RangeLimits;
+
+    fn weights(model: WeightModel, bearings: &[f64], ranges: &[f64]) -> Vec<f32> {
+        let scan = Scan::from_laser(bearings, ranges, &RangeLimits::default());
+        let mut weights = Vec::new();
+        model.weigh(&scan, &mut Vec::new(), &mut weights);
+        weights
+    }
+
+    #[test]
+    fn weights_fall_with_the_square_of_the_range_from_1_m_on() {
+        // A radian apart, so that no beam has a neighbor.
+        let got = weights(WeightModel::InverseSquare, &[-2.0, -1.0, 0.0, 1.0], &[0.5, 1.0, 2.0, 10.0]);
+        assert_eq!(got, [1.0, 1.0, 0.25, 0.01]);
+        assert_eq!(weights(WeightModel::Constant, &[0.0, 1.0], &[2.0, 10.0]), [1.0, 1.0]);
+    }
+
+    #[test]
+    fn weights_fall_with_the_incidence() {
+        // A wall at x = 2 m is met under the bearing.
+        let bearings: Vec<f64> = (-70..=70).map(|d| f64::from(d).to_radians()).collect();
+        let ranges: Vec<f64> = bearings.iter().map(|b| 2.0 / b.cos()).collect();
+        let cosines = weights(WeightModel::CosIncidence, &bearings, &ranges);
+        let both = weights(WeightModel::InverseSquareCosIncidence, &bearings, &ranges);
+        for (i, b) in bearings.iter().enumerate() {
+            let want = b.cos();
+            assert!((f64::from(cosines[i]) - want).abs() < 0.01, "{b}: {}", cosines[i]);
+            assert!((f64::from(both[i]) - want * (0.5 * want).powi(2)).abs() < 0.003, "{b}: {}", both[i]);
+        }
+    }
+}

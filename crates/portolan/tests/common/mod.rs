@@ -29,7 +29,7 @@ pub(crate) fn grid() -> Grid<2> {
 }
 
 pub(crate) fn tsdf(sweep: BeamSweep, carve: bool, log: &[(Pose<2>, Scan<2>)]) -> Tsdf2 {
-    let config = TsdfConfig { beams: sweep, carve, ..Default::default() };
+    let config = TsdfConfig { beams: sweep, carve, ..TsdfConfig::textbook() };
     let mut tsdf = Tsdf2::covering(&grid(), config).unwrap();
     for (pose, scan) in log {
         tsdf.integrate(pose, scan).unwrap();

@@ -9,7 +9,7 @@ use portolan_io::{MapMode, write_costmap};
 use super::field::Field;
 use crate::arguments::{heights, length_or_zero};
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, dense_esdf_2d, tsdf_of_samples};
+use crate::esdf::{esdf_of_surface, tsdf_of_samples};
 
 /// How costs become pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -93,5 +93,5 @@ impl CostArgs {
 /// 2-D distances to what stands between two heights.
 fn in_2d(field: &EsdfGrid<3>, heights: [f64; 2], unknown: UnknownSpace) -> anyhow::Result<EsdfGrid<2>> {
     let (grid, lowest) = lowest_between(field.grid(), field.samples(), heights, unknown)?;
-    Ok(dense_esdf_2d(&tsdf_of_samples(grid, &lowest)?, EsdfArg::Accurate))
+    esdf_of_surface(&tsdf_of_samples(grid, &lowest)?)
 }

@@ -1,13 +1,14 @@
 //! The distance field of anything that has one, as arrays.
 
 use anyhow::bail;
-use portolan::field::{Esdf, EsdfGrid};
+use portolan::field::EsdfGrid;
 use portolan::geom::{Aabb, Grid};
 use portolan_io::EsdfFile;
+use serde_json::{Map, Value};
 
 use super::Args;
-use crate::esdf::{dense_esdf_2d, esdf_of_cells};
-use crate::mapping::{Settings, cells_for_map_server, dense_esdf, esdf_settings};
+use crate::esdf::{FieldHow, esdf_2d, esdf_3d, esdf_of_cells};
+use crate::mapping::{Settings, cells_for_map_server, dense_esdf};
 use crate::source::Source;
 
 /// A field of either dimension.
@@ -22,8 +23,8 @@ impl Field {
         Ok(Some(match source {
             Source::Map2(file) => match &file.tsdf {
                 Some(tsdf) => {
-                    let method = args.esdf.unwrap_or(Settings::of_saved(&file.header.settings).esdf);
-                    Self::Two(in_2d(dense_esdf_2d(tsdf, method), args)?)
+                    let field = esdf_2d(file, tsdf, &how(args, &file.header.settings))?;
+                    Self::Two(in_2d(field.dense(tsdf.grid()), args)?)
                 }
                 None => {
                     let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(None) };
@@ -51,11 +52,8 @@ impl Field {
             }
             Source::Map3(file) => {
                 let Some(map) = &file.tsdf_bricks else { return Ok(None) };
-                let saved = Settings::of_saved(&file.header.settings);
-                let max_distance = args.max_distance.unwrap_or(saved.max_distance);
-                let mut how = esdf_settings(map.weights, map.carve_weight, max_distance);
-                how.method = args.esdf.unwrap_or(saved.esdf).method();
-                match dense_esdf(&Esdf::of(&map.store, &how), bounds_3d(args)?.as_ref()) {
+                let field = esdf_3d(file, map, &how(args, &file.header.settings))?;
+                match dense_esdf(&field, bounds_3d(args)?.as_ref()) {
                     Ok(dense) => Self::Three(dense),
                     Err(why) => {
                         bail!("{}: {}", args.input.display(), why.replace("--dense", "--bounds"))
@@ -64,6 +62,17 @@ impl Field {
             }
             _ => return Ok(None),
         }))
+    }
+}
+
+/// As the map was made, but for what was asked for.
+fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
+    let saved = FieldHow::of(&Settings::of_saved(saved));
+    FieldHow {
+        method: args.esdf.unwrap_or(saved.method),
+        thin: args.thin.unwrap_or(saved.thin),
+        max_distance: args.max_distance.unwrap_or(saved.max_distance),
+        ..saved
     }
 }
 

@@ -23,7 +23,7 @@ pub(super) fn evaluate(args: &Args, file: &MapFile<2>) -> anyhow::Result<Vec<Par
         text: format!("contour: {length:.1} m, {:.2} % of it doubled within 15 cm\n", 100.0 * share),
     }];
     if let Some(path) = &args.scans {
-        parts.push(predict::in_2d(args, path, &file.header, tsdf)?);
+        parts.push(predict::in_2d(args, path, file, tsdf)?);
     }
     if let Some(path) = &args.reference {
         parts.push(compare(&contour, path)?);

@@ -12,11 +12,10 @@ use portolan_io::{MapFile, PlyMesh, PointCloudFile, TsdfBricks, open, read_ply_m
 use serde_json::{Value, json};
 
 use super::{Args, Part, no_tsdf, predict};
-use crate::mapping::mesh_settings;
 
 pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Part>> {
     let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
-    let settings = MeshSettings { normals: false, colors: false, ..mesh_settings(tsdf.weights) };
+    let settings = MeshSettings { normals: false, colors: false, ..MeshSettings::of(tsdf) };
     let mesh = marching_cubes(&tsdf.store, None, &settings);
     let (triangles, area) = (mesh.triangles.len(), mesh.area());
     let mut parts = vec![Part {
@@ -25,7 +24,7 @@ pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Par
         text: format!("surface: {area:.1} square meters in {triangles} triangles\n"),
     }];
     if let Some(path) = &args.scans {
-        parts.push(predict::in_3d(args, path, &file.header, tsdf)?);
+        parts.push(predict::in_3d(args, path, file, tsdf)?);
     }
     if let Some(path) = &args.reference {
         parts.push(compare(args, &mesh, tsdf, settings.min_weight, path)?);

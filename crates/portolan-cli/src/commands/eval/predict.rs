@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use anyhow::bail;
-use portolan::map::{Thresholds, Tsdf2};
+use portolan::beam_model::{ForetoldRanges, RangeFloor};
+use portolan::map::{Attenuation, DistanceMap, Tsdf2};
 use portolan::store::Store;
 use portolan::surface::{
     PredictionScore, RangeNoise, RangePredictions, RayCast, RayCastSettings, RayCaster, cast_ray,
 };
-use portolan_io::{MapHeader, TsdfBricks};
+use portolan_io::{MapFile, MapHeader, TsdfBricks};
 use serde_json::{Value, json};
 
 use super::spread::Spread;
@@ -64,10 +65,10 @@ impl<'a> Task<'a> {
         Ok(indices)
     }
 
-    /// The document and the text. `read`: the number of scans that could be read.
+    /// The document and the text. `scans`: the number of scans that could be read.
     fn part(
         &self,
-        predictions: &RangePredictions,
+        (predictions, foretold): (&RangePredictions, &ForetoldRanges),
         scans: usize,
         noise: &RangeNoise,
         resolution: f64,
@@ -87,27 +88,40 @@ impl<'a> Task<'a> {
         value["held_out"] = json!(fresh);
         value["noise"] =
             json!({ "sigma": noise.sigma, "outliers": noise.outliers, "max_range": noise.max_range });
+        let floor = RangeFloor { outliers: noise.outliers, max_range: noise.max_range };
+        value["attenuation"] = foretold.score(&floor).map_or(Value::Null, |score| {
+            json!({
+                "beams": foretold.rays(),
+                "log_density": score.log_density,
+                "median_error": score.median_error,
+                "within_10_cm": score.within_10_cm,
+            })
+        });
         let text = text(&value);
         Ok(Part { key: "scans", value, text })
     }
 }
 
 /// Predicts 2-D scans.
-pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf2) -> anyhow::Result<Part> {
-    let task = Task::new(args, path, header);
+pub(super) fn in_2d(args: &Args, path: &Path, file: &MapFile<2>, tsdf: &Tsdf2) -> anyhow::Result<Part> {
+    let task = Task::new(args, path, &file.header);
     let log = log::read_2d(path, &args.source)?;
     let limits = LimitArgs { range: task.range(), no_return: args.limits.no_return };
     let scans = log::scans(&log, &task.indices(log.len())?, &limits.limits(&log));
     let resolution = tsdf.grid().lattice.resolution;
     let settings = RayCastSettings {
-        min_weight: Some(tsdf.thresholds().observed),
+        min_weight: Some(tsdf.min_weight()),
         unknown_tolerance: 2.0 * resolution,
         ..RayCastSettings::default()
     };
-    let mut predictions = RangePredictions::default();
+    let attenuation = attenuation_of(file)?;
+    let (mut predictions, mut foretold) = (RangePredictions::default(), ForetoldRanges::default());
     let progress = Progress::new(scans.len(), "predicting", args.output);
     for (world_from_sensor, scan) in &scans {
         progress.add(1);
+        if let Some(map) = &attenuation {
+            foretold.add_scan(map, world_from_sensor, scan, settings.max_range);
+        }
         for beam in scan.beams().filter(|b| b.is_hit()) {
             let direction = world_from_sensor.rotate(beam.direction);
             match cast_ray(tsdf, world_from_sensor.translation, direction, &settings) {
@@ -120,35 +134,42 @@ pub(super) fn in_2d(args: &Args, path: &Path, header: &MapHeader, tsdf: &Tsdf2) 
     }
     drop(progress);
     let noise = RangeNoise::of_cells(resolution, settings.max_range);
-    task.part(&predictions, scans.len(), &noise, resolution)
+    task.part((&predictions, &foretold), scans.len(), &noise, resolution)
 }
 
 /// Predicts 3-D scans.
 pub(super) fn in_3d(
     args: &Args,
     path: &Path,
-    header: &MapHeader,
+    file: &MapFile<3>,
     tsdf: &TsdfBricks<3>,
 ) -> anyhow::Result<Part> {
-    let task = Task::new(args, path, header);
+    let task = Task::new(args, path, &file.header);
     let log = log::read_3d(path, &args.source, false)?;
     let filter = task.range().filter(task.settings.shape.self_filter.clone())?;
     let indices = task.indices(log.len())?;
     let resolution = tsdf.store.lattice().resolution;
     let settings = RayCastSettings {
-        min_weight: Some(Thresholds::of(tsdf.weights, tsdf.carve_weight).observed),
+        min_weight: Some(tsdf.min_weight()),
         max_range: filter.max_range.min(FARTHEST),
         // Where free space was not fused, all of it is unknown.
         unknown_tolerance: if task.settings.shape.carve { 2.0 * resolution } else { f64::INFINITY },
         blind: BLIND,
     };
     let rays = RayCaster::new(&tsdf.store, settings);
-    let mut predictions = RangePredictions::default();
+    let attenuation = attenuation_of(file)?;
+    let (mut predictions, mut foretold) = (RangePredictions::default(), ForetoldRanges::default());
     let mut unreadable = Vec::new();
     let progress = Progress::new(indices.len(), "predicting", args.output);
     for &i in &indices {
         match log.frame(i) {
-            Ok(frame) => predictions.add(&rays, log.pose(i), &filter.apply(frame).0, args.rays),
+            Ok(frame) => {
+                let (frame, pose) = (filter.apply(frame).0, log.pose(i));
+                predictions.add(&rays, pose, &frame, args.rays);
+                if let Some(map) = &attenuation {
+                    foretold.add_frame(map, pose, &frame, args.rays, settings.max_range);
+                }
+            }
             Err(error) => unreadable.push(error),
         }
         progress.add(1);
@@ -159,9 +180,16 @@ pub(super) fn in_3d(
         bail!("{error}");
     }
     let noise = RangeNoise::of_cells(resolution, settings.max_range);
-    let mut part = task.part(&predictions, indices.len() - unreadable.len(), &noise, resolution)?;
+    let mut part =
+        task.part((&predictions, &foretold), indices.len() - unreadable.len(), &noise, resolution)?;
     part.value["unreadable"] = json!({ "scans": unreadable.len(), "first": first });
     Ok(part)
+}
+
+/// The map of hits per meter; `None`: the file holds none.
+fn attenuation_of<const D: usize>(file: &MapFile<D>) -> anyhow::Result<Option<Attenuation<D>>> {
+    let map = file.attenuation.as_ref().map(|map| Attenuation::from_store(map.store.clone(), map.rule));
+    Ok(map.transpose()?)
 }
 
 fn to_json(predictions: &RangePredictions, score: &PredictionScore) -> Value {
@@ -208,6 +236,19 @@ fn text(p: &Value) -> String {
         100.0 * f("within_two_cells_of_all"),
         f("negative_log_likelihood"),
     );
+    let hits = &p["attenuation"];
+    if let (Some(density), Some(within), Some(error)) =
+        (hits["log_density"].as_f64(), hits["within_10_cm"].as_f64(), hits["median_error"].as_f64())
+    {
+        text += &format!(
+            "hits per meter: log density {density:.3} nats a beam ({:.0} % uniform up to {} m); median range within \
+             10 cm {:.1} %, median |error| {:.1} mm\n",
+            100.0 * p["noise"]["outliers"].as_f64().unwrap_or(f64::NAN),
+            p["noise"]["max_range"],
+            100.0 * within,
+            1000.0 * error,
+        );
+    }
     if p["held_out"] != true {
         text += "warning: the map was not made with these scans held out; make it with --hold-out\n";
     }

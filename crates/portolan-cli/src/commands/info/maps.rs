@@ -1,6 +1,6 @@
 //! `info` of a map.portolan.
 
-use portolan::cell::{Cell, Planes};
+use portolan::cell::{Cell, HitLengthPlanes, Planes};
 use portolan::store::{Bricks, Store};
 use portolan_io::{MapFile, MapHeader};
 use serde_json::{Value, json};
@@ -51,6 +51,7 @@ pub(super) fn of_2d(file: &MapFile<2>) -> Value {
             "bytes": map.memory_bytes(),
         });
     }
+    maps_of_hits(&mut maps, file);
     of_header(2, &file.header, file.poses.len(), maps)
 }
 
@@ -67,10 +68,21 @@ pub(super) fn of_3d(file: &MapFile<3>) -> Value {
     if let Some(map) = &file.color_bricks {
         maps["colors"] = of_bricks("red, green, blue, weight, 16 bits each", &map.store);
     }
+    maps_of_hits(&mut maps, file);
     of_header(3, &file.header, file.poses.len(), maps)
 }
 
-fn of_bricks<C: Cell>(cell: &str, store: &Bricks<C, 3>) -> Value {
+fn maps_of_hits<const D: usize>(maps: &mut Value, file: &MapFile<D>) {
+    if let Some(map) = &file.attenuation {
+        maps["attenuation"] = of_bricks("hits, length of beams and looks, whole numbers", &map.store);
+        maps["attenuation"]["half_life"] = json!(map.rule.half_life);
+        let hits = |planes: &HitLengthPlanes| planes.hits().iter().map(|h| u64::from(*h)).sum::<u64>();
+        let all = map.store.bricks_by_age().map(|(_, brick)| hits(&brick.planes()));
+        maps["attenuation"]["hits"] = json!(all.sum::<u64>());
+    }
+}
+
+fn of_bricks<C: Cell, const D: usize>(cell: &str, store: &Bricks<C, D>) -> Value {
     let observed = |brick: &C::Brick| (0..brick.len()).filter(|&i| brick.get(i).is_some()).count();
     let extent = brick_extent(store);
     json!({

@@ -32,7 +32,7 @@ impl Fields {
         euclidean.measure();
         let dense = euclidean.dense(tsdf.grid());
         let planes = tsdf.store().planes();
-        let least = tsdf.thresholds().observed;
+        let least = tsdf.min_weight();
         let cells = planes.distances().iter().zip(planes.weights());
         let kept = cells.map(|(&d, &w)| if w > 0.0 && w >= least { d } else { f32::NAN });
         Ok(Self {

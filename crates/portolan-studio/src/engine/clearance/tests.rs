@@ -4,12 +4,13 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use portolan::Answer;
-use portolan::field::{ClearanceField, Esdf, EsdfSettings, UnknownSpace};
+use portolan::field::{Esdf, EsdfSettings, UnknownSpace};
 use portolan::geom::{Pose, vector};
 use portolan::map::Tsdf2;
 use portolan::plan::{Cause, PathCheck, Waypoints, check_path};
 use portolan::scan::{Beam, BeamKind, Scan};
 use portolan::surface::{ContourSettings, marching_squares};
+use portolan_io::AnswerRow;
 use serde_json::{Value, json};
 
 use super::ask::{Ask, Which};
@@ -110,27 +111,17 @@ fn agrees(studio: &mut Studio, n: usize) -> Vec<String> {
             let number = |name: &str| told[name].as_f64().map(f64::to_bits);
             let inside = tsdf.grid().aabb().contains(p);
             let answer = if inside { field.distance_and_gradient(p) } else { Answer::Outside };
-            let surface = field.clearance(p, UnknownSpace::Optimistic).value();
-            let far = surface.is_some_and(|c| c.lower >= limit);
-            let status = match answer {
-                Answer::Known(_) | Answer::Saturated(_) if far => "saturated",
-                Answer::Outside if inside => "unknown",
-                answer => answer.status().word(),
-            };
+            let answer = if inside && answer == Answer::Outside { Answer::Unknown } else { answer };
+            let mut row = AnswerRow::of(p, tsdf.occupancy(p), answer);
+            row.certify(&field, p, unknown, limit);
+            let status = row.status.word();
             assert_eq!(told["status"], status, "{p:?}");
-            let sample = answer.value();
-            let distance = sample.map(|(d, _)| if far { limit.copysign(d) } else { d });
-            assert_eq!(number("distance"), distance.map(f64::to_bits), "{p:?}");
-            let slope = sample.filter(|_| status == "known").map(|s| s.1);
+            for (name, said) in [("distance", row.distance), ("lower", row.lower), ("upper", row.upper)] {
+                assert_eq!(number(name), said.map(f64::to_bits), "{name} at {p:?}");
+            }
             let gradient = told["gradient"].as_array().map(|g| [0, 1].map(|k| g[k].as_f64().unwrap()));
-            assert_eq!(gradient, slope, "{p:?}");
-            assert_eq!(told["norm"].as_f64(), slope.map(vector::norm));
-            let asked = sample.and_then(|_| field.clearance(p, unknown).value());
-            let lower = asked.map(|c| if far { c.lower.min(limit) } else { c.lower });
-            assert_eq!(number("lower"), lower.map(f64::to_bits), "{p:?}");
-            let says_more = !(far && unknown == UnknownSpace::Optimistic);
-            let upper = asked.map(|c| c.upper).filter(|u| u.is_finite() && says_more);
-            assert_eq!(number("upper"), upper.map(f64::to_bits), "{p:?}");
+            assert_eq!(gradient, row.gradient, "{p:?}");
+            assert_eq!(told["norm"].as_f64(), row.gradient.map(vector::norm));
             assert_eq!(told["occupancy"].as_f64(), tsdf.occupancy(p));
             seen.push(status.to_owned());
         }
@@ -154,12 +145,13 @@ fn the_row_has_the_numbers_of_the_answer() {
     let row: Vec<&str> = body["row"].as_str().unwrap().split(',').collect();
     let e = &body["euclidean"];
     assert_eq!(row[..3], ["6.5", "4.5", "known"]);
-    let numbers: Vec<f64> = row[3..].iter().map(|v| v.parse().unwrap()).collect();
+    let numbers: Vec<f64> = row[3..9].iter().map(|v| v.parse().unwrap()).collect();
     let told =
         [&e["occupancy"], &e["distance"], &e["lower"], &e["upper"], &e["gradient"][0], &e["gradient"][1]];
     assert_eq!(numbers, told.map(|v| v.as_f64().unwrap()));
+    assert_eq!(row[9], "free");
     let unknown = studio.ask(json!({ "op": "probe", "at": [50.0, 4.5], "unknown": "optimistic" })).body;
-    assert_eq!(unknown["row"], "50,4.5,outside,,,,,,");
+    assert_eq!(unknown["row"], "50,4.5,outside,,,,,,,");
 }
 
 #[test]

@@ -32,16 +32,17 @@ impl Ghost {
         self.watch.observe(events);
     }
 
-    /// Measured and predicted, after `at` scans.
+    /// How soon half of it is gone, over all cells left and by kind of cell, after `at` scans.
     pub(super) fn to_json(&self, tsdf: &Tsdf2, at: usize, lap: usize) -> Value {
         let laps = (at - self.since.min(at)) as f64 / lap.max(1) as f64;
-        let [measured, unclamped, tapered] = self.watch.groups(tsdf.rule(), laps);
+        let [saturated, unclamped, tapered] = self.watch.groups(tsdf.rule(), laps);
         json!({
             "since": self.since,
             "old": { "min": self.old.min, "max": self.old.max },
             "laps": laps,
             "cells": self.watch.cells().count(),
-            "measured": group(&measured),
+            "left": group(&self.watch.left(tsdf.rule(), laps)),
+            "saturated": group(&saturated),
             "unclamped": group(&unclamped),
             "tapered": group(&tapered),
         })

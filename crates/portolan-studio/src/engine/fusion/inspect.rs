@@ -59,7 +59,7 @@ impl Inspected {
         })
     }
 
-    /// The closed form `D_n = m + (D_0 - m) lambda^n` with `lambda = W_max / (W_max + w)`, from the observation before
+    /// The closed form `D_n = m + (D_0 - m) lambda^n` with `lambda = W_max / (W_max + max(w, 1))`, from the observation before
     /// the chair was moved: `m` is the new truth, clamped, `w` the median weight of the observations since. `null` where
     /// the truth at this cell did not change, nothing was seen before or since, or nothing is forgotten.
     fn decay(&self, tsdf: &Tsdf2, moved: Option<&Move>) -> Value {
@@ -71,7 +71,7 @@ impl Inspected {
         let Some((_, first)) = after.first().filter(|(_, e)| e.weight_before > 0.0) else {
             return Value::Null;
         };
-        let mut weights: Vec<f64> = after.iter().map(|(_, e)| weight(e)).collect();
+        let mut weights: Vec<f64> = after.iter().map(|(_, e)| e.weight).collect();
         weights.sort_by(f64::total_cmp);
         let (w, w_max) = (weights[weights.len() / 2], f64::from(rule.w_max));
         let tau = f64::from(rule.truncation);
@@ -81,16 +81,11 @@ impl Inspected {
         if truth(&moved.before) == target {
             return Value::Null;
         }
-        let lambda = w_max / (w_max + w);
+        let lambda = w_max / (w_max + w.max(1.0));
         let values: Vec<f64> =
             (0..=after.len()).map(|n| target + (first.before - target) * lambda.powi(n as i32)).collect();
         json!({ "since": since, "target": target, "weight": w, "lambda": lambda, "half_life": rule.half_life(w), "values": values })
     }
-}
-
-/// The weight of an observation: `K = w / (W + w)` solved for `w`.
-fn weight(event: &FusionEvent) -> f64 {
-    if event.gain < 1.0 { event.weight_before * event.gain / (1.0 - event.gain) } else { event.weight_after }
 }
 
 /// `[scan, D before, W before, d, K, D after, W after]`; `D before` is `null` where nothing was known.

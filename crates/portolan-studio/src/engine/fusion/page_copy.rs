@@ -87,7 +87,7 @@ mod tests {
             shape in [1usize..40, 1usize..40],
             rounds in prop::collection::vec(prop::collection::vec((0i32..40, 0i32..40, -0.1f64..0.1), 0..20), 1..5),
         ) {
-            let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, shape), TsdfConfig::default()).unwrap();
+            let mut tsdf = Tsdf2::covering(&Grid::new([0.0; 2], 0.05, shape), TsdfConfig::textbook()).unwrap();
             let mut seen = PageCopy::nothing(shape);
             let mut page = (vec![0f32; shape[0] * shape[1]], vec![0f32; shape[0] * shape[1]]);
             for round in rounds {

@@ -1,12 +1,11 @@
 //! What the page's sliders set.
 
-use portolan::map::TsdfConfig;
+use portolan::map::{CARVE_WEIGHT, TsdfConfig, W_MAX};
 use portolan_io::{sweep_of, sweep_word, weights_of, weights_word};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Refusal;
 use crate::engine::recipe::within;
-use portolan::mapper::CARVE_WEIGHT;
 
 /// How scans are made and fused.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
@@ -33,14 +32,15 @@ pub(in crate::engine) struct Settings {
 impl Settings {
     /// Those that `map` has, so that the same log gives the same map.
     pub(super) fn of_log() -> Self {
-        Self { carve_weight: (1e4 * f64::from(CARVE_WEIGHT)).round() / 1e4, ..Self::default() }
+        let carve_weight = (1e4 * f64::from(CARVE_WEIGHT)).round() / 1e4;
+        Self { carve_weight, w_max: Some(W_MAX.into()), ..Self::default() }
     }
 }
 
 impl Default for Settings {
     /// The textbook's, with the default sweep.
     fn default() -> Self {
-        let config = TsdfConfig::<2>::default();
+        let config = TsdfConfig::<2>::textbook();
         Self {
             resolution: config.resolution,
             truncation: config.truncation,
@@ -74,7 +74,7 @@ impl Settings {
             carve: self.carve,
             beams: sweep_of(&self.sweep).ok_or_else(|| unknown("sweep", &self.sweep))?,
             weights: weights_of(&self.weights).ok_or_else(|| unknown("weight model", &self.weights))?,
-            ..TsdfConfig::default()
+            ..TsdfConfig::textbook()
         })
     }
 }

@@ -71,7 +71,7 @@ fn a_cells_history_is_what_the_library_says() {
         settings["w_max"] = json!(8);
         ask(&mut session, json!({ "op": "set", "settings": settings }));
         ask(&mut session, json!({ "op": "seek", "scan": 150 }));
-        let config = TsdfConfig { beams: sweep, w_max: 8.0, ..Default::default() };
+        let config = TsdfConfig { beams: sweep, w_max: 8.0, ..TsdfConfig::textbook() };
         for cell in [[31, 60], [100, 90], [37, 70], [20, 50]] {
             let told = ask(&mut session, json!({ "op": "watch", "cell": cell }));
             let expected = events(&scans, config, cell);
@@ -135,9 +135,13 @@ fn the_ghost_fades_as_predicted() {
     let moved = ask(&mut session, json!({ "op": "move_chair", "to": chair }));
     assert_eq!(moved["ghost"]["since"], 400);
     let told = ask(&mut session, json!({ "op": "seek", "scan": 600 }));
-    let measured = &told["ghost"]["measured"];
+    let measured = &told["ghost"]["saturated"];
     let of = |name: &str| measured[name].as_f64().unwrap();
     assert!(of("cells") > 30.0, "{measured}");
+    // All cells left: among them some that had less to forget, and some that are told less.
+    let left = &told["ghost"]["left"];
+    assert!(left["cells"].as_u64() > measured["cells"].as_u64(), "{left}");
+    assert!((2.0..4.0).contains(&left["half_life_measured"].as_f64().unwrap()), "{left}");
     let apart = (of("half_life_measured") / of("half_life_predicted") - 1.0).abs();
     assert!(apart < 0.1, "{measured}");
     // Back before the move and on again: the chair moves again at the same scan.

@@ -52,7 +52,7 @@ fn library() -> Gallery {
     let world = apartment().world;
     let scans: Vec<(Pose<2>, Scan<2>)> = lap(&world, &LapConfig::default()).into_iter().take(SCANS).collect();
     let grid = Grid::new([0.0; 2], 0.05, [240, 180]);
-    let tsdf = Tsdf2::covering(&grid, TsdfConfig::default()).unwrap();
+    let tsdf = Tsdf2::covering(&grid, TsdfConfig::textbook()).unwrap();
     let settings = GallerySettings {
         contour: ContourSettings::of(&tsdf),
         esdf: EsdfSettings::of(&tsdf),

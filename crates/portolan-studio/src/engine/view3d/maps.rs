@@ -7,6 +7,7 @@ use portolan::field::{Esdf, EsdfSettings};
 use portolan::geom::vector::sub;
 use portolan::geom::{BlockKey, Pose};
 use portolan::map::{MapError, Occupancy, Tsdf3};
+use portolan::mapper::MapperMaps;
 use portolan::scan::{Frame, ScanStats};
 use portolan::surface::{IncrementalMesh, Mesh, MeshSettings};
 
@@ -64,7 +65,8 @@ impl Maps {
         let start = source.pose(0).map_or([0.0; 3], |pose| pose.translation);
         let mut mapper = Mapper::with(settings.mapper(source.has_color())?);
         if let Some(map) = source.map() {
-            mapper = Mapper::of_maps(*mapper.settings(), None, Some(map.clone())).map_err(Refusal::new)?;
+            let maps = MapperMaps { tsdf: Some(map.clone()), ..Default::default() };
+            mapper = Mapper::of_maps(*mapper.settings(), maps).map_err(Refusal::new)?;
         }
         mapper.prepare(start).map_err(Refusal::new)?;
         let Some(tsdf) = mapper.tsdf() else { return Err(Refusal::new("there are no distances")) };
@@ -177,13 +179,14 @@ impl Maps {
                 (needed - memory).div_ceil(1 << 20)
             )));
         }
+        let cells = self.mapper.obstacle_cells().clone();
         let Some(tsdf) = self.mapper.tsdf() else { return Ok(0.0) };
         let store = tsdf.store();
         let ((), seconds) = clock.time(|| match &mut self.esdf {
             Some(esdf) => {
-                esdf.update(store);
+                esdf.update_with(store, &cells);
             }
-            None => self.esdf = Some(Esdf::of(tsdf, &EsdfSettings::default())),
+            None => self.esdf = Some(Esdf::with_obstacles(tsdf, &cells, &EsdfSettings::default())),
         });
         self.measured = store.epoch();
         Ok(seconds)

@@ -37,7 +37,7 @@ pub(in crate::engine) enum Sensor {
 }
 
 impl Default for Settings {
-    /// Those of `map`: 5 cm, truncation three cells, W_max 64, with carving.
+    /// Those of `map`: 5 cm, truncation three cells, W_max 128, with carving.
     fn default() -> Self {
         let usual = MapperSettings::<3>::new(0.05);
         Self {
@@ -65,6 +65,7 @@ impl Settings {
             w_max: w_max as f32,
             carve: self.carve,
             occupancy: self.occupancy.then(OccupancyModel::default),
+            attenuation: None,
             color,
             ..MapperSettings::new(resolution)
         })

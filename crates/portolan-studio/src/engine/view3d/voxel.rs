@@ -36,7 +36,7 @@ pub(super) fn pick(
     }
     let direction = scale(direction, 1.0 / length);
     let settings = RayCastSettings {
-        min_weight: Some(maps.tsdf().thresholds().surface),
+        min_weight: Some(maps.tsdf().min_weight()),
         max_range: FARTHEST,
         // The eye is outside of the map: whatever lies between was not observed.
         unknown_tolerance: FARTHEST,

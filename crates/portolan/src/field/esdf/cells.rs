@@ -46,7 +46,7 @@ impl<const D: usize> Esdf<D> {
         self.epoch = store.epoch();
         self.hold(store, &stage);
         if self.settings().unknown {
-            self.solve_unknown(store, &self.keys());
+            self.solve_unknown(&self.keys());
         }
     }
 

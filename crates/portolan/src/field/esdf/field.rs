@@ -2,7 +2,9 @@
 
 use super::TOGETHER;
 use super::bricks::EsdfBrick;
+use super::cell_mask::CellMask;
 use super::measure::NodeDistances;
+use super::obstacles::ObstacleCells;
 use super::settings::{EsdfMethod, EsdfSettings, EsdfUpdate};
 use super::surface::SurfaceElements;
 use crate::cell::SignedDistance;
@@ -16,7 +18,7 @@ use std::sync::Arc;
 /// Signed Euclidean distances (meters) at the centers of the cells of a map in bricks, positive in free space, up to a
 /// largest distance.
 ///
-/// Every cell that the map observed is known or saturated; all others are unknown. Outside begins where no brick is
+/// Every cell that the map observed is known or saturated, and so is every obstacle; all others are unknown. Outside begins where no brick is
 /// near: a brick away from every brick of the map.
 ///
 /// A clone is a snapshot that shares all bricks which neither side has solved again since: readers keep one while
@@ -35,6 +37,9 @@ pub struct Esdf<const D: usize> {
     pub(super) bricks: Vec<EsdfBrick>,
     /// Of the accurate method.
     pub(super) surface: SurfaceElements<D>,
+    /// Cells of which a map says that something stops beams there, in bricks. Of the accurate method.
+    pub(super) candidates: Arc<FxHashMap<BlockKey<D>, CellMask>>,
+    pub(super) has_points: bool,
 }
 
 impl<const D: usize> Esdf<D> {
@@ -54,11 +59,29 @@ impl<const D: usize> Esdf<D> {
     /// # Panics
     /// Where `max_distance` is not positive.
     pub fn of(map: &impl DistanceMap<D>, settings: &EsdfSettings) -> Self {
+        Self::made(map, None, settings)
+    }
+
+    /// [`Esdf::of`], with what stops beams as obstacles beside the surface: cells of `cells` that no element of the surface
+    /// explains (none within 1.4 cells of their center in 2-D, a cell in 3-D) are obstacles at their center, also where the map of distances calls
+    /// them free or never observed them. By the accurate method alone; the others measure to their own cells.
+    ///
+    /// # Panics
+    /// Where `max_distance` is not positive.
+    pub fn with_obstacles(
+        map: &impl DistanceMap<D>,
+        cells: &ObstacleCells<D>,
+        settings: &EsdfSettings,
+    ) -> Self {
+        Self::made(map, Some(cells), settings)
+    }
+
+    fn made(map: &impl DistanceMap<D>, cells: Option<&ObstacleCells<D>>, settings: &EsdfSettings) -> Self {
         assert!(settings.max_distance > 0.0, "distances are maintained up to a positive length");
         let store = map.bricks();
         let lattice = *store.lattice();
         let reach = settings.reach_cells(lattice.resolution);
-        let min_weight = settings.min_weight.unwrap_or(map.thresholds().observed);
+        let min_weight = settings.min_weight.unwrap_or(map.min_weight());
         let mut field = Self {
             lattice,
             settings: EsdfSettings { min_weight: Some(min_weight), ..*settings },
@@ -68,8 +91,10 @@ impl<const D: usize> Esdf<D> {
             keys: Arc::default(),
             bricks: Vec::new(),
             surface: SurfaceElements::new(min_weight),
+            candidates: Arc::default(),
+            has_points: false,
         };
-        field.update(&store);
+        field.renew(&store, cells);
         field
     }
 
@@ -82,9 +107,21 @@ impl<const D: usize> Esdf<D> {
     /// # Panics
     /// Where the map has another lattice.
     pub fn update(&mut self, store: &Bricks<SignedDistance, D>) -> EsdfUpdate {
+        self.renew(store, None)
+    }
+
+    /// [`Esdf::update`], with what stops beams now: afterwards it is what [`Esdf::with_obstacles`] makes of both.
+    ///
+    /// # Panics
+    /// Where the map has another lattice.
+    pub fn update_with(&mut self, store: &Bricks<SignedDistance, D>, cells: &ObstacleCells<D>) -> EsdfUpdate {
+        self.renew(store, Some(cells))
+    }
+
+    fn renew(&mut self, store: &Bricks<SignedDistance, D>, cells: Option<&ObstacleCells<D>>) -> EsdfUpdate {
         assert_eq!(self.lattice, *store.lattice(), "the map that the field was made of");
         if self.settings.method == EsdfMethod::Accurate {
-            return self.follow(store);
+            return self.follow(store, cells);
         }
         let changed = store.changed_since(self.epoch).len();
         if changed > 0 {
@@ -135,6 +172,7 @@ impl<const D: usize> Esdf<D> {
             + self.keys.capacity() * size_of::<BlockKey<D>>()
             + self.slots.capacity() * 8 / 7 * bucket
             + self.surface.memory_bytes()
+            + self.candidates.capacity() * 8 / 7 * (size_of::<(BlockKey<D>, CellMask)>() + 1)
             + size_of::<Self>()
     }
 

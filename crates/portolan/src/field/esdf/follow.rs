@@ -2,8 +2,10 @@
 
 use super::TOGETHER;
 use super::bricks::{EsdfBrick, Nearest, Sides};
+use super::cell_mask::CellMask;
 use super::field::Esdf;
 use super::measure::NodeDistances;
+use super::obstacles::{ObstacleCells, with_neighbors};
 use super::settings::EsdfUpdate;
 use super::transform::{Feature, Input, Output, Witness, bounds, edge_distances, within};
 use crate::cell::SignedDistance;
@@ -18,11 +20,20 @@ const AROUND: f32 = 3.0;
 
 impl<const D: usize> Esdf<D> {
     /// Solves again what changed in the map and what is within reach of it.
-    pub(super) fn follow(&mut self, store: &Bricks<SignedDistance, D>) -> EsdfUpdate {
+    pub(super) fn follow(
+        &mut self,
+        store: &Bricks<SignedDistance, D>,
+        cells: Option<&ObstacleCells<D>>,
+    ) -> EsdfUpdate {
         let changed = store.changed_since(self.epoch);
         self.epoch = store.epoch();
         let first = self.keys.is_empty();
-        let (moved, uncovered) = self.look_at(store, &changed);
+        let renewed = cells.map_or_else(Vec::new, |cells| self.take_candidates(cells));
+        let mut looked_at = changed.clone();
+        looked_at.extend_from_slice(&renewed);
+        looked_at.sort_unstable();
+        looked_at.dedup();
+        let (moved, uncovered) = self.look_at(store, &looked_at);
         let touched = self.surface.update(store, &changed);
         let reach = self.limit().sqrt();
         let (dirty, stale) = if first {
@@ -37,8 +48,20 @@ impl<const D: usize> Esdf<D> {
             (self.held(dirty), self.held(stale))
         };
         self.solve(&dirty);
+        let pointed = {
+            let mut may_be = with_neighbors(&looked_at);
+            may_be.extend(with_neighbors(&touched));
+            may_be.extend(with_neighbors(&dirty));
+            let may_be = self.held(may_be);
+            let mut pointed = self.find_points(store, &may_be);
+            // What was a point may be in a brick that is gone.
+            pointed.extend_from_slice(&moved);
+            self.held(within(&pointed, (reach + 1.0).powi(2)))
+        };
+        self.solve_points(&pointed);
+        self.has_points = self.bricks.iter().any(|brick| brick.sides.points.any());
         // To be measured when it is read.
-        for key in &stale {
+        for key in stale.iter().chain(&pointed) {
             if let Some(slot) = self.slot(*key) {
                 self.bricks[slot].distance = Arc::default();
             }
@@ -46,7 +69,7 @@ impl<const D: usize> Esdf<D> {
         if self.settings().unknown {
             let around = within(&uncovered, (reach + 1.0).powi(2));
             let dirty = if first { self.keys() } else { self.held(around) };
-            self.solve_unknown(store, &dirty);
+            self.solve_unknown(&dirty);
         }
         EsdfUpdate { changed: changed.len(), touched: touched.len(), solved: dirty.len(), stale: stale.len() }
     }
@@ -60,12 +83,14 @@ impl<const D: usize> Esdf<D> {
     ) -> (Vec<BlockKey<D>>, Vec<BlockKey<D>>) {
         let min_weight = self.min_weight();
         let sides = parallel::map(changed, TOGETHER, |&key| {
-            store.brick(key).map_or(Sides::default(), |brick| Sides::of(brick, min_weight))
+            let sides = store.brick(key).map_or(Sides::default(), |brick| Sides::of(brick, min_weight));
+            // Points are looked for when the surface is there.
+            self.slot(key).map_or(sides, |slot| sides.with_points_of(&self.bricks[slot].sides))
         });
         let (mut moved, mut uncovered) = (Vec::new(), Vec::new());
         for (&key, sides) in changed.iter().zip(sides) {
             let slot = self.slot(key);
-            match (sides.any(), slot) {
+            match (sides.any() || self.candidates.contains_key(&key), slot) {
                 (true, None) => self.add(key, EsdfBrick::new(sides)),
                 (false, Some(slot)) => self.remove(key, slot),
                 (false, None) => continue,
@@ -84,6 +109,26 @@ impl<const D: usize> Esdf<D> {
             uncovered.push(key);
         }
         (moved, uncovered)
+    }
+
+    /// Takes over where something stops beams; returns the bricks in which that is not what it was, ascending.
+    fn take_candidates(&mut self, cells: &ObstacleCells<D>) -> Vec<BlockKey<D>> {
+        let mut keys = cells.keys();
+        keys.extend(self.candidates.keys());
+        keys.sort_unstable();
+        keys.dedup();
+        let before = |key: &BlockKey<D>| self.candidates.get(key).copied().unwrap_or_default();
+        keys.retain(|key| before(key) != cells.brick(key));
+        if !keys.is_empty() {
+            let candidates = Arc::make_mut(&mut self.candidates);
+            for key in &keys {
+                match cells.brick(key) {
+                    said if said.any() => drop(candidates.insert(*key, said)),
+                    CellMask { .. } => drop(candidates.remove(key)),
+                }
+            }
+        }
+        keys
     }
 
     /// The nearest crossings of all cells of bricks (ascending).
@@ -130,18 +175,21 @@ impl<const D: usize> Esdf<D> {
             };
             scratch.brick(&self.surface, key, &nearest.feature, beside, &mut plane);
         }
+        if let Some(points) = &brick.points {
+            plane.iter_mut().zip(&**points).for_each(|(value, sq)| *value = value.min(sq.sqrt()));
+        }
         let resolution = self.lattice.resolution as f32;
         for (i, value) in plane.iter_mut().enumerate() {
             let length = *value * resolution;
             let length = if length <= self.max_distance { length } else { f32::INFINITY };
             let signed = if brick.sides.inside(i) { -length } else { length };
-            *value = if brick.sides.observed(i) { signed } else { f32::NAN };
+            *value = if brick.sides.known(i) { signed } else { f32::NAN };
         }
         plane.into()
     }
 
     /// Squared cells up to which the transform is exact: what certifies the largest distance.
-    fn limit(&self) -> f32 {
+    pub(super) fn limit(&self) -> f32 {
         let reach = self.reach_cells();
         (reach * reach + 0.25 * D as f64) as f32
     }

@@ -1,9 +1,9 @@
 //! The accurate field against brute force, and kept up to date against made anew.
 
 use crate::answer::Answer;
-use crate::cell::{DistanceBrick, Planes, SignedDistance};
+use crate::cell::{Cell, DistanceBrick, LogOdds8, Planes, SignedDistance};
 use crate::field::esdf::transform::Feature;
-use crate::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings, EsdfUpdate};
+use crate::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings, EsdfUpdate, ObstacleCells};
 use crate::geom::{BlockKey, Grid, Lattice, block_cells, vector};
 use crate::map::DenseTsdf;
 use crate::store::{Bricks, Store};
@@ -65,8 +65,18 @@ fn apply<const D: usize>(store: &mut Bricks<SignedDistance, D>, &(key, seen, how
     store.insert(key, brick).unwrap();
 }
 
+/// What an occupancy map says of a brick: a few cells are occupied, others are not any more.
+fn say<const D: usize>(occupancy: &mut Bricks<LogOdds8, D>, &(key, _, how): &Change) {
+    let key = BlockKey(std::array::from_fn(|k| key[k]));
+    let mut brick = <LogOdds8 as Cell>::Brick::unobserved(block_cells::<D>());
+    for i in (0..block_cells::<D>()).filter(|&i| (i as u32).wrapping_mul(how | 1) >> 26 == 0) {
+        brick.set(i, Some(LogOdds8(if i % 5 == 0 { -20 } else { 20 })));
+    }
+    occupancy.insert(key, brick).unwrap();
+}
+
 /// All that a field holds of its bricks, ascending.
-fn held<const D: usize>(esdf: &Esdf<D>) -> Vec<(BlockKey<D>, [Vec<u32>; 4])> {
+fn held<const D: usize>(esdf: &Esdf<D>) -> Vec<(BlockKey<D>, [Vec<u32>; 5])> {
     let bits = |plane: &[f32]| plane.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     esdf.keys()
         .into_iter()
@@ -76,29 +86,35 @@ fn held<const D: usize>(esdf: &Esdf<D>) -> Vec<(BlockKey<D>, [Vec<u32>; 4])> {
             let power = nearest.map_or_else(Vec::new, |n| bits(&n.power));
             let feature = nearest.map_or_else(Vec::new, |n| n.feature.to_vec());
             let unknown = brick.unknown.as_deref().map_or_else(Vec::new, bits);
-            (key, [bits(esdf.brick(key).unwrap()), power, feature, unknown])
+            let points = brick.points.as_deref().map_or_else(Vec::new, bits);
+            (key, [bits(esdf.brick(key).unwrap()), power, feature, unknown, points])
         })
         .collect()
 }
 
 fn follows_the_map<const D: usize>(steps: &[Vec<Change>], settings: &EsdfSettings) {
     let mut store = Bricks::new(Lattice::new([500_000.0; D], R));
+    let mut occupancy = Bricks::new(*store.lattice());
+    let mut cells = ObstacleCells::default();
     let mut esdf = Esdf::of(&store, settings);
     let mut last = held(&Esdf::of(&store, settings));
     for step in steps {
         step.iter().for_each(|change| apply(&mut store, change));
+        step.iter().filter(|c| c.2 % 3 == 0).for_each(|change| say(&mut occupancy, change));
+        cells.follow_occupancy(&occupancy);
         let before = esdf.clone();
         // Measured before the map went on, or afterwards by the snapshot alone.
         let early = (step.len() % 2 == 0).then(|| held(&before));
-        esdf.update(&store);
-        let anew = Esdf::of(&store, settings);
+        esdf.update_with(&store, &cells);
+        let anew = Esdf::with_obstacles(&store, &ObstacleCells::of_occupancy(&occupancy), settings);
+        assert!(esdf.point_obstacles().eq(anew.point_obstacles()));
         if step.len() % 3 == 0 {
             esdf.measure();
         }
         assert_eq!(held(&esdf), held(&anew));
         assert_eq!(held(&before), early.unwrap_or_else(|| last.clone()), "a snapshot changed");
         last = held(&anew);
-        assert_eq!(esdf.update(&store), EsdfUpdate::default());
+        assert_eq!(esdf.update_with(&store, &cells), EsdfUpdate::default());
     }
 }
 
@@ -143,6 +159,7 @@ fn is_the_nearest_crossing<const D: usize>(steps: &[Vec<Change>], settings: &Esd
             })
         })
         .collect();
+    let points: Vec<[f64; D]> = esdf.point_obstacles().map(|(cell, _)| cell.map(f64::from)).collect();
     let mut observed = 0;
     for key in esdf.keys() {
         let brick = &esdf.bricks[esdf.slot(key).unwrap()];
@@ -162,6 +179,14 @@ fn is_the_nearest_crossing<const D: usize>(steps: &[Vec<Change>], settings: &Esd
                 (Answer::Unknown, None) => {}
                 (Answer::Known(d), Some(cell)) => {
                     assert!(d == 0.0 || (d < 0.0) == (cell.distance < 0.0));
+                    let to_point = to_points(q, &points);
+                    let found = f64::from(d.abs()) / R;
+                    if (found - to_point).abs() < 1e-5 {
+                        // As near as the nearest point, and no surface is nearer by more than is certified.
+                        assert!(to_point <= (got + 1e-5).sqrt() + 1e-5);
+                        continue;
+                    }
+                    assert!(found < to_point);
                     // The nearest surface is no further than a crossing, and what certifies it holds.
                     // Distances are f32: held against the bound as f32 has it.
                     assert!(d.abs() <= ((got + 1e-5).sqrt() * R) as f32);
@@ -169,6 +194,7 @@ fn is_the_nearest_crossing<const D: usize>(steps: &[Vec<Change>], settings: &Esd
                     assert!(d * d >= got - 0.25 * D as f64 - 1e-5 * (1.0 + got));
                 }
                 (Answer::Saturated(d), Some(_)) => {
+                    assert!(to_points(q, &points) * R >= settings.max_distance - 1e-6);
                     assert!((f64::from(d.abs()) - settings.max_distance).abs() < 1e-6);
                     assert!(want.sqrt() * R >= settings.max_distance - 1e-6);
                 }
@@ -178,6 +204,11 @@ fn is_the_nearest_crossing<const D: usize>(steps: &[Vec<Change>], settings: &Esd
     }
     let weights = store.bricks_by_age().flat_map(|(_, brick)| brick.weights());
     assert_eq!(observed, weights.filter(|w| **w >= 0.5).count());
+}
+
+/// Distance (cells) to the nearest of some points.
+fn to_points<const D: usize>(q: [f64; D], points: &[[f64; D]]) -> f64 {
+    points.iter().map(|p| vector::distance(q, *p)).fold(f64::INFINITY, f64::min)
 }
 
 proptest! {

@@ -5,9 +5,10 @@
 //! | 1 | `surface` | the segments or triangles of every cell, and where they cross the lattice's edges |
 //! | 2 | `transform` | for every cell the edge whose crossing is nearest (a feature) and how far it is (a power) |
 //! | 3 | `measure` | the distance to the segments or triangles around that crossing, when a brick is read |
-//! | 4 | `clearance` | at any point an interval that holds the distance |
-//! | | `follow` | steps 1 to 3 again where the map changed |
-//! | | `cells`, `unknown` | step 2 from cells instead of crossings: the textbook's seeds, a mask, unknown cells |
+//! | 4 | `obstacles` | cells that are obstacles without being surface, and how far the nearest is |
+//! | 5 | `clearance` | at any point an interval that holds the distance |
+//! | | `follow` | steps 1 to 4 again where the map changed |
+//! | | `cells`, `unknown`, `cell_distances` | step 2 from cells instead of crossings: the textbook's seeds, a mask; unknown cells, and obstacles without surface |
 //! | | `field`, `query`, `bricks`, `export` | what is held, and what is read of it |
 //!
 //! ```text
@@ -21,12 +22,15 @@
 //! ```
 
 mod bricks;
+mod cell_distances;
+mod cell_mask;
 mod cells;
 mod clearance;
 mod export;
 mod field;
 mod follow;
 mod measure;
+mod obstacles;
 mod query;
 mod settings;
 mod surface;
@@ -35,6 +39,7 @@ mod unknown;
 
 pub use clearance::SurfaceNoise;
 pub use field::Esdf;
+pub use obstacles::{ObstacleCells, PointKind};
 pub use settings::{EsdfMethod, EsdfSettings, EsdfUpdate};
 
 /// Bricks in one task of those that take microseconds each.

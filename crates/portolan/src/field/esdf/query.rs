@@ -3,6 +3,7 @@
 use super::field::Esdf;
 use super::measure::NodeDistances;
 use crate::answer::Answer;
+use crate::field::on_nodes::on_nodes;
 use crate::geom::{BLOCK_EDGE, BlockKey, interpolate, vector};
 
 impl<const D: usize> Esdf<D> {
@@ -35,10 +36,27 @@ impl<const D: usize> Esdf<D> {
     pub fn distance_and_gradient(&self, p_world: impl Into<[f64; D]>) -> Answer<(f64, [f64; D])> {
         let p = p_world.into();
         let Some((base, fraction)) = self.place(p) else { return Answer::Outside };
-        let Some((corners, saturated)) = self.corners(base) else { return self.nothing(p) };
+        let Some((corners, saturated)) = self.corners(base) else {
+            return self.on_nodes(p).map(|(value, slope)| (value, self.per_meter(slope)));
+        };
         let (value, slope) = interpolate(&corners, &std::array::from_fn(|k| 1 << k), 0, &fraction);
-        let answer = (value, vector::scale(slope, 1.0 / self.lattice.resolution));
+        let answer = (value, self.per_meter(slope));
         if saturated { Answer::Saturated(answer) } else { Answer::Known(answer) }
+    }
+
+    fn per_meter(&self, slope: [f64; D]) -> [f64; D] {
+        vector::scale(slope, 1.0 / self.lattice.resolution)
+    }
+
+    /// The answer where a center around the point is missing, in cells: known where that one does not count.
+    #[cold]
+    pub(in crate::field) fn on_nodes(&self, p: [f64; D]) -> Answer<(f64, [f64; D])> {
+        let place = self.lattice.to_cells(p).map(|c| c - 0.5);
+        let sample = |cell| {
+            let value = self.value(cell).filter(|v| !v.is_nan())?;
+            Some((f64::from(self.clamped(value)), value.is_infinite()))
+        };
+        on_nodes(place, sample).unwrap_or_else(|| self.nothing(p))
     }
 
     /// The lower one of the two centers beside a point, along every axis, and the point's place between them; `None` where

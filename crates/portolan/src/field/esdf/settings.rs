@@ -30,7 +30,7 @@ impl EsdfMethod {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EsdfSettings {
     /// Cells of smaller weight count as never observed. `None`: what fits the map
-    /// ([`Thresholds::observed`](crate::map::Thresholds::observed)), and any weight above 0 where cells alone are given.
+    /// ([`DistanceMap::min_weight`](crate::map::DistanceMap::min_weight)), and any weight above 0 where cells alone are given.
     pub min_weight: Option<f32>,
     /// Distances are maintained up to here (meters); beyond it answers are saturated. Positive.
     pub max_distance: f64,
@@ -50,7 +50,7 @@ impl Default for EsdfSettings {
 impl EsdfSettings {
     /// The default, with the weight that fits a map written out: for fields of its cells alone.
     pub fn of<const D: usize>(map: &impl DistanceMap<D>) -> Self {
-        Self { min_weight: Some(map.thresholds().observed), ..Self::default() }
+        Self { min_weight: Some(map.min_weight()), ..Self::default() }
     }
 
     /// Distances are maintained up to so many cells.

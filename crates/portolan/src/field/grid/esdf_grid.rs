@@ -2,6 +2,7 @@
 
 use super::squared_distance_transform;
 use crate::answer::{Answer, Status};
+use crate::field::on_nodes::on_nodes;
 use crate::geom::{Grid, interpolate, vector};
 
 /// Why distances are no field.
@@ -161,17 +162,29 @@ impl<const D: usize> EsdfGrid<D> {
 
     #[inline(always)]
     fn sample(&self, p: [f64; D]) -> Answer<(f64, [f64; D])> {
-        let Some((base, fraction)) = self.grid.interpolation(p) else { return self.nothing_at(p) };
+        let Some((base, fraction)) = self.grid.interpolation(p) else { return self.on_nodes(p) };
         let Some(at) = self.grid.index(base) else { return Answer::Outside };
         let (value, slope) = interpolate(&self.distances, &self.grid.strides(), at, &fraction);
         // One unknown corner makes the sum NaN.
         if value.is_nan() {
-            Answer::Unknown
+            self.on_nodes(p)
         } else if self.status.is_some() && self.saturated_beside(base) {
             Answer::Saturated((value, slope))
         } else {
             Answer::Known((value, slope))
         }
+    }
+
+    /// The answer where a center around the point is missing, in cells: known where that one does not count.
+    #[cold]
+    pub(in crate::field) fn on_nodes(&self, p: [f64; D]) -> Answer<(f64, [f64; D])> {
+        let place = self.grid.lattice.to_cells(p).map(|c| c - 0.5);
+        let sample = |cell| {
+            let i = self.grid.index(cell)?;
+            let value = self.distances[i];
+            (!value.is_nan()).then(|| (f64::from(value), self.status(i) == Status::Saturated))
+        };
+        on_nodes(place, sample).unwrap_or_else(|| self.nothing_at(p))
     }
 
     /// Whether one of the `2^D` cells from `base` on is saturated.

@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn unobserved_cells_make_their_neighbourhood_unknown() {
         let mut tsdf =
-            DenseTsdf::covering(&Grid::new([0.0; 2], 0.1, [20; 2]), TsdfConfig::default()).unwrap();
+            DenseTsdf::covering(&Grid::new([0.0; 2], 0.1, [20; 2]), TsdfConfig::textbook()).unwrap();
         for i in 0..400 {
             let cell = tsdf.grid().cell(i);
             if cell != [10, 10] {

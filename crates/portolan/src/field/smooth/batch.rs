@@ -50,6 +50,9 @@ trait Samples<const D: usize>: Sync {
 
     /// Why a point has no answer.
     fn nothing(&self, p_world: [f64; D]) -> Status;
+
+    /// The answer, in cells, where one of the centers has none.
+    fn on_nodes(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])>;
 }
 
 type Brick<'s, const D: usize> = Option<(BlockKey<D>, &'s [f32])>;
@@ -85,6 +88,10 @@ impl<const D: usize> Samples<D> for EsdfGrid<D> {
 
     fn nothing(&self, p_world: [f64; D]) -> Status {
         self.nothing_at::<()>(p_world).status()
+    }
+
+    fn on_nodes(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])> {
+        Self::on_nodes(self, p_world)
     }
 }
 
@@ -133,6 +140,10 @@ impl<const D: usize> Samples<D> for Esdf<D> {
 
     fn nothing(&self, p_world: [f64; D]) -> Status {
         Esdf::nothing::<()>(self, p_world).status()
+    }
+
+    fn on_nodes(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])> {
+        Esdf::on_nodes(self, p_world)
     }
 }
 
@@ -210,7 +221,8 @@ fn serial<S: Samples<D>, const D: usize>(
     for (points, ((distance, gradient), status)) in points.chunks(LANES).zip(slots) {
         let mut corners = [[f64::NAN; LANES]; 8];
         let mut fractions = [[0.0; LANES]; D];
-        for (lane, (&p, status)) in points.iter().zip(status).enumerate() {
+        let mut missing = false;
+        for (lane, (&p, status)) in points.iter().zip(&mut *status).enumerate() {
             let found = field.place(p).and_then(|(base, fraction)| {
                 for k in 0..D {
                     fractions[k][lane] = fraction[k];
@@ -218,7 +230,7 @@ fn serial<S: Samples<D>, const D: usize>(
                 field.corners(base, &mut last)
             });
             let Some((samples, saturated)) = found else {
-                *status = field.nothing(p);
+                missing = true;
                 continue;
             };
             *status = if saturated { Status::Saturated } else { Status::Known };
@@ -227,9 +239,21 @@ fn serial<S: Samples<D>, const D: usize>(
             }
         }
         let slopes = interpolate(&mut corners, &fractions);
-        for (lane, (distance, gradient)) in distance.iter_mut().zip(gradient).enumerate() {
+        for (lane, (distance, gradient)) in distance.iter_mut().zip(&mut *gradient).enumerate() {
             *distance = corners[0][lane];
             *gradient = vector::scale(std::array::from_fn(|k| slopes[k][lane]), inverse);
+        }
+        if missing {
+            let slots = distance.iter_mut().zip(gradient).zip(status);
+            for (&p, ((distance, gradient), status)) in
+                points.iter().zip(slots).filter(|(_, ((d, _), _))| d.is_nan())
+            {
+                let answer = field.on_nodes(p);
+                *status = answer.status();
+                if let Some((value, slope)) = answer.value() {
+                    (*distance, *gradient) = (value, vector::scale(slope, inverse));
+                }
+            }
         }
     }
 }

@@ -34,7 +34,7 @@ impl Default for MeshSettings {
 impl MeshSettings {
     /// The default, with the weight that fits a map written out: for meshes of its cells alone.
     pub fn of(map: &impl DistanceMap<3>) -> Self {
-        Self { min_weight: Some(map.thresholds().surface), ..Self::default() }
+        Self { min_weight: Some(map.min_weight()), ..Self::default() }
     }
 
     pub(super) fn attributes(&self, colors: bool) -> Attributes {
@@ -69,7 +69,7 @@ pub fn marching_cubes(
     colors: Option<&Bricks<Color, 3>>,
     settings: &MeshSettings,
 ) -> Mesh {
-    let min_weight = settings.min_weight.unwrap_or(map.thresholds().surface);
+    let min_weight = settings.min_weight.unwrap_or(map.min_weight());
     mesh_of(&map.bricks(), colors, settings, min_weight)
 }
 

@@ -4,6 +4,7 @@ use super::depth_bounds::DepthBounds;
 use super::lanes::LANES;
 use super::observe::{BlockCenters, ImageLookup, cell_of, nearest, observe_block, places};
 use super::padded_image::{Cleaning, PaddedImage};
+use super::project::LEAST_COSINE;
 use super::projector::Projector;
 use super::range_pyramid::RangePyramid;
 use super::search::{BlockBox, LONGEST_EDGE, Octants, find_blocks};
@@ -15,7 +16,7 @@ use crate::sweep::{PlanError, PlanLimits, Sweep, Swept, SweptColors, WeightModel
 /// How a range image becomes distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectiveSettings {
-    /// Truncation tau (meters): cells further behind a surface get nothing.
+    /// Truncation tau (meters): cells further behind a surface get nothing, measured across it (up to 66 degrees of incidence).
     pub truncation: f64,
     /// Weight of free space before the truncation, times that of its ray; 0: free space gets nothing.
     pub carve_weight: f32,
@@ -34,7 +35,11 @@ pub struct ProjectiveSettings {
 /// The center is projected into the image. If the four pixels around it are of one surface, the range there is
 /// interpolated between them: `1 / z` linearly, which is exact on a plane. (Along a steep surface linear depths would be
 /// off by centimeters.) Else the nearest pixel counts, with its surface no further aside than half a cell, so that nothing is
-/// drawn across gaps and thin things stay. Depths become distances along the ray, so that weights and truncation mean the
+/// drawn across gaps and thin things stay.
+///
+/// The truncation is measured across the surface that the four pixels show: cells around a surface that is met at a slant are further
+/// from it along the ray than across, and without them one view shows only what it meets head-on. Distances stay those
+/// along the ray, between minus and plus the truncation. Depths become distances along the ray, so that weights and truncation mean the
 /// same in the image's corners as in its middle.
 ///
 /// Blocks are found from the other side: boxes of blocks are projected, largest first, and compared with the
@@ -71,6 +76,11 @@ impl Projective {
         }
     }
 
+    /// The truncation along the ray, where the surface is met at the steepest incidence that counts.
+    fn longest(&self) -> f64 {
+        self.settings.truncation / f64::from(LEAST_COSINE)
+    }
+
     fn carves(&self) -> bool {
         self.settings.carve_weight > 0.0
     }
@@ -92,7 +102,7 @@ impl Projective {
             lattice: self.lattice,
             origin: self.origin,
             image_from_world: self.image_from_world,
-            truncation: self.settings.truncation,
+            truncation: self.longest(),
             carves: self.carves(),
         };
         let fits = find_blocks(&bounds, whole, most, &mut keys, &mut octants);
@@ -107,7 +117,7 @@ impl Projective {
         if farthest <= 0.0 {
             return None;
         }
-        let tau = self.settings.truncation;
+        let tau = self.longest();
         let (low, high) = projector.reach(farthest + tau, tau);
         let mut seen = Aabb::EMPTY;
         for corner in 0..8 {

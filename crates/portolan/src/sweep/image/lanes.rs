@@ -22,3 +22,11 @@ pub(super) struct Steps {
     pub below: Lanes,
     pub row: [u32; LANES],
 }
+
+/// The surface that 64 rays meet: what is linear on it ([`super::padded_image::PaddedImage::linear`]), and by how much that grows from
+/// one pixel to the next.
+pub(super) struct Gradients {
+    pub value: Lanes,
+    pub right: Lanes,
+    pub below: Lanes,
+}

@@ -19,6 +19,7 @@ mod bands;
 mod depth_bounds;
 mod distances;
 mod lanes;
+mod lengths;
 mod misses;
 mod observe;
 mod padded_image;
@@ -35,4 +36,5 @@ mod window;
 mod window_minima;
 
 pub use distances::{Projective, ProjectiveSettings};
+pub(super) use lengths::ProjectiveLengths;
 pub(super) use misses::ProjectiveMisses;

@@ -3,7 +3,7 @@
 //! Every loop runs over the 64 lanes of an octant without calls and without branches, so that it stands in the widest vectors that the
 //! processor has; no operation depends on the width, so that all versions give the same bits.
 
-use super::lanes::{LANES, Lanes, Projected, Steps};
+use super::lanes::{Gradients, LANES, Lanes, Projected, Steps};
 use super::padded_image::PaddedImage;
 use super::projector::Projector;
 use super::search::Octants;
@@ -117,6 +117,17 @@ pub(super) fn places(u: &Lanes, v: &Lanes, stride: usize) -> Places {
     at
 }
 
+/// What a surface weighs at most beyond the truncation along a ray, where it is met at a slant and is nearer than that across: more
+/// than the least weight that counts ([`least_weight`](crate::map::least_weight)), so that what was seen once is a surface, and
+/// less than where it is seen better.
+const SLANTED: f32 = 0.15;
+
+/// Weight of a surface at a distance (in truncations): it falls linearly to 0 behind it.
+#[inline(always)]
+fn taper(d: f32) -> f32 {
+    (1.0 + d).clamp(0.0, 1.0)
+}
+
 #[inline(always)]
 fn observe(view: &ImageLookup<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight: &mut Lanes) {
     let stride = view.image.stride;
@@ -138,22 +149,30 @@ fn observe(view: &ImageLookup<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight:
     let parallel = view.projector.is_parallel();
     let (tau, per_tau, carve) = (view.truncation, 1.0 / view.truncation, view.carve_weight);
     let mut torn = [0u32; LANES];
+    let mut surface = Gradients { value: [0.0; LANES], right: [0.0; LANES], below: [0.0; LANES] };
     for l in 0..LANES {
         torn[l] = corners[0][l].to_bits() >> 31;
         let [a, b, c, d] =
             [corners[0][l].abs(), corners[1][l].abs(), corners[2][l].abs(), corners[3][l].abs()];
         let (above, below) = (a + at.right[l] * (b - a), c + at.right[l] * (d - c));
-        let q = above + at.below[l] * (below - above);
+        surface.value[l] = above + at.below[l] * (below - above);
+        surface.right[l] = (b - a) + at.below[l] * ((d - c) - (b - a));
+        surface.below[l] = below - above;
+    }
+    let cosine = view.projector.cosines(&surface, &seen, &at.row);
+    for l in 0..LANES {
+        let q = surface.value[l];
         let range = if parallel { q } else { seen.scale[l] / q };
         let d = range - seen.length[l];
-        let free = d > tau;
-        let w = if free {
+        let across = d * cosine[l];
+        let head_on = if d > tau { 0.0 } else { taper(d * per_tau) };
+        let w = if across > tau {
             if seen.length[l] >= 0.0 { carve } else { 0.0 }
         } else {
-            (1.0 + d * per_tau).clamp(0.0, 1.0)
+            head_on.max(taper(across * per_tau).min(SLANTED))
         };
         let w = if view.inverse_square & !parallel { w / (range.max(1.0) * range.max(1.0)) } else { w };
-        distance[l] = d.min(tau);
+        distance[l] = d.max(-tau).min(tau);
         weight[l] = if q > 0.0 { w } else { 0.0 };
     }
     if torn.iter().fold(0, |any, t| any | t) != 0 {
@@ -222,7 +241,7 @@ fn alone(view: &ImageLookup<'_>, seen: &Projected, at: &Places) -> (Lanes, Lanes
         let range = value * seen.scale[l];
         let d = range - seen.length[l];
         let free = if seen.length[l] >= 0.0 { carve } else { 0.0 };
-        let surface = (1.0 + d / tau).clamp(0.0, 1.0);
+        let surface = taper(d / tau);
         let surface = if near & (own[l] > 0.0) { surface } else { 0.0 };
         let w = if d > tau { free } else { surface };
         let w = if squared { w / (range.max(1.0) * range.max(1.0)) } else { w };

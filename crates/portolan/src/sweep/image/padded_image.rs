@@ -3,7 +3,9 @@
 use super::bands::each_row;
 use super::projector::Projector;
 use crate::geom::vector::{cross3, dot, norm, sub};
-use crate::scan::{BeamCounts, MAX_OPENING, MAX_SLOPE, RangeImage, RefusedBeams};
+use crate::scan::{
+    BeamCounts, Bridge, Bridges, MAX_OPENING, MAX_SLOPE, Projection, RangeImage, RefusedBeams,
+};
 use crate::sweep::{ScanStats, WeightModel};
 use multiversion::multiversion;
 
@@ -30,6 +32,8 @@ pub(super) struct PaddedImage {
     pub linear: Vec<f32>,
     /// Cosine of the incidence at each pixel; empty where the weights do not ask for it.
     pub cosine: Vec<f32>,
+    /// Pixels without a reading that were given the value of a bridge, and the pixel whose color they have.
+    bridged: Vec<(usize, usize)>,
     /// Colors, without border; empty where the image has no colors.
     pub colors: Vec<[u8; 3]>,
 }
@@ -70,6 +74,7 @@ impl PaddedImage {
         self.colors.clear();
         if how.colors {
             self.colors.extend_from_slice(&image.colors);
+            self.color_bridges();
         }
         counted
     }
@@ -107,6 +112,8 @@ impl PaddedImage {
         };
         let (hits, free) =
             each_row(&mut self.linear[inside], stride, linear_row, |a, b| (a.0 + b.0, a.1 + b.1));
+        // Bridges are no readings: they are made after those were counted.
+        self.bridge(image, projector.is_closed());
         if projector.is_closed() {
             Self::repeat_seam(&mut self.value, stride);
             Self::repeat_seam(&mut self.linear, stride);
@@ -114,6 +121,30 @@ impl PaddedImage {
         let dropped = (w * self.rows) as u64 - u64::from(hits) - u64::from(free);
         let beams = BeamCounts { hit: hits.into(), max_range: free.into(), dropped, ..BeamCounts::default() };
         ScanStats { scans: 1, beams, refused, ..Default::default() }
+    }
+
+    /// Gives pixels of a lidar without a reading the range of a bridge, where there is one.
+    fn bridge(&mut self, image: &RangeImage, closed: bool) {
+        self.bridged.clear();
+        let Projection::Spherical(rays) = &image.projection else { return };
+        let bridges = Bridges::of(rays, closed);
+        let mut made = Vec::new();
+        for row in 0..self.rows {
+            let first = (row + 1) * self.stride + 1;
+            made.clear();
+            bridges.each(row, &self.value[first..][..self.columns], |bridge| made.push(bridge));
+            for Bridge { column, nearest, range } in &made {
+                self.value[first + column] = *range;
+                self.linear[first + column] = 1.0 / range;
+                self.bridged.push((row * self.columns + column, row * self.columns + nearest));
+            }
+        }
+    }
+
+    fn color_bridges(&mut self) {
+        if self.colors.len() == self.columns * self.rows {
+            self.bridged.iter().for_each(|&(to, from)| self.colors[to] = self.colors[from]);
+        }
     }
 
     /// Marks in the sign where four neighbors are not of one surface.

@@ -7,7 +7,7 @@ use super::search::{Class, Classify, Cube};
 use super::steps::{STEP_BITS, STEPS};
 use super::window_minima::{RangeTables, WindowMinima, WindowSizes};
 use crate::geom::{BLOCK_EDGE, Lattice, Pose};
-use crate::scan::RangeImage;
+use crate::scan::{Bridges, Projection, RangeImage};
 
 /// How far beyond a cell's center the beams must have seen, in cells. Half a cell is where a surface square to the beam
 /// would touch it.
@@ -65,8 +65,11 @@ impl PlacedImage {
         let corner = |i: usize| [0, 1, 2].map(|a| (i >> a & 1) as f64 - 0.5);
         // Readings that no cell can hold are not used.
         let farthest = (f64::from(1 << 29) * lattice.resolution) as f32;
-        let values: Vec<f32> =
+        let mut values: Vec<f32> =
             image.values.iter().map(|&v| if v.abs() <= farthest { v } else { 0.0 }).collect();
+        if let Projection::Spherical(rays) = &image.projection {
+            Bridges::of(rays, image.is_full_turn()).fill(&mut values, image.columns);
+        }
         let turn = projector.projector.columns_of_turn();
         tables.fill(&values, image.columns, turn, projector.rows_per_column());
         Self {

@@ -30,6 +30,17 @@ pub(crate) struct Tally {
     pub(crate) refused_hits: u64,
 }
 
+impl Tally {
+    /// Of the rays of both.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            hits_outside: self.hits_outside + other.hits_outside,
+            refused: self.refused + other.refused,
+            refused_hits: self.refused_hits + other.refused_hits,
+        }
+    }
+}
+
 /// Walks every beam through the cells (Amanatides & Woo 1987): each cell that beams pass gets one miss a scan, each in
 /// which one ends one hit, and a hit overrules misses (Hornung et al. 2013, as in OctoMap's `computeUpdate`). The cell in
 /// which a beam without a surface ends gets nothing. Rays are shared out to threads with bits of their own, which are
@@ -97,11 +108,7 @@ impl ExactRays {
             return Err(PlanError::TooManyBlocks);
         }
         (self.keys, self.slots) = whole[0].sorted().into_iter().unzip();
-        Ok(tallies.iter().fold(Tally::default(), |a, b| Tally {
-            hits_outside: a.hits_outside + b.hits_outside,
-            refused: a.refused + b.refused,
-            refused_hits: a.refused_hits + b.refused_hits,
-        }))
+        Ok(tallies.into_iter().fold(Tally::default(), Tally::and))
     }
 
     /// The bricks that were touched, ascending.

@@ -5,7 +5,9 @@ use super::masks::Bits;
 use crate::cell::HitMiss;
 use crate::geom::{BlockKey, Lattice, Pose};
 use crate::parallel;
-use crate::scan::{BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{
+    BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays,
+};
 use crate::sweep::image::ProjectiveMisses;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept};
 use std::borrow::Cow;
@@ -163,7 +165,8 @@ impl Sweep<3> for HitMissSweep<RangeImage> {
         let view = (!passes).then_some(View { world_from_image: world_from_sensor, image });
         let rays = Rays { hits, count: all.len(), ray: |i| all[i], view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
-        Ok(ScanStats { refused: stats.refused + image.refused, ..stats })
+        let way = if passes { Way::Rays(WhyRays::Asked) } else { Way::Stated };
+        Ok(ScanStats { refused: stats.refused + image.refused, ..stats }.by(way))
     }
 }
 
@@ -179,9 +182,11 @@ impl Sweep<3> for HitMissSweep<PointScan> {
     ) -> Result<ScanStats, PlanError> {
         let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
-        let (common, image) = match &scan.origin {
-            Origin::Common(o) => (world_from_sensor.transform_point(*o), self.organised(scan, *o)?),
-            Origin::PerPoint(_) => (world_from_sensor.translation, None),
+        let (common, (way, image)) = match &scan.origin {
+            Origin::Common(o) => {
+                (world_from_sensor.transform_point(*o), self.organised(scan, *o, lattice.resolution)?)
+            }
+            Origin::PerPoint(_) => (world_from_sensor.translation, (Way::Rays(WhyRays::OwnOrigins), None)),
         };
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
         let view = image.as_deref().map(|image| View { world_from_image: &world_from_image, image });
@@ -200,7 +205,7 @@ impl Sweep<3> for HitMissSweep<PointScan> {
         };
         let rays = Rays { hits, count: hits + scan.free_ends.len(), ray, view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
-        Ok(ScanStats { refused: stats.refused + scan.refused, ..stats })
+        Ok(ScanStats { refused: stats.refused + scan.refused, ..stats }.by(way))
     }
 }
 
@@ -223,20 +228,24 @@ impl Sweep<3> for HitMissSweep<[[f64; 3]]> {
 }
 
 impl HitMissSweep<PointScan> {
-    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them.
+    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them, and which way it is.
     fn organised<'a>(
         &mut self,
         scan: &'a PointScan,
         origin: [f64; 3],
-    ) -> Result<Option<Cow<'a, RangeImage>>, PlanError> {
+        cell: f64,
+    ) -> Result<(Way, Option<Cow<'a, RangeImage>>), PlanError> {
         if self.sweep == OccupancySweep::Exact {
-            return Ok(None);
+            return Ok((Way::Rays(WhyRays::Asked), None));
         }
         if let Some(image) = &scan.image {
             image.check().map_err(PlanError::BadImage)?;
-            return Ok(Some(Cow::Borrowed(image)));
+            return Ok((Way::Stated, Some(Cow::Borrowed(image))));
         }
-        Ok(self.layout.image(&scan.points, origin).map(Cow::Owned))
+        Ok(match self.layout.image(&scan.points, origin, cell) {
+            Ok(image) => (Way::Found, Some(Cow::Owned(image))),
+            Err(why) => (Way::Rays(why), None),
+        })
     }
 }
 
@@ -278,7 +287,8 @@ fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Optio
     Some(Ray { origin: o.map(|v| v - r), end: o.map(|v| v + r), hit: false, passes: false })
 }
 
-fn stats(hits: usize, count: usize, tally: Tally) -> ScanStats {
+/// What became of `count` rays, of which the first so many were to hit.
+pub(in crate::sweep) fn stats(hits: usize, count: usize, tally: Tally) -> ScanStats {
     let dropped = tally.refused.total();
     let hit = (hits as u64).saturating_sub(tally.refused_hits);
     let max_range = (count as u64).saturating_sub(hit + dropped);

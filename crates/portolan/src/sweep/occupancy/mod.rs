@@ -10,3 +10,6 @@ mod masks;
 mod trace;
 
 pub use hit_miss_sweep::{HitMissSweep, OccupancySweep};
+
+pub(super) use exact::Tally;
+pub(super) use hit_miss_sweep::stats;

@@ -1,5 +1,6 @@
 //! What a field knows around a point.
 
+use super::interval::Interval;
 use crate::answer::Answer;
 use crate::field::Esdf;
 use crate::field::esdf::bricks::EsdfBrick;
@@ -71,6 +72,11 @@ impl<const D: usize> QueryPoint<D> {
         self.base[k] + (self.t[k] + off).floor() as i32
     }
 
+    /// Whether bounds (cells) say on which side of `enough` a distance is: what rounding may have done is taken off afterwards.
+    pub(super) fn decides(&self, interval: Interval, enough: f64) -> bool {
+        interval.lower - self.margin >= enough || interval.upper + self.margin < enough
+    }
+
     /// The point in cells from a cell's center.
     pub(super) fn relative(&self, cell: [i32; D]) -> [f64; D] {
         std::array::from_fn(|k| self.t[k] + f64::from(self.base[k] - cell[k]))
@@ -124,11 +130,21 @@ impl<'f, const D: usize> NodesAround<'f, D> {
         }
     }
 
+    /// The squared distance (cells) of node `i` to the nearest point obstacle, infinite beyond the largest distance; `None`:
+    /// there is no brick.
+    pub(super) fn points_at(&self, i: usize) -> Option<f32> {
+        let points = &self.bricks[i]?.points;
+        Some(points.as_ref().map_or(f32::INFINITY, |plane| plane[self.places[i]]))
+    }
+
     /// A lower bound of it.
+    pub(super) fn points_sq(&self, field: &Esdf<D>, i: usize) -> Option<f64> {
+        Some(certified_sq(field, self.points_at(i)?))
+    }
+
+    /// A lower bound of [`NodesAround::unknown_at`].
     pub(super) fn unknown_sq(&self, field: &Esdf<D>, i: usize) -> Option<f64> {
-        let reach = field.reach_cells();
-        let sq = f64::from(self.unknown_at(i)?).min(reach * reach);
-        Some((sq * (1.0 - 1e-6) - 1e-6).max(0.0))
+        Some(certified_sq(field, self.unknown_at(i)?))
     }
 
     /// Signed distance (meters) between the nodes that know one: of the side where the point lies.
@@ -141,11 +157,17 @@ impl<'f, const D: usize> NodesAround<'f, D> {
     }
 }
 
+/// What a squared distance (cells) to cells is at least: sums in f32, and nothing is known beyond the largest distance.
+fn certified_sq<const D: usize>(field: &Esdf<D>, sq: f32) -> f64 {
+    let reach = field.reach_cells();
+    (f64::from(sq).min(reach * reach) * (1.0 - 1e-6) - 1e-6).max(0.0)
+}
+
 impl<const D: usize> Esdf<D> {
-    /// Whether a cell was observed.
+    /// Whether something is known of a cell: it was observed, or is an obstacle.
     pub(super) fn observes(&self, cell: [i32; D]) -> bool {
         let brick = self.slot(BlockKey::of_cell(cell)).map(|slot| &self.bricks[slot]);
-        brick.is_some_and(|brick| brick.sides.observed(BlockKey::offset(cell)))
+        brick.is_some_and(|brick| brick.sides.known(BlockKey::offset(cell)))
     }
 
     /// The answer about a cell that was not observed.
@@ -200,15 +222,15 @@ impl<const D: usize> Esdf<D> {
         best.sqrt()
     }
 
-    /// Distance (cells) to the nearest unknown one, as a box, of the `3^D` cells around that of the point.
-    pub(super) fn to_unknown_cells_around(&self, point: &QueryPoint<D>) -> f64 {
+    /// Distance (cells) to the nearest one, as a box, that `is` accepts of the `3^D` cells around that of the point.
+    pub(super) fn to_cells_around(&self, point: &QueryPoint<D>, is: impl Fn([i32; D]) -> bool) -> f64 {
         let mut best = f64::INFINITY;
         for n in 0..3usize.pow(D as u32) {
             let cell: [i32; D] =
                 std::array::from_fn(|k| point.holder[k] + (n / 3usize.pow(k as u32) % 3) as i32 - 1);
             let off = point.relative(cell).map(|v| (v.abs() - 0.5).max(0.0));
             let sq = off.iter().map(|v| v * v).sum();
-            if sq < best && !self.observes(cell) {
+            if sq < best && is(cell) {
                 best = sq;
             }
         }

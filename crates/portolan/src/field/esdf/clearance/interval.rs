@@ -5,8 +5,8 @@ use super::search::FURTHEST;
 use crate::answer::Answer;
 use crate::field::{Clearance, ClearanceField, Esdf, UnknownSpace};
 
-/// Bounds that are further apart (cells) are tightened by looking at the elements between them.
-const APART: f64 = 1.0 / 32.0;
+/// Bounds that are further apart (cells) are tightened by looking at what lies between them.
+pub(super) const APART: f64 = 1.0 / 32.0;
 
 /// An interval in cells.
 #[derive(Clone, Copy, Debug)]
@@ -23,10 +23,11 @@ impl Interval {
 
 /// Of fields made by [`EsdfMethod::Accurate`](crate::field::EsdfMethod::Accurate); others certify nothing and answer that they do not know.
 ///
-/// The distance meant is that to the segments or triangles that [`crate::surface::marching_squares`] and
-/// [`crate::surface::marching_cubes`] extract with the same `min_weight`, as they are: not to the true surface, from
-/// which noise, truncation and the lattice keep them away. Rounding is paid for: that of the field, of world coordinates,
-/// and of the vertices of a [`crate::surface::Mesh`].
+/// The distance meant is that to the nearest obstacle: to the segments or triangles that
+/// [`crate::surface::marching_squares`] and [`crate::surface::marching_cubes`] extract with the same `min_weight`, as they
+/// are, and to [`Esdf::point_obstacles`]. Not to the true surface, from which
+/// noise, truncation and the lattice keep them away. Rounding is paid for: that of the field, of world coordinates, and of
+/// the vertices of a [`crate::surface::Mesh`].
 ///
 /// Lower bounds come from the transform: a node's least `|q - w|^2 + h_w` over all crossings is at most its squared
 /// distance plus `D / 4`, whatever the surface does between crossings. Between nodes squared distance less `|x|^2` is
@@ -67,10 +68,13 @@ impl<const D: usize> Esdf<D> {
         let Some((mut interval, signed)) = self.to_surface(&point, &mut nodes, enough) else {
             return self.unobserved_at(point.holder);
         };
+        interval = interval.nearer(self.to_points(&point, &nodes, interval.upper, enough));
+        let in_loose =
+            self.sides_at(point.holder).is_some_and(|(sides, i)| sides.points.has(i) && sides.inside(i));
         if unknown == UnknownSpace::Pessimistic {
             interval = interval.nearer(self.to_unknown(&point, &nodes));
         }
-        self.answer(&point, interval, signed < 0.0)
+        self.answer(&point, interval, in_loose || signed < 0.0)
     }
 
     /// How far the nearest cell is that was not observed, at least and at most (meters); cells of bricks that were never
@@ -118,9 +122,7 @@ impl<const D: usize> Esdf<D> {
         if interval.upper > interval.lower {
             interval.upper = interval.upper.min(self.to_elements_found(point, nodes));
             let apart = interval.upper - interval.lower;
-            // What rounding may have done is taken off afterwards.
-            let decided = enough
-                .is_some_and(|e| interval.lower - point.margin >= e || interval.upper + point.margin < e);
+            let decided = enough.is_some_and(|e| point.decides(interval, e));
             if apart > APART && interval.upper <= FURTHEST && !decided {
                 interval.upper = self.search_elements(point, interval.upper);
                 interval.lower = interval.upper;
@@ -142,7 +144,7 @@ impl<const D: usize> Esdf<D> {
             }
         }
         if interval.lower < 1.0 {
-            let found = self.to_unknown_cells_around(point);
+            let found = self.to_cells_around(point, |cell| !self.observes(cell));
             if found <= 1.0 {
                 return Interval { lower: found, upper: found };
             }

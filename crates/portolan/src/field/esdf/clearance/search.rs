@@ -8,27 +8,34 @@ use crate::geom::{BLOCK_EDGE, BlockKey};
 /// Further away (cells) bounds are not tightened: they are as tight there, and a ball holds too many bricks.
 pub(super) const FURTHEST: f64 = 24.0;
 
-impl<const D: usize> Esdf<D> {
-    /// Distance (cells) to the nearest element, given one that is `upper` away. Looks into every brick that the ball of
-    /// that radius meets; what is in it beside the nearest element is little.
-    pub(super) fn search_elements(&self, point: &QueryPoint<D>, upper: f64) -> f64 {
-        let mut best = upper * upper;
-        let from: [i32; D] = std::array::from_fn(|k| (point.floor(k, -upper) - BLOCK_EDGE as i32) >> 3);
-        let to: [i32; D] = std::array::from_fn(|k| point.floor(k, upper) >> 3);
+impl<const D: usize> QueryPoint<D> {
+    /// Visits the bricks whose cells, or the nodes above them, are within `reach` (cells) along every axis, x fastest.
+    pub(super) fn bricks_within(&self, reach: f64, mut visit: impl FnMut(BlockKey<D>)) {
+        let from: [i32; D] = std::array::from_fn(|k| (self.floor(k, -reach) - BLOCK_EDGE as i32) >> 3);
+        let to: [i32; D] = std::array::from_fn(|k| (self.floor(k, reach) + 1) >> 3);
         let mut key = BlockKey(from);
         loop {
-            self.search_brick(point, key, &mut best);
-            // The next key, x fastest.
+            visit(key);
             let mut k = 0;
             while key.0[k] == to[k] {
                 key.0[k] = from[k];
                 k += 1;
                 if k == D {
-                    return best.sqrt();
+                    return;
                 }
             }
             key.0[k] += 1;
         }
+    }
+}
+
+impl<const D: usize> Esdf<D> {
+    /// Distance (cells) to the nearest element, given one that is `upper` away. Looks into every brick that the ball of
+    /// that radius meets; what is in it beside the nearest element is little.
+    pub(super) fn search_elements(&self, point: &QueryPoint<D>, upper: f64) -> f64 {
+        let mut best = upper * upper;
+        point.bricks_within(upper, |key| self.search_brick(point, key, &mut best));
+        best.sqrt()
     }
 
     #[inline]
@@ -78,6 +85,6 @@ fn interval_distance_sq(v: f64, edge: f64) -> f64 {
 
 /// Squared distance from `p` to the box from zero to `edge` along each axis.
 #[inline(always)]
-fn box_distance_sq<const D: usize>(p: [f64; D], edge: f64) -> f64 {
+pub(super) fn box_distance_sq<const D: usize>(p: [f64; D], edge: f64) -> f64 {
     p.iter().map(|&v| interval_distance_sq(v, edge)).sum()
 }

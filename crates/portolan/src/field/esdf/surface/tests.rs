@@ -83,7 +83,7 @@ fn contour(seed: u64, noise: Noise) {
     let mut random = Random(seed);
     let mut store = Bricks::<SignedDistance, 2>::new(Lattice::new([-16.0; 2], 1.0));
     let grid = Grid::new([-16.0; 2], 1.0, [32; 2]);
-    let config = TsdfConfig { truncation: 1e3, ..TsdfConfig::default() };
+    let config = TsdfConfig { truncation: 1e3, ..TsdfConfig::textbook() };
     let mut tsdf = DenseTsdf::covering(&grid, config).unwrap();
     for key in (0..16).map(|n| BlockKey([n % 4, n / 4])) {
         let brick = noise_brick::<2>(&mut random, noise);

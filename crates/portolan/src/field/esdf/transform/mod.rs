@@ -43,7 +43,7 @@ pub(super) use edges::edge_distances;
 pub(crate) use feature::Feature;
 pub(super) use layout::layout;
 pub(super) use outputs::{Output, within};
-pub(super) use search::{FromBoxes, Source};
+pub(super) use search::{FromBoxes, FromCenters, RowSearch, Source};
 pub(super) use seeds::SeedMap;
 pub(super) use squared::squared_distances;
 pub(super) use stage::{Input, Stage};

@@ -57,6 +57,8 @@ pub(crate) trait RowSearch: Copy + Sync {
     const FEATURES: bool;
     /// The sample of cells that no brick holds.
     const BLANK: f32;
+    /// Whether bricks without a seed differ from such cells.
+    const EMPTY_BRICKS: bool = false;
     /// Bricks of such cells on either side of what is there.
     const MARGIN: i32;
 
@@ -101,6 +103,7 @@ impl RowSearch for FromFeatures {
 impl RowSearch for FromBoxes {
     const FEATURES: bool = false;
     const BLANK: f32 = 0.0;
+    const EMPTY_BRICKS: bool = true;
     const MARGIN: i32 = 1;
 
     fn least(self, rows: Panels<'_>, first: usize, reach: usize, found: &mut Found) {
