@@ -78,10 +78,10 @@ export function probePanel() {
         cells[which][0].dataset.status = answer[which].status;
       }
       put(row, answer.row);
-      const or = unknown === "pessimistic" ? " or unknown cell" : "";
+      const counts = unknown === "pessimistic" ? "and no unknown cell " : "";
       put(
         note,
-        `At least and at most are certified, to the nearest surface${or}; the distance is interpolated.`,
+        `Certified: the surface is no farther than at most; no surface ${counts}is nearer than at least.`,
       );
       put(command, `--unknown ${unknown}`);
     },
