@@ -63,7 +63,7 @@ impl<const D: usize> Esdf<D> {
     }
 
     /// [`Esdf::of`], with what stops beams as obstacles beside the surface: cells of `cells` that no element of the surface
-    /// explains (none within 1.4 cells of their center in 2-D, a cell in 3-D) are obstacles at their center, also where the map of distances calls
+    /// explains (none within 1.4 cells of their center in 2-D, 0.8 in 3-D) are obstacles at their center, also where the map of distances calls
     /// them free or never observed them. By the accurate method alone; the others measure to their own cells.
     ///
     /// # Panics

@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// (of Freiburg 079 at 5 cm 3.0 % of free points are within 10 cm of an obstacle with 1.25, 2.8 with 1.5), with more, what
 /// stands before a wall is lost (2.8 and 3.0 % of confirmed returns). In 3-D a hit is farther from the center of its cell.
 const fn explained<const D: usize>() -> f64 {
-    if D == 2 { 1.4 } else { 1.0 }
+    if D == 2 { 1.4 } else { 0.8 }
 }
 
 /// A cell inside of the surface is within its own estimate of it, and this many cells: half a diagonal of a 3-D cell, and
@@ -25,7 +25,7 @@ const BEYOND_ESTIMATE: f32 = 1.75;
 /// Why the center of a cell is an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointKind {
-    /// Something stops beams there, and no surface is within 1.4 cells (2-D) or a cell (3-D).
+    /// Something stops beams there, and no surface is within 1.4 cells (2-D) or 0.8 cells (3-D).
     Thin,
     /// It is inside of the surface by its own estimate, and there is no surface that it is behind of.
     Loose,

@@ -4,7 +4,7 @@
 //! in means, and a lone cell between unobserved ones has no surface to be part of. Both were measured, and are obstacles:
 //!
 //! - **thin cells**: what says that something stops beams there ([`ObstacleCells`]), in cells with no
-//!   element of the surface within 1.4 cells (2-D) or a cell (3-D);
+//!   element of the surface within 1.4 cells (2-D) or 0.8 cells (3-D);
 //! - **loose cells**: inside of the surface by their own estimate, but beside a free cell with no surface between the two,
 //!   or farther from any surface than their estimate has it and not of a solid that reaches up to one.
 //!
