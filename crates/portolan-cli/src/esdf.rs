@@ -9,6 +9,7 @@ use portolan::store::{Bricks, Dense, Store};
 use portolan_io::{MapCell, MapFile, TsdfBricks};
 use serde::{Deserialize, Serialize};
 
+use crate::error::bad_call;
 use crate::mapping::Settings;
 
 /// What distances are measured to.
@@ -62,6 +63,26 @@ impl FieldHow {
             ..EsdfSettings::default()
         }
     }
+}
+
+/// Whether some map of a file beside its signed distances says what stops beams.
+pub(crate) fn keeps_thin<const D: usize>(file: &MapFile<D>) -> bool {
+    let occupancy = file.grid.is_some() || file.tree.is_some() || file.occupancy_bricks.is_some();
+    occupancy || file.attenuation.is_some()
+}
+
+/// What is to be said of the distances of a map without such maps.
+pub(crate) const SURFACE_ALONE: &str = "distances are those to surfaces alone, which lose what is thinner than a cell or two: the map \
+     holds neither occupancy nor attenuation, which keep it";
+
+/// Refuses a share for thin obstacles where the method has none.
+pub(crate) fn check_thin(given: bool, method: EsdfArg) -> anyhow::Result<()> {
+    if given && method != EsdfArg::Accurate {
+        return Err(bad_call(
+            "--thin is only for --esdf accurate: the other methods measure to their own cells",
+        ));
+    }
+    Ok(())
 }
 
 /// The field of a 2-D map, as far as the method reaches (509 cells where it is accurate), around the surface and what the

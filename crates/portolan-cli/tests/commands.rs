@@ -475,3 +475,29 @@ fn maps_of_a_kind_that_no_command_reads_are_refused() {
         }
     }
 }
+
+#[test]
+fn distances_say_when_nothing_keeps_thin_things() {
+    let (folder, log) = room();
+    let (out, points) = (folder.path().join("out"), folder.path().join("points.csv"));
+    std::fs::write(&points, "0.5,2.0\n").unwrap();
+    let warned = |options: &[&str]| {
+        map(&log, &out, options);
+        let text = std::fs::read_to_string(out.join("summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let warnings = summary["warnings"].to_string();
+        let query = support::portolan(["query", arg(&out), "--points", arg(&points)]);
+        let err = String::from_utf8_lossy(&query.stderr).into_owned();
+        assert_eq!(warnings.contains("surfaces alone"), err.contains("surfaces alone"), "{warnings} {err}");
+        (warnings.contains("surfaces alone"), summary["obstacles"].clone())
+    };
+    assert!(!warned(&[]).0);
+    assert!(warned(&["--maps", "esdf"]).0);
+    assert!(!warned(&["--maps", "esdf,attenuation"]).0);
+    assert!(warned(&["--esdf", "mask"]).1.is_null());
+    let thin =
+        ["map", arg(&log), "--resolution", "0.05", "--out", arg(&out), "--esdf", "mask", "--thin", "0.2"];
+    assert!(fail(2, thin).contains("--thin is only for --esdf accurate"));
+    let thin = ["query", arg(&out), "--points", arg(&points), "--esdf", "seeded", "--thin", "0.2"];
+    assert!(fail(2, thin).contains("--thin is only for --esdf accurate"));
+}

@@ -4,23 +4,10 @@
 
 mod support;
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
-use support::{arg, json};
-
-/// The data set; `None` where the data are not there, said past the test harness's capture.
-fn data(name: &str) -> Option<PathBuf> {
-    let beside = || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
-    let path = std::env::var_os("PORTOLAN_DATA").map_or_else(beside, PathBuf::from).join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    let note = format!("SKIPPED: {} is not there; set PORTOLAN_DATA\n", path.display());
-    std::io::stderr().write_all(note.as_bytes()).unwrap();
-    None
-}
+use support::{arg, json, real_data};
 
 fn map(log: &Path, out: &Path, more: &[&str]) -> Value {
     json(["map", arg(log), "--out", arg(out), "--json"].into_iter().chain(more.iter().copied()))
@@ -32,7 +19,7 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn the_bunny_is_a_quarter_of_a_millimetre_from_the_zippered_mesh() {
-    let Some(bunny) = data("rangescan_stanford_bunny") else { return };
+    let Some(bunny) = real_data("rangescan_stanford_bunny") else { return };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let made = map(&bunny.join("data"), &out, &["--resolution", "0.0005", "--maps", "mesh"]);
@@ -47,7 +34,7 @@ fn the_bunny_is_a_quarter_of_a_millimetre_from_the_zippered_mesh() {
 
 #[test]
 fn the_kitchen_predicts_the_frames_that_were_left_out() {
-    let Some(kitchen) = data("rgbd_redkitchen") else { return };
+    let Some(kitchen) = real_data("rgbd_redkitchen") else { return };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let how = ["--resolution", "0.02", "--every", "4", "--hold-out", "5", "--maps", "tree,mesh"];
@@ -65,7 +52,7 @@ fn the_kitchen_predicts_the_frames_that_were_left_out() {
 
 #[test]
 fn the_hall_predicts_the_scans_that_were_left_out() {
-    let Some(hall) = data("lidar3d_balm_hall") else { return };
+    let Some(hall) = real_data("lidar3d_balm_hall") else { return };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let how = ["--resolution", "0.1", "--every", "4", "--hold-out", "4", "--max-range", "60"];

@@ -6,25 +6,7 @@
 
 mod support;
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
-
-use support::{arg, json, map};
-
-/// A log of the real data, or `None` with a loud line where it is not there.
-fn real_log(name: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("PORTOLAN_DATA").map_or_else(beside, PathBuf::from);
-    let path = folder.join("lidar2d_carmen").join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    // Not `eprintln!`, which the test harness swallows: a skipped test must be seen.
-    let mut err = std::io::stderr();
-    writeln!(err, "SKIPPED: {} is not there (set PORTOLAN_DATA to the folder of real data)", path.display())
-        .unwrap();
-    None
-}
+use support::{arg, json, map, real_data};
 
 /// What a map must reach.
 struct Limits {
@@ -48,7 +30,7 @@ const INTEL: Limits = Limits { median: 0.03, within_two_cells: 0.85, doubled: 0.
 const FREIBURG: Limits = Limits { median: 0.036, within_two_cells: 0.74, doubled: 0.03 };
 
 fn predicts_the_tenth_scan(name: &str, limits: &Limits) {
-    let Some(log) = real_log(name) else { return };
+    let Some(log) = real_data(&format!("lidar2d_carmen/{name}")) else { return };
     let folder = tempfile::tempdir().unwrap();
     map(&log, folder.path(), &["--hold-out", "10"]);
     let score = json(["eval", arg(folder.path()), "--scans", arg(&log), "--json"]);
@@ -77,7 +59,7 @@ fn every_log_is_read_whole() {
         ("freiburg-079-corrected.log.gz", 4791, 360, true),
         ("intel.clf.bz2", 13_631, 180, true),
     ] {
-        let Some(log) = real_log(name) else { continue };
+        let Some(log) = real_data(&format!("lidar2d_carmen/{name}")) else { continue };
         let about = json(["info", arg(&log), "--json"]);
         assert_eq!(about["scans"], scans, "{name}");
         assert_eq!(about["beams_per_scan"], serde_json::json!([beams, beams]), "{name}");

@@ -7,29 +7,16 @@ mod support;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use portolan::geom::vector::{distance, point_segment};
 use portolan::surface::{Mesh, NearestSurface};
 use portolan_io::read_ply_mesh;
 
-use support::{arg, map, succeed};
+use support::{arg, map, real_data, succeed};
 
 const POINTS: usize = 100_000;
-
-fn data(name: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let path = std::env::var_os("PORTOLAN_DATA").map_or_else(beside, PathBuf::from).join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    // Not `eprintln!`, which the test harness swallows: a skipped test must be seen.
-    let mut err = std::io::stderr();
-    writeln!(err, "SKIPPED: {} is not there (set PORTOLAN_DATA to the folder of real data)", path.display())
-        .unwrap();
-    None
-}
 
 /// Numbers that look random, the same in every run.
 struct Random(u64);
@@ -111,7 +98,7 @@ fn holds<const D: usize>(folder: &Path, points: &[[f64; D]], exact: impl Fn([f64
 }
 
 fn in_2d(log: &str, options: &[&str]) {
-    let Some(log) = data(log) else { return };
+    let Some(log) = real_data(log) else { return };
     let folder = tempfile::tempdir().unwrap();
     map(&log, folder.path(), options);
     let text = fs::read_to_string(folder.path().join("contour.geojson")).unwrap();
@@ -152,7 +139,7 @@ fn what_is_certified_holds_for_the_contour_of_freiburg() {
 
 #[test]
 fn what_is_certified_holds_for_the_mesh_of_the_kitchen() {
-    let Some(log) = data("rgbd_redkitchen") else { return };
+    let Some(log) = real_data("rgbd_redkitchen") else { return };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     succeed(["map", arg(&log), "--resolution", "0.04", "--every", "6", "--out", arg(out), "-q"]);

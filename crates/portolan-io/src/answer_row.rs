@@ -61,7 +61,8 @@ impl<const D: usize> AnswerRow<D> {
         unknown: UnknownSpace,
         limit: f64,
     ) {
-        let pessimistic = field.clearance(p, UnknownSpace::Pessimistic).value();
+        let counts = unknown == UnknownSpace::Pessimistic || !self.status.has_value();
+        let pessimistic = counts.then(|| field.clearance(p, UnknownSpace::Pessimistic).value()).flatten();
         if !self.status.has_value() && pessimistic.is_none() {
             return;
         }

@@ -5,7 +5,7 @@ use portolan::Mapper;
 use portolan::field::{ClearanceField, Esdf, EsdfSettings, PointKind, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map::{Tsdf2, TsdfConfig};
-use portolan::mapper::MapperSettings;
+use portolan::mapper::{MapperMaps, MapperSettings};
 use portolan::plan::{Demand, Waypoints, check_path};
 use portolan::scan::{Frame, PointScan, RangeLimits, Scan};
 
@@ -95,10 +95,14 @@ fn a_door_that_shuts_is_refused_at_the_third_look_3d() {
     });
 }
 
+fn beams() -> Vec<f64> {
+    (-200..=200).map(|i| f64::from(i) * 0.004).collect()
+}
+
 /// A wall at x = 3 m behind a post that stops a share of the beams near y = 0 at x = 1.55 m.
 fn post(stopped: usize, of: usize, looks: usize) -> Mapper<2> {
     let mut mapper = Mapper::<2>::new(0.05);
-    let bearings: Vec<f64> = (-200..=200).map(|i| f64::from(i) * 0.004).collect();
+    let bearings = beams();
     for look in 0..looks {
         let stands = |i: usize| (i + look) % of < stopped;
         let ranges = bearings.iter().enumerate().map(|(i, b)| {
@@ -139,6 +143,25 @@ fn thin_zero_leaves_the_surface_alone() {
     assert!(lower(with.esdf().unwrap()) < 0.1 && lower(without.esdf().unwrap()) > 0.5);
 }
 
+/// What is hit by all beams in one look of four is free by log odds, and by a field of means; the counts keep it.
+#[test]
+fn what_stops_all_beams_at_times_is_an_obstacle_by_its_counts() {
+    let (bearings, pose) = (beams(), Pose::<2>::new(0.025, 0.025, 0.0));
+    let mut mapper = Mapper::<2>::new(0.05);
+    for look in 0..100 {
+        let range = |b: &f64| if b.abs() < 0.013 && look % 4 == 0 { 1.5525 } else { 3.0 / b.cos() };
+        let ranges: Vec<f64> = bearings.iter().map(range).collect();
+        mapper.integrate(&pose, &Scan::from_laser(&bearings, &ranges, &RangeLimits::default())).unwrap();
+    }
+    let at = [1.6, 0.03];
+    let lower = |field: &Esdf<2>| field.clearance(at, UnknownSpace::Optimistic).value().unwrap().lower;
+    assert!(mapper.occupancy().unwrap().probability(at).known().unwrap() < 0.5);
+    assert!(lower(mapper.esdf().unwrap()) < 0.1);
+    let maps = MapperMaps { attenuation: None, ..mapper.clone().into_maps() };
+    let mut without = Mapper::of_maps(*mapper.settings(), maps).unwrap();
+    assert!(lower(without.esdf().unwrap()) > 0.5);
+}
+
 /// A post of many beams is taken away: it goes within the looks that are promised for distances.
 #[test]
 fn what_has_gone_goes() {
@@ -148,7 +171,7 @@ fn what_has_gone_goes() {
         mapper.esdf().unwrap().clearance(at, UnknownSpace::Optimistic).value().unwrap().lower
     };
     assert!(lower(&mut mapper) < 0.1);
-    let bearings: Vec<f64> = (-200..=200).map(|i| f64::from(i) * 0.004).collect();
+    let bearings = beams();
     let ranges: Vec<f64> = bearings.iter().map(|b| 3.0 / b.cos()).collect();
     let scan = Scan::from_laser(&bearings, &ranges, &RangeLimits::default());
     let mut gone = None;
@@ -164,14 +187,20 @@ fn what_has_gone_goes() {
 }
 
 /// A cell that is inside by its own estimate stands between two that were not observed: no surface can be extracted, and it is
-/// an obstacle all the same, whatever unknown space counts as.
+/// an obstacle all the same, whatever unknown space counts as, far from everything or three cells before a wall.
 #[test]
 fn a_cell_inside_without_a_surface_is_an_obstacle() {
+    for wall in [40, 23] {
+        a_cell_inside_before_a_wall(wall);
+    }
+}
+
+fn a_cell_inside_before_a_wall(wall: i32) {
     let mut config = TsdfConfig { truncation: 0.15, ..Default::default() };
     config.resolution = 0.05;
     let mut tsdf = Tsdf2::covering(&portolan::geom::Grid::new([0.0; 2], 0.05, [40, 40]), config).unwrap();
     for cell in (0..1600).map(|n| [n % 40, n / 40]).filter(|c| *c != [20, 19] && *c != [20, 21]) {
-        tsdf.fuse(cell, 0.15, 1.0);
+        tsdf.fuse(cell, if cell[0] < wall { 0.15 } else { -0.15 }, 1.0);
     }
     for _ in 0..2000 {
         tsdf.fuse([20, 20], -0.15, 1.0);
@@ -182,11 +211,28 @@ fn a_cell_inside_without_a_surface_is_an_obstacle() {
     assert_eq!(esdf.point_obstacles().collect::<Vec<_>>(), [([20, 20], PointKind::Loose)]);
     let before = esdf.clearance(tsdf.grid().lattice.center([19, 20]), UnknownSpace::Optimistic).known();
     assert!(before.is_some_and(|c| c.lower <= 0.05 && c.upper >= 0.05 - 1e-9), "{before:?}");
-    for (to, demand) in
-        [([1.475, 1.025], 0.0), ([1.475, 1.025], 0.2), ([1.475, 1.0], 0.0), ([1.475, 1.0], 0.02)]
-    {
+    // Behind the cell, and before the wall.
+    let end = 1.09;
+    for (to, demand) in [([end, 1.025], 0.0), ([end, 1.025], 0.03), ([end, 1.01], 0.0), ([end, 1.01], 0.02)] {
         let path = Waypoints::new(vec![[0.525, 1.025], to]).unwrap();
         let verdict = check_path(&esdf, &path, &Demand::new(demand).optimistic());
         assert!(!verdict.is_certified(), "{to:?} {demand}: {verdict:?}");
     }
+}
+
+/// A stray return leaves a cell inside with nothing observed around it: it is an obstacle where it is, and not a meter deep.
+#[test]
+fn a_stray_cell_inside_is_no_deep_solid() {
+    let config = TsdfConfig { resolution: 0.05, truncation: 0.15, ..Default::default() };
+    let mut tsdf = Tsdf2::covering(&portolan::geom::Grid::new([0.0; 2], 0.05, [40, 40]), config).unwrap();
+    // A wall at x = 1.6 m, observed three cells deep, and the stray cell at 0.5 m.
+    for cell in (0..400).map(|n| [25 + n % 10, n / 10]) {
+        tsdf.fuse(cell, 0.05 * (31.5 - f64::from(cell[0])), 1.0);
+    }
+    tsdf.fuse([10, 20], -0.05, 1.0);
+    let esdf = Esdf::of(&tsdf, &EsdfSettings::default());
+    assert_eq!(esdf.point_obstacles().collect::<Vec<_>>(), [([10, 20], PointKind::Loose)]);
+    assert_eq!(esdf.cell([10, 20]).known().map(f32::abs), Some(0.0));
+    let c = esdf.clearance([0.525, 1.125], UnknownSpace::Optimistic).known().unwrap();
+    assert!((c.lower - 0.1).abs() < 1e-6 && (c.upper - 0.1).abs() < 1e-6, "{c:?}");
 }

@@ -177,7 +177,9 @@ fn said_between(
     }
     let taper = |d: f64| (1.0 + d / tau).clamp(0.0, 1.0);
     let head_on = if d > tau { 0.0 } else { taper(d) };
-    Said::One(d.clamp(-tau, tau), by_range * head_on.max(taper(across).min(0.15)))
+    let carve = if config.carve { f64::from(config.carve_weight) } else { 0.0 };
+    let slanted = 0.15f64.max(0.52 * carve);
+    Said::One(d.clamp(-tau, tau), by_range * head_on.max(taper(across).min(slanted)))
 }
 
 /// Cosine of the incidence on the surface between pixels, from what is linear there and by how much it grows to the right and

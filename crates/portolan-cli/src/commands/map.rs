@@ -13,6 +13,7 @@ use portolan_io::{detect_no_return, write_atomic};
 use crate::arguments::{box3, bytes};
 use crate::dimension::{Dimension, Given, ONLY_3D};
 use crate::error::bad_call;
+use crate::esdf::check_thin;
 use crate::json;
 use crate::log::{self, Log, LogArgs};
 use crate::mapping::{Artifacts, Derived, Limits, MapKind, Run, Settings, Summary, report, title};
@@ -160,6 +161,7 @@ impl Args {
         let base = saved.map(Settings::of_saved).unwrap_or_default();
         let settings = self.settings.over(base)?.resolved(dimension);
         settings.check(dimension)?;
+        check_thin(self.settings.has("thin"), settings.esdf)?;
         if let Some(saved) = saved {
             settings.check_agree(saved, &map)?;
         }

@@ -18,7 +18,9 @@ use serde_json::{Map, Value, json};
 use super::convert::UnknownArg;
 use crate::arguments::{length, thin};
 use crate::error::bad_call;
-use crate::esdf::{EsdfArg, FieldHow, esdf_2d, esdf_3d, esdf_of_cells};
+use crate::esdf::{
+    EsdfArg, FieldHow, SURFACE_ALONE, check_thin, esdf_2d, esdf_3d, esdf_of_cells, keeps_thin,
+};
 use crate::mapping::Settings;
 use crate::output::Output;
 use crate::source::{Source, open};
@@ -74,6 +76,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             source.describe()
         )));
     }
+    check_thin(args.thin.is_some(), args.esdf.unwrap_or_default())?;
+    if surface_alone(&source, args) && !args.output.quiet {
+        writeln!(io::stderr(), "portolan: warning: {}: {SURFACE_ALONE}", args.map.display())?;
+    }
     if let Some(warning) = source.warning().filter(|_| !args.output.quiet) {
         // Standard output is for the answers.
         writeln!(io::stderr(), "portolan: warning: {}: {warning}", args.map.display())?;
@@ -94,6 +100,16 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             bail!("{}: the points are x,y; the map is 3-D: give x,y,z", shown(args))
         }
     }
+}
+
+/// Whether thin obstacles would count, and no map of the file knows them.
+fn surface_alone(source: &Source, args: &Args) -> bool {
+    let lacks = match source {
+        Source::Map2(file) => file.tsdf.is_some() && !keeps_thin(file),
+        Source::Map3(file) => file.tsdf_bricks.is_some() && !keeps_thin(file),
+        _ => false,
+    };
+    lacks && args.esdf.unwrap_or_default() == EsdfArg::Accurate && args.thin != Some(0.0)
 }
 
 fn shown(args: &Args) -> String {
@@ -196,7 +212,9 @@ fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
     let saved = FieldHow::of(&Settings::of_saved(saved));
     FieldHow {
         method: args.esdf.unwrap_or_default(),
-        unknown: args.unknown != Some(UnknownArg::Optimistic),
+        // Only what is certified looks at unknown space.
+        unknown: args.unknown != Some(UnknownArg::Optimistic)
+            && args.esdf.unwrap_or_default() == EsdfArg::Accurate,
         thin: args.thin.unwrap_or(saved.thin),
         max_distance: args.max_distance.unwrap_or(saved.max_distance),
     }

@@ -14,6 +14,7 @@ use super::memory::peak_memory;
 use super::{Derived, FusionReport, Settings};
 use crate::arguments::shown_bytes;
 use crate::dimension::Dimension;
+use crate::esdf::{EsdfArg, SURFACE_ALONE, keeps_thin};
 use crate::json;
 use crate::log::Log;
 use crate::saved::SavedMap;
@@ -62,6 +63,13 @@ impl Summary<'_> {
             warnings.push(format!("{} hits lie outside of --bounds", stats.hits_outside));
         }
         warnings.extend(self.surface_warnings());
+        let keeps = match self.file {
+            SavedMap::Two(file) => keeps_thin(file),
+            SavedMap::Three(file) => keeps_thin(file),
+        };
+        warnings.extend(
+            (self.has_points() && !keeps && self.settings.thin > 0.0).then(|| SURFACE_ALONE.to_owned()),
+        );
         warnings.extend(self.fusion.full.iter().map(|full| format!("fusing ended early: {full}")));
         warnings.extend(self.notes.iter().cloned());
         warnings
@@ -147,9 +155,14 @@ impl Summary<'_> {
         document
     }
 
+    /// Whether there are distances that are measured to more than the surface.
+    fn has_points(&self) -> bool {
+        self.derived.esdf.is_some() && self.settings.esdf == EsdfArg::Accurate
+    }
+
     /// What the distances are measured to beside the surface.
     fn obstacles_json(&self) -> Value {
-        let Some(esdf) = &self.derived.esdf else { return Value::Null };
+        let Some(esdf) = self.derived.esdf.as_ref().filter(|_| self.has_points()) else { return Value::Null };
         let points = esdf.points();
         let count = |kind| points.iter().filter(|(_, k)| *k == kind).count();
         json!({
@@ -244,7 +257,7 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         let (n, length) = (checked.contour.segments.len(), checked.contour.length() + 0.0);
         let _ = writeln!(text, "contour of {n} segments, {length:.1} m, {doubled:.2} % doubled");
     }
-    if let Some(esdf) = &summary.derived.esdf {
+    if let Some(esdf) = summary.derived.esdf.as_ref().filter(|_| summary.has_points()) {
         let points = esdf.points().len();
         let _ = writeln!(text, "distances to the surface and to {points} cells that stop beams without one");
     }

@@ -5,8 +5,24 @@
 pub(crate) mod logs_3d;
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+/// A part of the real data, at `PORTOLAN_DATA`, else `../shared/data` beside the workspace; `None`, with a loud line, where it is
+/// not there.
+pub(crate) fn real_data(name: &str) -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let path = std::env::var_os("PORTOLAN_DATA").map_or_else(beside, PathBuf::from).join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    // Not `eprintln!`, which the test harness swallows: a skipped test must be seen.
+    let note =
+        format!("SKIPPED: {} is not there (set PORTOLAN_DATA to the folder of real data)\n", path.display());
+    std::io::stderr().write_all(note.as_bytes()).unwrap();
+    None
+}
 
 /// The program, run with these arguments.
 pub(crate) fn portolan<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Output {

@@ -6,7 +6,8 @@ use crate::field::UnknownSpace;
 use crate::geom::Grid;
 
 /// The least distance of every column between two heights (meters): a 2-D array that is negative where there is an
-/// obstacle at any of these heights. Cells with their center in `[low, high]` count.
+/// obstacle at any of these heights. Cells with their center in `[low, high]` count. Where a cell's center is on an obstacle
+/// that is a point, and 0 from it, the column's value is half a cell below zero, so that it has a surface in 2-D.
 ///
 /// The values are also distances to surfaces below and above, such as the floor; only their sign is meaningful in 2-D.
 /// For 2-D distances compute a distance field of it.
@@ -41,6 +42,8 @@ pub fn lowest_between(
         let known = layers.iter().map(|layer| layer[i]).filter(|d| !d.is_nan());
         let (count, lowest) = known.fold((0, f32::INFINITY), |(n, low), d| (n + 1, low.min(d)));
         let complete = count == layers.len() || unknown == UnknownSpace::Optimistic;
+        let on_point = lowest == 0.0;
+        let lowest = if on_point { -0.5 * grid.lattice.resolution as f32 } else { lowest };
         if count > 0 && (complete || lowest <= 0.0) { lowest } else { f32::NAN }
     };
     let [x, y, _] = grid.lattice.origin;
@@ -66,6 +69,9 @@ mod tests {
         assert_eq!(low, [-1.0, -1.0]);
         let (_, low) = of([1.7, 9.0], UnknownSpace::Optimistic).unwrap();
         assert!(low[0] == -0.5 && low[1].is_nan());
+        let on_a_point = [0.5, 0.5, 0.0, 0.0, 0.5, 0.5, 0.5, 0.5];
+        let (_, low) = lowest_between(&grid, &on_a_point, [0.5, 1.5], UnknownSpace::Pessimistic).unwrap();
+        assert_eq!(low, [-0.25, -0.25]);
         for bad in [[3.0, 4.0], [-2.0, -1.0], [0.8, 1.2], [f64::NAN, 1.0], [1.0, 0.5]] {
             assert!(of(bad, UnknownSpace::Optimistic).is_err(), "{bad:?}");
         }

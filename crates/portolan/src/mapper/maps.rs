@@ -125,6 +125,17 @@ impl<const D: usize> Mapper<D> {
     pub fn of_maps(settings: MapperSettings<D>, maps: MapperMaps<D>) -> Result<Self, MapError> {
         settings.check()?;
         let MapperMaps { occupancy, tsdf, attenuation } = maps;
+        let lattices = [
+            occupancy.as_ref().map(|map| *map.store().lattice()),
+            tsdf.as_ref().map(|map| *map.lattice()),
+            attenuation.as_ref().map(|map| *map.store().lattice()),
+        ];
+        let mut given = lattices.iter().flatten();
+        if let Some(first) = given.next()
+            && given.any(|other| other != first)
+        {
+            return Err(MapError::Lattices);
+        }
         let of_occupancy = occupancy.as_ref().map(|map| map.store().lattice().resolution);
         let resolution = attenuation.as_ref().map(|map| map.store().lattice().resolution).or(of_occupancy);
         let settings = MapperSettings { resolution: resolution.unwrap_or(settings.resolution), ..settings };

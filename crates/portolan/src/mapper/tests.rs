@@ -121,6 +121,16 @@ fn makes_what_its_parts_make_2d_and_3d() {
 }
 
 #[test]
+fn maps_of_several_lattices_are_refused() {
+    let maps = |resolution| fused(MapperSettings::<2>::new(resolution)).into_maps();
+    let (a, b) = (maps(0.1), maps(0.2));
+    let mixed = MapperMaps { occupancy: b.occupancy, tsdf: a.tsdf, attenuation: a.attenuation };
+    let refused = Mapper::of_maps(MapperSettings::new(0.1), mixed);
+    assert!(matches!(refused, Err(crate::map::MapError::Lattices)), "{refused:?}");
+    assert!(Mapper::of_maps(MapperSettings::new(0.1), maps(0.1)).is_ok());
+}
+
+#[test]
 fn memory_is_kept_by_both_maps_together() {
     fn keeps<const D: usize>(memory: usize) {
         let mut mapper = Mapper::with(MapperSettings { memory, ..MapperSettings::<D>::new(0.05) });

@@ -23,7 +23,9 @@ mod occupancy;
 mod plan;
 mod point_rays;
 mod rays;
+mod scan_rays;
 mod touched;
+mod union;
 mod weight;
 
 pub use cell_centre::CellCentre;

@@ -7,7 +7,7 @@ use portolan_io::EsdfFile;
 use serde_json::{Map, Value};
 
 use super::Args;
-use crate::esdf::{FieldHow, esdf_2d, esdf_3d, esdf_of_cells};
+use crate::esdf::{FieldHow, check_thin, esdf_2d, esdf_3d, esdf_of_cells};
 use crate::mapping::{Settings, cells_for_map_server, dense_esdf};
 use crate::source::Source;
 
@@ -23,7 +23,7 @@ impl Field {
         Ok(Some(match source {
             Source::Map2(file) => match &file.tsdf {
                 Some(tsdf) => {
-                    let field = esdf_2d(file, tsdf, &how(args, &file.header.settings))?;
+                    let field = esdf_2d(file, tsdf, &how(args, &file.header.settings)?)?;
                     Self::Two(in_2d(field.dense(tsdf.grid()), args)?)
                 }
                 None => {
@@ -52,7 +52,7 @@ impl Field {
             }
             Source::Map3(file) => {
                 let Some(map) = &file.tsdf_bricks else { return Ok(None) };
-                let field = esdf_3d(file, map, &how(args, &file.header.settings))?;
+                let field = esdf_3d(file, map, &how(args, &file.header.settings)?)?;
                 match dense_esdf(&field, bounds_3d(args)?.as_ref()) {
                     Ok(dense) => Self::Three(dense),
                     Err(why) => {
@@ -66,14 +66,13 @@ impl Field {
 }
 
 /// As the map was made, but for what was asked for.
-fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
+fn how(args: &Args, saved: &Map<String, Value>) -> anyhow::Result<FieldHow> {
     let saved = FieldHow::of(&Settings::of_saved(saved));
-    FieldHow {
-        method: args.esdf.unwrap_or(saved.method),
-        thin: args.thin.unwrap_or(saved.thin),
-        max_distance: args.max_distance.unwrap_or(saved.max_distance),
-        ..saved
-    }
+    let method = args.esdf.unwrap_or(saved.method);
+    check_thin(args.thin.is_some(), method)?;
+    let (thin, max_distance) =
+        (args.thin.unwrap_or(saved.thin), args.max_distance.unwrap_or(saved.max_distance));
+    Ok(FieldHow { method, thin, max_distance, ..saved })
 }
 
 fn in_2d(dense: EsdfGrid<2>, args: &Args) -> anyhow::Result<EsdfGrid<2>> {

@@ -77,6 +77,12 @@ impl Sides {
         self.inside
     }
 
+    /// Whether a cell was observed.
+    #[inline(always)]
+    pub(super) fn observed(&self, i: usize) -> bool {
+        self.observed.has(i)
+    }
+
     /// Whether a cell was observed in free space.
     #[inline(always)]
     pub(super) fn free(&self, i: usize) -> bool {

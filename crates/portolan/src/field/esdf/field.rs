@@ -63,11 +63,11 @@ impl<const D: usize> Esdf<D> {
     }
 
     /// [`Esdf::of`], with what stops beams as obstacles beside the surface: cells of `cells` that no element of the surface
-    /// explains (none within 1.4 cells of their center in 2-D, 0.8 in 3-D) are obstacles at their center, also where the map of distances calls
-    /// them free or never observed them. By the accurate method alone; the others measure to their own cells.
+    /// explains (none within 1.4 cells of their center in 2-D, 0.8 in 3-D) are obstacles at their center, also where the map
+    /// of distances calls them free or never observed them. By the accurate method alone; the others measure to their own cells.
     ///
     /// # Panics
-    /// Where `max_distance` is not positive.
+    /// Where `max_distance` is not positive, or the cells are of another lattice.
     pub fn with_obstacles(
         map: &impl DistanceMap<D>,
         cells: &ObstacleCells<D>,
@@ -98,7 +98,8 @@ impl<const D: usize> Esdf<D> {
         field
     }
 
-    /// Follows the map that the field was made of: afterwards it is what [`Esdf::of`] makes of it, bit for bit.
+    /// Follows the map that the field was made of: afterwards it is what [`Esdf::of`] makes of it, bit for bit, or
+    /// [`Esdf::with_obstacles`] of it and the cells that were given last.
     /// Only what changed since and what lies within the largest distance of it is solved again, and only where the surface
     /// is not what it was; by the other methods than [`EsdfMethod::Accurate`], everything.
     ///
@@ -120,6 +121,8 @@ impl<const D: usize> Esdf<D> {
 
     fn renew(&mut self, store: &Bricks<SignedDistance, D>, cells: Option<&ObstacleCells<D>>) -> EsdfUpdate {
         assert_eq!(self.lattice, *store.lattice(), "the map that the field was made of");
+        let others = cells.and_then(ObstacleCells::lattice).unwrap_or(&self.lattice);
+        assert_eq!(self.lattice, *others, "cells on the map's lattice");
         if self.settings.method == EsdfMethod::Accurate {
             return self.follow(store, cells);
         }
@@ -158,7 +161,7 @@ impl<const D: usize> Esdf<D> {
         self.max_distance
     }
 
-    /// The keys of the bricks that hold an observed cell, ascending. O(n log n).
+    /// The keys of the bricks that hold a cell of which something is known, ascending. O(n log n).
     pub fn keys(&self) -> Vec<BlockKey<D>> {
         let mut keys = self.keys.to_vec();
         keys.sort_unstable();

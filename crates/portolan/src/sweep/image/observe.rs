@@ -117,10 +117,11 @@ pub(super) fn places(u: &Lanes, v: &Lanes, stride: usize) -> Places {
     at
 }
 
-/// What a surface weighs at most beyond the truncation along a ray, where it is met at a slant and is nearer than that across: more
-/// than the least weight that counts ([`least_weight`](crate::map::least_weight)), so that what was seen once is a surface, and
-/// less than where it is seen better.
+/// What a surface weighs at most beyond the truncation along a ray, where it is met at a slant and is nearer than that across, and
+/// what it weighs of free space at least: more than the least weight that counts ([`least_weight`](crate::map::least_weight),
+/// half of free space), so that what was seen once is a surface, and less than where it is seen better.
 const SLANTED: f32 = 0.15;
+const SLANTED_OF_FREE: f32 = 0.52;
 
 /// Weight of a surface at a distance (in truncations): it falls linearly to 0 behind it.
 #[inline(always)]
@@ -148,6 +149,7 @@ fn observe(view: &ImageLookup<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight:
     }
     let parallel = view.projector.is_parallel();
     let (tau, per_tau, carve) = (view.truncation, 1.0 / view.truncation, view.carve_weight);
+    let slanted = SLANTED.max(SLANTED_OF_FREE * carve);
     let mut torn = [0u32; LANES];
     let mut surface = Gradients { value: [0.0; LANES], right: [0.0; LANES], below: [0.0; LANES] };
     for l in 0..LANES {
@@ -169,7 +171,7 @@ fn observe(view: &ImageLookup<'_>, p: &[Lanes; 3], distance: &mut Lanes, weight:
         let w = if across > tau {
             if seen.length[l] >= 0.0 { carve } else { 0.0 }
         } else {
-            head_on.max(taper(across * per_tau).min(SLANTED))
+            head_on.max(taper(across * per_tau).min(slanted))
         };
         let w = if view.inverse_square & !parallel { w / (range.max(1.0) * range.max(1.0)) } else { w };
         distance[l] = d.max(-tau).min(tau);

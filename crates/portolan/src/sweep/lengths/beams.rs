@@ -1,11 +1,12 @@
 //! Hits and lengths of beams with kinds, in 2-D and 3-D.
 
 use super::blocks::{HitBlocks, KnowsHits};
-use super::rays::{Ray, RayLengths};
+use super::rays::RayLengths;
 use crate::cell::{Evidence, HitLengths};
 use crate::geom::vector::along;
 use crate::geom::{BlockKey, Lattice, Pose, block_cells};
 use crate::scan::{Scan, ScanStats};
+use crate::sweep::scan_rays::Ray;
 use crate::sweep::{PlanError, PlanLimits, Sweep, Swept, beam_stats};
 
 /// Walks every beam through the cells (Amanatides & Woo 1987), up to its end or as far as it is known to be free, and adds

@@ -1,14 +1,15 @@
 //! Hits and lengths of 3-D scans: exact rays, or exact ends and lengths in closed form through a range image.
 
 use super::blocks::{HitBlocks, KnowsHits, is_fine, shared_out};
-use super::rays::{Ray, RayLengths};
+use super::rays::RayLengths;
 use crate::cell::{Evidence, HitLengths};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
-use crate::scan::{LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{LayoutFinder, PointScan, RangeImage, ScanStats, SphericalLayout};
 use crate::sweep::image::ProjectiveLengths;
 use crate::sweep::occupancy::stats;
+use crate::sweep::scan_rays::{Ray, organised};
+use crate::sweep::union::union;
 use crate::sweep::{OccupancySweep, PlanError, PlanLimits, Sweep, Swept};
-use std::borrow::Cow;
 use std::marker::PhantomData;
 
 /// The sweep for hits and lengths of 3-D scans: of points (`HitLengthSweep<PointScan>`) or of range images
@@ -82,21 +83,11 @@ impl<S: ?Sized> HitLengthSweep<S> {
 
     /// Blocks of the rays and of the image together, ascending, as both are.
     fn unite(&mut self, lattice: &Lattice<3>, bounds: Option<&Aabb<3>>) {
-        let (marked, seen) = (self.rays.keys(), self.lengths.blocks());
-        let (mut i, mut j) = (0, 0);
-        while i < marked.len() || j < seen.len() {
-            let key = match (marked.get(i), seen.get(j)) {
-                (Some(a), Some(b)) => *a.min(b),
-                (Some(key), None) | (None, Some(key)) => *key,
-                (None, None) => break,
-            };
-            let (is_marked, is_seen) = (marked.get(i) == Some(&key), seen.get(j) == Some(&key));
+        let (hit, parts) = (&self.rays.hit, &mut self.parts);
+        union(self.rays.keys(), self.lengths.blocks(), |key, [rays, image]| {
             self.keys.push(key);
-            let (rays, image) = (is_marked.then_some(i as u32), is_seen.then_some(j as u32));
-            self.parts.push(Seen { rays, image, fine: is_fine(&self.rays.hit, bounds, lattice, key) });
-            i += usize::from(is_marked);
-            j += usize::from(is_seen);
-        }
+            parts.push(Seen { rays, image, fine: is_fine(hit, bounds, lattice, key) });
+        });
     }
 }
 
@@ -135,28 +126,12 @@ impl Sweep<3> for HitLengthSweep<PointScan> {
         lattice: &Lattice<3>,
         limits: &PlanLimits<3>,
     ) -> Result<ScanStats, PlanError> {
-        let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
-        let (common, image) = match &scan.origin {
-            Origin::Common(o) => {
-                (world_from_sensor.transform_point(*o), self.organised(scan, *o, lattice.resolution)?)
-            }
-            Origin::PerPoint(_) => (world_from_sensor.translation, None),
-        };
+        let (common, _, image) =
+            organised(scan, world_from_sensor, self.sweep, &mut self.layout, lattice.resolution)?;
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
         let exact = image.is_none();
-        let ray = |i: usize| match i.checked_sub(hits) {
-            Some(free) => {
-                Ray { origin: common, end: to_world(scan.free_ends[free]), hit: false, passes: true }
-            }
-            None => {
-                let origin = match &scan.origin {
-                    Origin::Common(_) => common,
-                    Origin::PerPoint(all) => all.get(i).map_or([f64::NAN; 3], |o| to_world(*o)),
-                };
-                Ray { origin, end: to_world(scan.points[i]), hit: true, passes: exact }
-            }
-        };
+        let ray = |i: usize| Ray::of_points(scan, i, common, world_from_sensor, exact);
         let view = image.as_deref().map(|image| (image, &world_from_image));
         let count = hits + scan.free_ends.len();
         let stats = self.plan_rays((hits, count), (0..count).map(ray), view, lattice, limits)?;
@@ -168,23 +143,6 @@ impl HitLengthSweep<PointScan> {
     /// Rows and columns for points that come without them; otherwise they are looked for.
     pub fn set_layout(&mut self, layout: SphericalLayout) {
         self.layout = LayoutFinder::of(layout);
-    }
-
-    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them.
-    fn organised<'a>(
-        &mut self,
-        scan: &'a PointScan,
-        origin: [f64; 3],
-        cell: f64,
-    ) -> Result<Option<Cow<'a, RangeImage>>, PlanError> {
-        if self.sweep == OccupancySweep::Exact {
-            return Ok(None);
-        }
-        if let Some(image) = &scan.image {
-            image.check().map_err(PlanError::BadImage)?;
-            return Ok(Some(Cow::Borrowed(image)));
-        }
-        Ok(self.layout.image(&scan.points, origin, cell).ok().map(Cow::Owned))
     }
 }
 

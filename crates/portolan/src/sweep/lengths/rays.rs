@@ -7,18 +7,8 @@ use crate::geom::vector::{along, distance, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, block_cells};
 use crate::parallel;
 use crate::sweep::occupancy::Tally;
+use crate::sweep::scan_rays::Ray;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, clip};
-
-/// One beam in the world's frame (meters).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ray<const D: usize> {
-    pub(super) origin: [f64; D],
-    pub(super) end: [f64; D],
-    /// Whether there is a surface at the end.
-    pub(super) hit: bool,
-    /// Whether its length counts; else only its end does.
-    pub(super) passes: bool,
-}
 
 /// Hits and lengths by block. First come the hits, which say what blocks are told apart cell by cell; then rays are walked,
 /// shared out to threads with counts of their own, which are then added: whole numbers, so that the order does not matter.

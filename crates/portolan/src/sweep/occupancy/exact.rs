@@ -6,18 +6,8 @@ use crate::geom::vector::{along, distance, dot, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, RayWalk};
 use crate::parallel;
 use crate::scan::RefusedBeams;
+use crate::sweep::scan_rays::Ray;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, clip};
-
-/// One beam in the world's frame (meters).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Ray {
-    pub(crate) origin: [f64; 3],
-    pub(crate) end: [f64; 3],
-    /// Whether there is a surface at the end.
-    pub(crate) hit: bool,
-    /// Whether the cells that it passes are missed; else only its end counts.
-    pub(crate) passes: bool,
-}
 
 /// What became of the rays of a scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,8 +56,8 @@ impl ExactRays {
         lattice: &Lattice<3>,
         bounds: Option<&Aabb<3>>,
         count: usize,
-        ray: impl Fn(usize) -> Ray + Sync,
-        further: &[Ray],
+        ray: impl Fn(usize) -> Ray<3> + Sync,
+        further: &[Ray<3>],
         most: usize,
     ) -> Result<Tally, PlanError> {
         let parts = parallel::threads().min(count / RAYS_A_PART).max(1);
@@ -75,7 +65,7 @@ impl ExactRays {
         let range = |part: usize| part * count / parts..(part + 1) * count / parts;
         let mut boxes = vec![Aabb::EMPTY; parts];
         parallel::each(boxes.iter_mut().enumerate(), |(i, b)| {
-            let short = |r: &Ray| bounds.is_some() || !is_long(lattice, r);
+            let short = |r: &Ray<3>| bounds.is_some() || !is_long(lattice, r);
             *b = extent(lattice, range(i).map(&ray).filter(short))
         });
         let all = boxes.into_iter().fold(extent(lattice, further.iter().copied()), Aabb::union);
@@ -129,7 +119,7 @@ impl ExactRays {
 
 /// Whether a ray is longer than any that is walked, or not finite.
 #[inline(always)]
-fn is_long(lattice: &Lattice<3>, ray: &Ray) -> bool {
+fn is_long(lattice: &Lattice<3>, ray: &Ray<3>) -> bool {
     let offset = sub(ray.end, ray.origin);
     let longest = LONGEST_RAY_CELLS * lattice.resolution;
     !(dot(offset, offset) <= longest * longest)
@@ -137,7 +127,13 @@ fn is_long(lattice: &Lattice<3>, ray: &Ray) -> bool {
 
 /// Marks one ray.
 #[inline]
-fn mark(masks: &mut BrickMasks, lattice: &Lattice<3>, bounds: Option<&Aabb<3>>, ray: Ray, tally: &mut Tally) {
+fn mark(
+    masks: &mut BrickMasks,
+    lattice: &Lattice<3>,
+    bounds: Option<&Aabb<3>>,
+    ray: Ray<3>,
+    tally: &mut Tally,
+) {
     let end = match bounds {
         None if is_long(lattice, &ray) => None,
         None if ray.passes => trace(masks, lattice, ray.origin, ray.end),
@@ -164,7 +160,7 @@ fn trace_inside(
     masks: &mut BrickMasks,
     lattice: &Lattice<3>,
     bounds: &Aabb<3>,
-    ray: Ray,
+    ray: Ray<3>,
 ) -> Option<[i32; 3]> {
     let end = lattice.cell_of(ray.end)?;
     let length = distance(ray.end, ray.origin);
@@ -186,7 +182,7 @@ fn trace_inside(
 }
 
 /// The box of all origins and ends that have a cell.
-fn extent(lattice: &Lattice<3>, rays: impl Iterator<Item = Ray> + Clone) -> Aabb<3> {
+fn extent(lattice: &Lattice<3>, rays: impl Iterator<Item = Ray<3>> + Clone) -> Aabb<3> {
     // Where the corners of the box of all have cells, all have.
     let (mut all, mut is_number) = (Aabb::EMPTY, true);
     for p in rays.clone().flat_map(|ray| [ray.origin, ray.end]) {
@@ -225,7 +221,7 @@ mod tests {
     use std::collections::HashSet;
 
     /// The definition, with sets of cells.
-    fn oracle(lattice: &Lattice<3>, rays: &[Ray]) -> (HashSet<[i32; 3]>, HashSet<[i32; 3]>) {
+    fn oracle(lattice: &Lattice<3>, rays: &[Ray<3>]) -> (HashSet<[i32; 3]>, HashSet<[i32; 3]>) {
         let (mut hits, mut misses) = (HashSet::new(), HashSet::new());
         for ray in rays {
             let end = lattice.cell_of(ray.end).unwrap();
@@ -250,7 +246,7 @@ mod tests {
         (hits, misses)
     }
 
-    fn equals_the_oracle(lattice: &Lattice<3>, rays: &[Ray]) {
+    fn equals_the_oracle(lattice: &Lattice<3>, rays: &[Ray<3>]) {
         let mut sweep = ExactRays::default();
         for _ in 0..2 {
             assert_eq!(

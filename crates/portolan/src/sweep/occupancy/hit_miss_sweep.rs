@@ -1,16 +1,17 @@
 //! Hits and misses of 3-D scans, brick by brick: exact rays, or exact ends and misses through a range image.
 
-use super::exact::{ExactRays, Ray, Tally};
+use super::exact::{ExactRays, Tally};
 use super::masks::Bits;
 use crate::cell::HitMiss;
 use crate::geom::{BlockKey, Lattice, Pose};
 use crate::parallel;
 use crate::scan::{
-    BeamCounts, LayoutFinder, Origin, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays,
+    BeamCounts, LayoutFinder, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays,
 };
 use crate::sweep::image::ProjectiveMisses;
+use crate::sweep::scan_rays::{Ray, organised};
+use crate::sweep::union::union;
 use crate::sweep::{LONGEST_RAY_CELLS, PlanError, PlanLimits, Sweep, Swept};
-use std::borrow::Cow;
 use std::marker::PhantomData;
 
 /// How a 3-D scan becomes evidence of hits and misses.
@@ -92,7 +93,7 @@ impl<S: ?Sized> HitMissSweep<S> {
     /// Marks the rays, and finds what the image of a view sees; without one, rays that pass mark misses.
     fn plan_rays(
         &mut self,
-        rays: &Rays<'_, impl Fn(usize) -> Ray + Sync>,
+        rays: &Rays<'_, impl Fn(usize) -> Ray<3> + Sync>,
         lattice: &Lattice<3>,
         limits: &PlanLimits<3>,
     ) -> Result<ScanStats, PlanError> {
@@ -101,7 +102,7 @@ impl<S: ?Sized> HitMissSweep<S> {
         self.misses.clear();
         let (bounds, most) = (limits.bounds.as_ref(), limits.most_blocks);
         let longest = LONGEST_RAY_CELLS * lattice.resolution;
-        let further: Vec<Ray> = rays.view.and_then(|view| free_reach(view, longest)).into_iter().collect();
+        let further: Vec<Ray<3>> = rays.view.and_then(|view| free_reach(view, longest)).into_iter().collect();
         let (exact, misses) = (&mut self.exact, &mut self.misses);
         let (planned, ()) = parallel::join(
             || exact.plan(lattice, bounds, rays.count, &rays.ray, &further, most),
@@ -122,21 +123,11 @@ impl<S: ?Sized> HitMissSweep<S> {
 
     /// Blocks of the rays and of the image together, ascending, as both are.
     fn unite(&mut self) {
-        let (marked, seen) = (self.exact.keys(), self.misses.blocks());
-        let (mut i, mut j) = (0, 0);
-        while i < marked.len() || j < seen.len() {
-            let key = match (marked.get(i), seen.get(j)) {
-                (Some(a), Some(b)) => *a.min(b),
-                (Some(key), None) | (None, Some(key)) => *key,
-                (None, None) => break,
-            };
-            let (is_marked, is_seen) = (marked.get(i) == Some(&key), seen.get(j) == Some(&key));
+        let parts = &mut self.parts;
+        union(self.exact.keys(), self.misses.blocks(), |key, [rays, misses]| {
             self.keys.push(key);
-            self.parts
-                .push(Parts { rays: is_marked.then_some(i as u32), misses: is_seen.then_some(j as u32) });
-            i += usize::from(is_marked);
-            j += usize::from(is_seen);
-        }
+            parts.push(Parts { rays, misses });
+        });
     }
 }
 
@@ -152,7 +143,7 @@ impl Sweep<3> for HitMissSweep<RangeImage> {
     ) -> Result<ScanStats, PlanError> {
         image.check().map_err(PlanError::BadImage)?;
         let passes = self.sweep == OccupancySweep::Exact;
-        let all: Vec<Ray> = image
+        let all: Vec<Ray<3>> = image
             .readings()
             .map(|(origin, end, hit)| Ray {
                 origin: world_from_sensor.transform_point(origin),
@@ -180,29 +171,13 @@ impl Sweep<3> for HitMissSweep<PointScan> {
         lattice: &Lattice<3>,
         limits: &PlanLimits<3>,
     ) -> Result<ScanStats, PlanError> {
-        let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
         let hits = scan.points.len();
-        let (common, (way, image)) = match &scan.origin {
-            Origin::Common(o) => {
-                (world_from_sensor.transform_point(*o), self.organised(scan, *o, lattice.resolution)?)
-            }
-            Origin::PerPoint(_) => (world_from_sensor.translation, (Way::Rays(WhyRays::OwnOrigins), None)),
-        };
+        let (common, way, image) =
+            organised(scan, world_from_sensor, self.sweep, &mut self.layout, lattice.resolution)?;
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
         let view = image.as_deref().map(|image| View { world_from_image: &world_from_image, image });
         let passes = view.is_none();
-        let ray = |i: usize| match i.checked_sub(hits) {
-            Some(free) => {
-                Ray { origin: common, end: to_world(scan.free_ends[free]), hit: false, passes: true }
-            }
-            None => {
-                let origin = match &scan.origin {
-                    Origin::Common(_) => common,
-                    Origin::PerPoint(all) => all.get(i).map_or([f64::NAN; 3], |o| to_world(*o)),
-                };
-                Ray { origin, end: to_world(scan.points[i]), hit: true, passes }
-            }
-        };
+        let ray = |i: usize| Ray::of_points(scan, i, common, world_from_sensor, passes);
         let rays = Rays { hits, count: hits + scan.free_ends.len(), ray, view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
         Ok(ScanStats { refused: stats.refused + scan.refused, ..stats }.by(way))
@@ -224,28 +199,6 @@ impl Sweep<3> for HitMissSweep<[[f64; 3]]> {
         let ray = |i: usize| Ray { origin, end: points_world[i], hit: true, passes: true };
         let count = points_world.len();
         self.plan_rays(&Rays { hits: count, count, ray, view: None }, lattice, limits)
-    }
-}
-
-impl HitMissSweep<PointScan> {
-    /// Rows and columns of a scan about one origin, if the sweep wants them and the scan has or gets them, and which way it is.
-    fn organised<'a>(
-        &mut self,
-        scan: &'a PointScan,
-        origin: [f64; 3],
-        cell: f64,
-    ) -> Result<(Way, Option<Cow<'a, RangeImage>>), PlanError> {
-        if self.sweep == OccupancySweep::Exact {
-            return Ok((Way::Rays(WhyRays::Asked), None));
-        }
-        if let Some(image) = &scan.image {
-            image.check().map_err(PlanError::BadImage)?;
-            return Ok((Way::Stated, Some(Cow::Borrowed(image))));
-        }
-        Ok(match self.layout.image(&scan.points, origin, cell) {
-            Ok(image) => (Way::Found, Some(Cow::Owned(image))),
-            Err(why) => (Way::Rays(why), None),
-        })
     }
 }
 
@@ -275,7 +228,7 @@ impl<S: ?Sized> Swept<3> for HitMissSweep<S> {
 
 /// The box around a sensor in which pixels without a surface mean that space is free, as its diagonal. Not those of more
 /// than `longest` meters, which are refused.
-fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Option<Ray> {
+fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Option<Ray<3>> {
     let used = |v: &f32| f64::from(-v) <= longest;
     let farthest = image.values.iter().copied().filter(used).fold(0.0f32, f32::min);
     if farthest == 0.0 || image.has_parallel_rays() {

@@ -144,7 +144,9 @@ impl<const D: usize> Esdf<D> {
             }
         }
         if interval.lower < 1.0 {
-            let found = self.to_cells_around(point, |cell| !self.observes(cell));
+            // Where something stops beams that was never observed, space is unknown all the same.
+            let unknown = |cell| self.sides_at(cell).is_none_or(|(sides, i)| !sides.observed(i));
+            let found = self.to_cells_around(point, unknown);
             if found <= 1.0 {
                 return Interval { lower: found, upper: found };
             }

@@ -2,9 +2,9 @@
 
 use crate::cell::{HitLength, LogOddsValue, Planes, StopRule};
 use crate::field::esdf::cell_mask::CellMask;
-use crate::geom::BlockKey;
+use crate::geom::{BlockKey, Lattice};
 use crate::parallel;
-use crate::store::Bricks;
+use crate::store::{Bricks, Store};
 use rustc_hash::FxHashMap;
 
 /// Bricks in one task.
@@ -27,6 +27,8 @@ pub struct ObstacleCells<const D: usize> {
     /// Cells with any hit, where they are counted.
     hit: Listed<D>,
     counted: bool,
+    /// Of the maps; none before one was followed.
+    lattice: Option<Lattice<D>>,
 }
 
 /// The cells of one map.
@@ -52,6 +54,15 @@ impl<const D: usize> Listed<D> {
 }
 
 impl<const D: usize> ObstacleCells<D> {
+    /// Index to meters; `None` before a map was followed.
+    pub fn lattice(&self) -> Option<&Lattice<D>> {
+        self.lattice.as_ref()
+    }
+
+    fn on(&mut self, lattice: &Lattice<D>) {
+        assert_eq!(self.lattice.get_or_insert(*lattice), lattice, "all maps have one lattice");
+    }
+
     /// Of an occupancy map alone: the cells whose log odds are above zero. O(cells).
     pub fn of_occupancy<V: LogOddsValue>(map: &Bricks<V, D>) -> Self {
         let mut cells = Self::default();
@@ -60,7 +71,11 @@ impl<const D: usize> ObstacleCells<D> {
     }
 
     /// Takes in what changed in an occupancy map, always the same one. O(changed bricks).
+    ///
+    /// # Panics
+    /// Where another map has another lattice.
     pub fn follow_occupancy<V: LogOddsValue>(&mut self, map: &Bricks<V, D>) {
+        self.on(map.lattice());
         let changed = map.changed_since(self.occupied.epoch);
         let found = parallel::map(&changed, TOGETHER, |&key| match map.brick(key) {
             Some(brick) => CellMask::of::<D>(|i| brick.get(i).is_some_and(V::is_occupied)),
@@ -73,7 +88,11 @@ impl<const D: usize> ObstacleCells<D> {
     /// Takes in what changed in a map of hits per meter, always the same one: the cells that stop more than `share` of the
     /// beams through them, by three hits or more. Where it counted no hit, log odds alone make no obstacle: they call
     /// cells around the end of a beam occupied, too. O(changed bricks).
+    ///
+    /// # Panics
+    /// Where another map has another lattice.
     pub fn follow_attenuation(&mut self, map: &Bricks<HitLength, D>, share: f64) {
+        self.on(map.lattice());
         let rule = StopRule::<D>::new(share, LEAST_HITS);
         let changed = map.changed_since(self.opaque.epoch);
         let found = parallel::map(&changed, TOGETHER, |&key| match map.brick(key) {
@@ -134,7 +153,7 @@ impl<const D: usize> ObstacleCells<D> {
 mod tests {
     use super::*;
     use crate::cell::{Cell, LENGTH_UNITS, LogOdds8};
-    use crate::geom::{Lattice, block_cells};
+    use crate::geom::block_cells;
 
     fn cells_of_either_map<const D: usize>() {
         let (lattice, key) = (Lattice::new([0.0; D], 0.1), BlockKey([-1; D]));

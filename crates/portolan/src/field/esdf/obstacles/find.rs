@@ -11,9 +11,9 @@ use crate::parallel;
 use crate::store::Bricks;
 use std::sync::Arc;
 
-/// An element within so many cells of a cell's center explains what was hit there. With less, cells beside walls thicken them
-/// (of Freiburg 079 at 5 cm 3.0 % of free points are within 10 cm of an obstacle with 1.25, 2.8 with 1.5), with more, what
-/// stands before a wall is lost (2.8 and 3.0 % of confirmed returns). In 3-D a hit is farther from the center of its cell.
+/// An element within so many cells of a cell's center explains what was hit there. With less, cells beside walls thicken them,
+/// with more, what stands before a wall is lost: chosen on Freiburg 079 and, in 3-D, on the red kitchen
+/// (`docs/WHAT-MAPS-DO-NOT-KNOW.md`). In 3-D a hit may be farther from the center of its cell.
 const fn explained<const D: usize>() -> f64 {
     if D == 2 { 1.4 } else { 0.8 }
 }
@@ -88,9 +88,12 @@ impl<const D: usize> Esdf<D> {
 
     /// Whether an element of the surface is so near to the center of a cell that it is what was hit there.
     fn is_explained(&self, cell: [i32; D]) -> bool {
-        (0..4usize.pow(D as u32)).any(|n| {
-            // The cells between nodes, up to a cell and a half away.
-            let lower: [i32; D] = std::array::from_fn(|k| cell[k] - 2 + (n >> (2 * k) & 3) as i32);
+        // The cells between nodes that reach within that far.
+        let around = explained::<D>().ceil() as i32;
+        let edge = 2 * around as usize;
+        (0..edge.pow(D as u32)).any(|n| {
+            let lower: [i32; D] =
+                std::array::from_fn(|k| cell[k] - around + (n / edge.pow(k as u32) % edge) as i32);
             let p = std::array::from_fn(|k| f64::from(cell[k] - lower[k]));
             self.surface.cell(lower).iter().any(|s| simplex_distance_sq(p, s) <= explained::<D>().powi(2))
         })
