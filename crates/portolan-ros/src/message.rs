@@ -1,0 +1,1 @@
+//! Definitions of messages, bytes to values, and the messages that maps are made of.
