@@ -10,8 +10,8 @@ use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::mapper::{Mapper, MapperSettings};
 use portolan::surface::{MeshSettings, marching_cubes};
 use portolan::sweep::OccupancySweep;
-use portolan_sim::ErrorSummary;
 use portolan_sim::building::{BuildingConfig, BuildingLog, BuildingSensor, DepthCamera, building_log};
+use portolan_sim::{ErrorSummary, Random};
 use std::sync::LazyLock;
 use truth::{free_points, score_free, score_surface, seen_surface, surface_errors, surface_points};
 
@@ -78,6 +78,38 @@ fn the_default_sweep_keeps_surfaces_at_10_cm() {
 #[test]
 fn the_default_sweep_keeps_surfaces_at_5_cm() {
     assert_labels(0.05, OccupancySweep::Auto, 2e-4);
+}
+
+/// Near surfaces the default sweep sees nearly the free space that exact rays see, and keeps what is just inside of a surface, which
+/// those carve.
+#[test]
+fn the_default_sweep_sees_what_is_before_surfaces() {
+    let log = &*LIDAR;
+    let mut random = Random::stream(11, 1);
+    let within = log.world.aabb();
+    let span: [f64; 3] = std::array::from_fn(|k| within.max[k] - within.min[k]);
+    let points: Vec<([f64; 3], f64)> = (0..60_000)
+        .map(|_| std::array::from_fn(|k| within.min[k] + span[k] * random.uniform()))
+        .map(|p| (p, log.world.signed_distance(p)))
+        .collect();
+    let [default, exact] = [OccupancySweep::Auto, OccupancySweep::Exact].map(|sweep| {
+        let map = occupancy(0.1, sweep);
+        let free = |low: f64, high: f64| {
+            let asked: Vec<_> = points.iter().filter(|(_, d)| (low..high).contains(d)).collect();
+            let free = asked.iter().filter(|(p, _)| map.probability(*p).known().is_some_and(|p| p < 0.5)).count();
+            free as f64 / asked.len() as f64
+        };
+        let [open, inside] = [free(0.1, f64::INFINITY), free(-0.05, 0.0)];
+        println!(
+            "{sweep:?} at 10 cm: {:.2} % of all that is 10 cm or more before surfaces called free, {:.2} % of what is up to 5 cm inside",
+            100.0 * open,
+            100.0 * inside,
+        );
+        [open, inside]
+    });
+    // Measured 0.6 points less, and 0.31 % against 1.16 %.
+    assert!(default[0] >= exact[0] - 0.012, "{default:?} {exact:?}");
+    assert!(default[1] <= 0.005 && default[1] <= 0.4 * exact[1], "{default:?} {exact:?}");
 }
 
 /// The mesh's vertices.

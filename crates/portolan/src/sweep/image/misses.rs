@@ -11,7 +11,8 @@ const MOST_SEARCHED: u64 = 1 << 27;
 /// Misses of a scan of rows and columns. A cell is missed where all beams within its width (and at least the four around
 /// its center) that had a reading saw beyond it, and the pixel that it is in, or one within its width, had one. That is
 /// the smallest of several ranges against one distance: cells on grazing surfaces between two beams are kept, which exact
-/// rays carve. Blocks, and in them octants, that are wholly free or wholly unseen are found by one look at the nearest and
+/// rays carve. It is missed, too, where its center is half a cell or more before the surface through the four readings around
+/// it, across that surface; or, where those are not of one, where a beam through it saw six cells farther. Blocks, and in them octants, that are wholly free or wholly unseen are found by one look at the nearest and
 /// the farthest reading in their window.
 #[derive(Clone, Debug, Default)]
 pub(in crate::sweep) struct ProjectiveMisses {

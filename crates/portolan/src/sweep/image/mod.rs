@@ -30,6 +30,7 @@ mod projector;
 mod range_pyramid;
 mod rings;
 mod search;
+mod sheet;
 mod sine_rows;
 mod steps;
 mod window;

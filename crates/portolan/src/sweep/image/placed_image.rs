@@ -4,6 +4,7 @@ use super::balls::BallWindows;
 use super::lanes::LANES;
 use super::pixels::{PixelProjector, Pixels};
 use super::search::{Class, Classify, Cube};
+use super::sheet::{Before, Sheet};
 use super::steps::{STEP_BITS, STEPS};
 use super::window_minima::{RangeTables, WindowMinima, WindowSizes};
 use crate::geom::{BLOCK_EDGE, Lattice, Pose};
@@ -12,6 +13,11 @@ use crate::scan::{Bridges, Projection, RangeImage};
 /// How far beyond a cell's center the beams must have seen, in cells. Half a cell is where a surface square to the beam
 /// would touch it.
 const MARGIN: f32 = 0.5;
+/// How far before the surface through the readings around it a cell's center must be, across that surface, in cells.
+const BEFORE: f32 = 0.5;
+/// How far beyond a cell a beam through it must have seen where neighboring beams are not of one surface, in cells: so far past
+/// an edge, and less would free cells of surfaces that are met at a slant.
+const PAST: f32 = 6.0;
 /// Half of the width that a cell has for beams, in cells.
 const HALF_WIDTH: f32 = 0.5;
 /// Bits of pixels' readings.
@@ -29,6 +35,7 @@ pub(super) struct PlacedImage {
     coarse_sizes: WindowSizes,
     /// For every pixel [`OWN`], where it has a reading, and [`BESIDE`], where it or one of the eight around it has one.
     readings: Vec<u8>,
+    sheet: Sheet,
     columns: usize,
     rows: usize,
     /// Edge of a cell (meters).
@@ -49,9 +56,9 @@ impl PlacedImage {
         lattice: &Lattice<3>,
         old: Option<Box<Self>>,
     ) -> Self {
-        let (projector, mut tables) = match old {
-            Some(old) => (Some(old.projector).filter(|p| p.projector.is_of(image)), old.tables),
-            None => (None, RangeTables::default()),
+        let (projector, mut tables, mut sheet) = match old {
+            Some(old) => (Some(old.projector).filter(|p| p.projector.is_of(image)), old.tables, old.sheet),
+            None => (None, RangeTables::default(), Sheet::default()),
         };
         let projector = projector.unwrap_or_else(|| PixelProjector::of(image));
         let sensor_from_world = world_from_image.inverse();
@@ -71,6 +78,7 @@ impl PlacedImage {
             Bridges::of(rays, image.is_full_turn()).fill(&mut values, image.columns);
         }
         let turn = projector.projector.columns_of_turn();
+        sheet.fill(&values, &projector.projector);
         tables.fill(&values, image.columns, turn, projector.rows_per_column());
         Self {
             fine_sizes: WindowSizes::of(&tables.fine),
@@ -78,6 +86,7 @@ impl PlacedImage {
             tables,
             projector,
             readings: readings(&values, image.columns),
+            sheet,
             columns: image.columns,
             rows: image.rows,
             resolution: lattice.resolution as f32,
@@ -138,6 +147,12 @@ impl PlacedImage {
             columns: self.columns as i32,
             rows: self.rows as i32,
             margin: MARGIN * self.resolution,
+            sheet: &self.sheet,
+            before: Before {
+                across: BEFORE * self.resolution,
+                past: PAST * self.resolution,
+                half: [c.max(0.5), r.max(0.5)],
+            },
             nearest_of_all,
         };
         let mut bits = free_lanes(&self.projector, center, &self.offsets, &test, &mut pixels);
@@ -227,6 +242,8 @@ struct FreeTest<'a> {
     margin: f32,
     /// Cells must be nearer than this.
     nearest_of_all: f32,
+    sheet: &'a Sheet,
+    before: Before,
 }
 
 /// Which of the points `center + offsets` are nearer than all that the readings in their windows, a bit each.
@@ -262,6 +279,12 @@ fn free_lanes(
         let is_free =
             (limit < n) & (n < f32::INFINITY) & (limit < test.nearest_of_all) & (pixels.depth[i] > 0.0);
         free[i] = u8::from(is_free);
+    }
+    for i in 0..LANES {
+        let (column, row, depth) = (pixels.column[i], pixels.row[i], pixels.depth[i]);
+        if free[i] == 0 && index[i] != u32::MAX && depth > 0.0 {
+            free[i] = u8::from(test.sheet.is_behind(column, row, depth, &test.before));
+        }
     }
     let mut bits = 0;
     for (i, eight) in free.chunks_exact(8).enumerate() {
