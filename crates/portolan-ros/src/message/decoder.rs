@@ -193,7 +193,9 @@ pub(crate) mod tests {
         /// A length, then values.
         pub(crate) fn f32s(&mut self, all: &[f32]) -> &mut Self {
             self.u32(all.len() as u32);
-            all.iter().for_each(|v| drop(self.f32(*v)));
+            all.iter().for_each(|v| {
+                self.f32(*v);
+            });
             self
         }
 

@@ -28,6 +28,8 @@ mod livox;
 mod poses;
 mod ros_msg;
 mod schema;
+#[cfg(test)]
+mod tests;
 mod values;
 
 pub use camera_info::CameraInfo;

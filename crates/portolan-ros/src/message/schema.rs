@@ -150,7 +150,7 @@ pub(super) fn link(root: &str, raw: Vec<RawStructure>, dialect: Dialect) -> Resu
     }
     let mut linker =
         Linker { by_name, dialect, done: HashMap::new(), structures: Vec::new(), assumed: Vec::new() };
-    linker.add(root, &mut Vec::new())?;
+    linker.add(&type_name(root), &mut Vec::new())?;
     let Linker { structures, assumed, .. } = linker;
     let notes = match &assumed[..] {
         [] => Vec::new(),
