@@ -146,7 +146,7 @@ pub(crate) mod tests {
         }
 
         fn put(&mut self, little: &[u8]) -> &mut Self {
-            while self.cdr && (self.bytes.len() - 4) % little.len() != 0 {
+            while self.cdr && !(self.bytes.len() - 4).is_multiple_of(little.len()) {
                 self.bytes.push(0xaa);
             }
             let at = self.bytes.len();

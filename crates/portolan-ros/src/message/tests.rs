@@ -198,7 +198,8 @@ fn packed_pictures_are_what_their_bytes_say() {
     };
     let kind = "sensor_msgs/msg/CompressedImage";
     let is = |bytes: &[u8], check: &dyn Fn(Compressed<'_>) -> bool| {
-        with(kind, bytes, |r| Ok(assert!(check(CompressedImage::of(r)?.content)))).unwrap();
+        let right = with(kind, bytes, |r| Ok(check(CompressedImage::of(r)?.content)));
+        assert!(right.unwrap());
     };
     is(&message("jpeg", &[0xff, 0xd8, 0xff]), &|c| c == Compressed::Color(&[0xff, 0xd8, 0xff]));
     is(&message("bgr8; png compressed bgr8", &png), &|c| c == Compressed::Color(&png));

@@ -18,8 +18,10 @@ fn at_x(x: f64) -> RawTransform {
     RawTransform { translation: [x, 0.0, 0.0], quaternion: [0.0, 0.0, 0.0, 1.0] }
 }
 
-/// `parent > child: static?, [(seconds, x)]`
-fn tree_of(edges: &[(&str, &str, bool, &[(f64, f64)])]) -> FrameTree {
+/// `parent > child`, static or not, `(seconds, x)`.
+type Row<'a> = (&'a str, &'a str, bool, &'a [(f64, f64)]);
+
+fn tree_of(edges: &[Row<'_>]) -> FrameTree {
     let mut builder = FrameTreeBuilder::default();
     for (parent, child, is_static, poses) in edges {
         for (time, x) in *poses {
@@ -144,7 +146,7 @@ fn refusals_name_the_edge_and_the_gap() {
 
 #[test]
 fn what_contradicts_itself_is_told() {
-    let notes = |edges: &[(&str, &str, bool, &[(f64, f64)])]| tree_of(edges).notes().join("\n");
+    let notes = |edges: &[Row<'_>]| tree_of(edges).notes().join("\n");
     let said = |notes: String, part: &str| assert!(notes.contains(part), "{notes:?} without {part:?}");
     let way: &[(f64, f64)] = &[(0.0, 0.0), (0.1, 0.1), (0.2, 0.2)];
     assert_eq!(notes(&[("map", "base", false, way)]), "");
