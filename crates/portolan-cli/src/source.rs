@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline, detect, read_geojson,
+    EsdfFile, FileKind, LaserLog, MapFile, MapServerMap, OctomapTree, Pgm, Polyline, detect, read_geojson,
 };
 
 use crate::dimension::{Dimension, Given};
@@ -30,7 +30,7 @@ pub(crate) enum Source {
     /// A `.bt` or `.ot`
     Octomap(Box<OctomapTree>),
     /// A log of 2-D scans
-    Log2(Box<CarmenLog>),
+    Log2(Box<LaserLog>),
     /// A log of 3-D scans
     Log3(Box<ScanLog>),
 }
@@ -48,7 +48,7 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         },
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
         FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
-        FileKind::CarmenLog => Source::Log2(Box::new(CarmenLog::read(path)?)),
+        FileKind::CarmenLog => Source::Log2(Box::new(LaserLog::read_carmen(path)?)),
         FileKind::ScanLog(_) => Source::Log3(Box::new(ScanLog::open(path, &ScanLogOptions::default())?)),
         FileKind::Unknown(what) => bail!("{}: not recognized: {what}", path.display()),
         kind => bail!("{}: is {}, which cannot be read yet", path.display(), describe(&kind)),

@@ -6,7 +6,8 @@ use portolan_ros::container::{Bag, BagOptions};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
-    let allow_truncated = arguments.iter().position(|a| a == "--allow-truncated").map(|i| arguments.remove(i)).is_some();
+    let allow_truncated =
+        arguments.iter().position(|a| a == "--allow-truncated").map(|i| arguments.remove(i)).is_some();
     let mut out = String::new();
     for path in arguments {
         let start = Instant::now();
@@ -19,7 +20,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for message in bag.messages(&topics) {
             bag.read(&message, &mut data)?;
             let hash = &mut hashes[message.topic as usize];
-            for byte in message.log_time.to_le_bytes().iter().chain(&(data.len() as u64).to_le_bytes()).chain(&data) {
+            for byte in
+                message.log_time.to_le_bytes().iter().chain(&(data.len() as u64).to_le_bytes()).chain(&data)
+            {
                 *hash = (*hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
             }
         }
@@ -33,10 +36,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut lines: Vec<String> = Vec::new();
         for ((topic, count), hash) in bag.topics().iter().zip(bag.counts()).zip(&hashes) {
             let (first, last) = count.log_times.unwrap_or_default();
-            lines.push(format!("{} {} {} {first} {last} {hash:016x}", topic.name, topic.type_name, count.messages));
+            lines.push(format!(
+                "{} {} {} {first} {last} {hash:016x}",
+                topic.name, topic.type_name, count.messages
+            ));
         }
         lines.sort();
-        out += &format!("{path}: {:?}, index {opened:.3} s, {bytes} bytes in {pass:.3} s\n{}\n", bag.kind(), lines.join("\n"));
+        out += &format!(
+            "{path}: {:?}, index {opened:.3} s, {bytes} bytes in {pass:.3} s\n{}\n",
+            bag.kind(),
+            lines.join("\n")
+        );
         bag.notes().iter().for_each(|note| out += &format!("note: {note}\n"));
     }
     std::io::Write::write_all(&mut std::io::stdout(), out.as_bytes())?;

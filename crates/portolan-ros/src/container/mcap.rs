@@ -66,7 +66,9 @@ impl Channels {
             Record::Channel(channel) => {
                 match self.records.get(&channel.id) {
                     Some(old) if *old == channel => return Ok(()),
-                    Some(_) => return Err(("the channel", format!("number {} again and different", channel.id))),
+                    Some(_) => {
+                        return Err(("the channel", format!("number {} again and different", channel.id)));
+                    }
                     None => {}
                 }
                 let schema = self.schemas.get(&channel.schema_id);
@@ -100,7 +102,9 @@ fn topic(channel: &records::Channel, schema: Option<&(String, String, String)>) 
         (Encoding::Ros1, "ros1msg") => DefinitionFormat::Ros1Msg,
         (Encoding::Cdr, "ros2msg") => DefinitionFormat::Ros2Msg,
         (Encoding::Cdr, "ros2idl") => DefinitionFormat::Ros2Idl,
-        (_, other) => return Err(format!("{name}: its definition is written as {other:?}, which is not read")),
+        (_, other) => {
+            return Err(format!("{name}: its definition is written as {other:?}, which is not read"));
+        }
     };
     let has = |key: &str| channel.metadata.get(key);
     Ok(Topic {
@@ -189,7 +193,8 @@ fn entries(
     chunks.sort_by_key(|c| c.chunk_start_offset);
     let (mut entries, mut bytes) = (Vec::new(), Vec::new());
     for chunk in chunks {
-        let damaged = || Ok(Err(format!("its index of the chunk at byte {} is damaged", chunk.chunk_start_offset)));
+        let damaged =
+            || Ok(Err(format!("its index of the chunk at byte {} is damaged", chunk.chunk_start_offset)));
         let Some(place) = chunk.chunk_start_offset.checked_add(chunk.chunk_length) else { return damaged() };
         if reader.check(place, chunk.message_index_length, "the message index").is_err() {
             return damaged();
@@ -283,8 +288,9 @@ fn scan_record(
         }
         op::CHUNK => {
             let walked = load_chunk(reader, place).and_then(|chunk| {
-                walk_chunk(&chunk, place, channels, entries)
-                    .map_err(|(at, field, value)| reader.damaged(place, format!("{field} at byte {at} of the chunk"), value))
+                walk_chunk(&chunk, place, channels, entries).map_err(|(at, field, value)| {
+                    reader.damaged(place, format!("{field} at byte {at} of the chunk"), value)
+                })
             });
             match walked {
                 Err(error @ BagError::Damaged { .. }) => return Ok(Step::Skip(error, next)),
@@ -406,7 +412,11 @@ pub(crate) fn message_in(chunk: &[u8], within: u32) -> Option<(u32, i64, Range<u
 }
 
 /// Channel and log time of the message at `place`, which is in no chunk; its bytes in `data`.
-pub(crate) fn message_at(reader: &mut FileReader, place: u64, data: &mut Vec<u8>) -> Result<Option<(u32, i64)>> {
+pub(crate) fn message_at(
+    reader: &mut FileReader,
+    place: u64,
+    data: &mut Vec<u8>,
+) -> Result<Option<(u32, i64)>> {
     let mut head = [0; RECORD_HEAD as usize + MESSAGE_HEAD];
     reader.read_at(place, &mut head, "a message")?;
     let Some(length) = u64_at(&head, 1).checked_sub(MESSAGE_HEAD as u64) else { return Ok(None) };

@@ -108,8 +108,9 @@ impl<'a> Image<'a> {
         (0..if row == 0 { 0 } else { self.height }).map(move |r| &data[r * step..][..row])
     }
 
-    /// Depth along the optical axis (meters), row by row; 0 where there is none. `None` for a picture that is no depth.
-    pub fn depth(&self) -> Option<Vec<f32>> {
+    /// Depth along the optical axis (meters), row by row; 0 where there is none. `units_per_meter`: of whole numbers, 1000 in
+    /// ROS (REP 118). `None` for a picture that is no depth.
+    pub fn depth(&self, units_per_meter: f64) -> Option<Vec<f32>> {
         let big = self.order == ByteOrder::Big;
         let two = |b: &[u8; 2]| if big { u16::from_be_bytes(*b) } else { u16::from_le_bytes(*b) };
         let four = |b: &[u8; 4]| if big { f32::from_be_bytes(*b) } else { f32::from_le_bytes(*b) };
@@ -117,7 +118,7 @@ impl<'a> Image<'a> {
             PixelFormat::Millimeters => self
                 .rows()
                 .flat_map(|r| r.as_chunks::<2>().0)
-                .map(|b| (f64::from(two(b)) / 1000.0) as f32)
+                .map(|b| (f64::from(two(b)) / units_per_meter) as f32)
                 .collect(),
             PixelFormat::Meters => self
                 .rows()

@@ -156,7 +156,7 @@ const IMAGE: &str = "sensor_msgs/msg/Image";
 
 #[test]
 fn pictures_of_every_format() {
-    let depth = |bytes: Vec<u8>| with(IMAGE, &bytes, |r| Ok(Image::of(r)?.depth().unwrap())).unwrap();
+    let depth = |bytes: Vec<u8>| with(IMAGE, &bytes, |r| Ok(Image::of(r)?.depth(1000.0).unwrap())).unwrap();
     let padded = [0xe8, 3, 0, 0, 9, 9, 0xd0, 7, 1, 0, 9, 9];
     assert_eq!(depth(image("16UC1", [2, 2], 6, false, &padded)), [1.0, 0.0, 2.0, 0.001]);
     assert_eq!(depth(image("mono16", [2, 1], 4, true, &[3, 0xe8, 0, 1])), [1.0, 0.001]);
@@ -175,7 +175,7 @@ fn pictures_of_every_format() {
         let bytes = image(encoding, [1, 1], data.len() as u32, false, data);
         with(IMAGE, &bytes, |r| {
             let image = Image::of(r)?;
-            assert_eq!((image.colors().unwrap(), image.depth()), (vec![expected], None), "{encoding}");
+            assert_eq!((image.colors().unwrap(), image.depth(1000.0)), (vec![expected], None), "{encoding}");
             Ok(())
         })
         .unwrap();
