@@ -123,7 +123,11 @@ impl Bag {
             head = read_head(&mut reader)?;
         }
         let refused = |reason: &str, advice: &str| {
-            Err(BagError::Refused { name: source.name().to_owned(), reason: reason.into(), advice: advice.into() })
+            Err(BagError::Refused {
+                name: source.name().to_owned(),
+                reason: reason.into(),
+                advice: advice.into(),
+            })
         };
         let allow = options.allow_truncated;
         let (index, container) = match ContainerKind::recognise(&head) {
@@ -170,7 +174,8 @@ impl Bag {
         }
         let mut refused: Vec<_> = refused.into_iter().collect();
         refused.sort_by_key(|(id, _)| *id);
-        let notes = refused.into_iter().map(|(_, (reason, n))| format!("{name}: {reason} ({n} messages left out)"));
+        let notes =
+            refused.into_iter().map(|(_, (reason, n))| format!("{name}: {reason} ({n} messages left out)"));
         self.notes.extend(notes);
     }
 
@@ -283,8 +288,12 @@ impl Bag {
             file.topics.get(&channel) == Some(&message.topic) && time == message.log_time
         };
         let chunk = match file.container {
-            Container::Mcap if message.within != NO_CHUNK => Some(self.chunk(file, message, mcap::load_chunk)?),
-            Container::RosBag if message.within != NO_CHUNK => Some(self.chunk(file, message, ros1::load_chunk)?),
+            Container::Mcap if message.within != NO_CHUNK => {
+                Some(self.chunk(file, message, mcap::load_chunk)?)
+            }
+            Container::RosBag if message.within != NO_CHUNK => {
+                Some(self.chunk(file, message, ros1::load_chunk)?)
+            }
             _ => None,
         };
         let packed = |bytes: &[u8]| {
@@ -440,6 +449,7 @@ fn unwritten(path: &Path, allowed: bool) -> Result<Option<String>> {
     if allowed {
         return Ok(Some(format!("{name}: {reason}: they are left out")));
     }
-    let advice = "finish it by `sqlite3 FILE 'PRAGMA wal_checkpoint'`, or leave them out by --allow-truncated".into();
+    let advice =
+        "finish it by `sqlite3 FILE 'PRAGMA wal_checkpoint'`, or leave them out by --allow-truncated".into();
     Err(BagError::Refused { name, reason, advice })
 }

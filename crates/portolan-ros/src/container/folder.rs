@@ -61,7 +61,8 @@ pub(super) fn files(path: &Path) -> Result<Files> {
     if !missing.is_empty() {
         files.notes.push(format!("{described} names {}, which is not there", missing.join(", ")));
     }
-    let unnamed: Vec<String> = there.iter().filter(|p| !files.paths.contains(p)).map(|p| file_name(p)).collect();
+    let unnamed: Vec<String> =
+        there.iter().filter(|p| !files.paths.contains(p)).map(|p| file_name(p)).collect();
     if !unnamed.is_empty() {
         files.notes.push(format!("{described} does not name {}: left out", unnamed.join(", ")));
     }
@@ -123,7 +124,9 @@ fn belongs(path: &Path, named: &str) -> bool {
 fn relative_file_paths(text: &str) -> Vec<String> {
     let clean = |item: &str| item.trim().trim_matches(|c| c == '"' || c == '\'').to_owned();
     let mut lines = text.lines().map(str::trim);
-    let Some(rest) = lines.find_map(|line| line.strip_prefix("relative_file_paths:")) else { return Vec::new() };
+    let Some(rest) = lines.find_map(|line| line.strip_prefix("relative_file_paths:")) else {
+        return Vec::new();
+    };
     if let Some(inline) = rest.trim().strip_prefix('[') {
         let items = inline.trim_end().trim_end_matches(']').split(',');
         return items.map(clean).filter(|item| !item.is_empty()).collect();

@@ -60,7 +60,8 @@ mod tests {
 
     #[test]
     fn durability_is_found_as_number_and_as_word() {
-        let profile = |d: &str| format!("- history: 3\n  depth: 0\n  durability: {d}\n  deadline:\n    sec: 1\n");
+        let profile =
+            |d: &str| format!("- history: 3\n  depth: 0\n  durability: {d}\n  deadline:\n    sec: 1\n");
         assert!(is_transient_local(&profile("1")) && is_transient_local(&profile("transient_local")));
         assert!(is_transient_local(&(profile("2") + &profile("1"))));
         for volatile in ["2", "volatile", "0", "12", ""] {

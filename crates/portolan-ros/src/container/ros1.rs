@@ -279,7 +279,8 @@ fn chunk_entries(
         let record = RecordHead::read(reader, place)?;
         place = record.end();
         let fields = record.fields();
-        let (Some(op::INDEX), Some(1), Some(channel)) = (fields.op(), fields.u32(b"ver"), fields.u32(b"conn"))
+        let (Some(op::INDEX), Some(1), Some(channel)) =
+            (fields.op(), fields.u32(b"ver"), fields.u32(b"conn"))
         else {
             return Ok(false);
         };
@@ -421,7 +422,11 @@ pub(crate) fn message_in(chunk: &[u8], within: u32) -> Option<(u32, i64, Range<u
 }
 
 /// Connection and log time of the message at `place`, which is in no chunk; its bytes in `data`.
-pub(crate) fn message_at(reader: &mut FileReader, place: u64, data: &mut Vec<u8>) -> Result<Option<(u32, i64)>> {
+pub(crate) fn message_at(
+    reader: &mut FileReader,
+    place: u64,
+    data: &mut Vec<u8>,
+) -> Result<Option<(u32, i64)>> {
     let record = RecordHead::read(reader, place)?;
     record.data(reader, data)?;
     let fields = record.fields();

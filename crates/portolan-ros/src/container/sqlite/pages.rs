@@ -181,7 +181,8 @@ impl Pages {
     /// The row `index` of a leaf.
     pub(super) fn cell(&self, reader: &FileReader, leaf: &Leaf, index: u32) -> Result<Cell> {
         let (bytes, at) = (&leaf.bytes, leaf.start());
-        let wrong = |what: &str| reader.damaged(self.place(leaf.number), format!("{what} of row {index}"), "damaged");
+        let wrong =
+            |what: &str| reader.damaged(self.place(leaf.number), format!("{what} of row {index}"), "damaged");
         let cells = u32::from(u16::from_be_bytes([bytes[at + 3], bytes[at + 4]]));
         let pointer = at + 8 + 2 * index as usize;
         if bytes[at] != LEAF || index >= cells || pointer + 2 > self.usable as usize {
@@ -225,7 +226,11 @@ impl Pages {
         out.clear();
         let place = self.place(leaf.number);
         if range.end > cell.payload || range.start > range.end {
-            return Err(reader.damaged(place, "the length of a column", format!("{range:?} of {}", cell.payload)));
+            return Err(reader.damaged(
+                place,
+                "the length of a column",
+                format!("{range:?} of {}", cell.payload),
+            ));
         }
         let local = cell.local.len() as u64;
         if range.start < local {

@@ -48,9 +48,15 @@ pub(super) fn varint(bytes: &[u8]) -> Option<(i64, usize)> {
 }
 
 /// The columns of a row, as many as the row has: a column that was added to the table later is missing in older rows.
-pub(super) fn columns(pages: &Pages, reader: &mut FileReader, leaf: &Leaf, cell: &Cell) -> Result<Vec<Column>> {
+pub(super) fn columns(
+    pages: &Pages,
+    reader: &mut FileReader,
+    leaf: &Leaf,
+    cell: &Cell,
+) -> Result<Vec<Column>> {
     let mut head = Vec::new();
-    let wrong = |reader: &FileReader| reader.damaged(pages.place(leaf.number()), "the header of a row", "damaged");
+    let wrong =
+        |reader: &FileReader| reader.damaged(pages.place(leaf.number()), "the header of a row", "damaged");
     pages.payload(reader, leaf, cell, 0..cell.payload.min(9), &mut head)?;
     let (size, first) = varint(&head).ok_or_else(|| wrong(reader))?;
     let size = u64::try_from(size).ok().filter(|s| *s <= cell.payload).ok_or_else(|| wrong(reader))?;

@@ -46,34 +46,45 @@ pub(crate) fn index(reader: &mut FileReader, allow_damage: bool) -> Result<(File
     index.channels = read_topics(&pages, reader, topics, &definitions, &mut damage)?;
     let column = |name: &str| {
         messages.column(name).ok_or_else(|| {
-            reader.wrong(pages.place(messages.root), "the table `messages`", format!("without {name}"), "not a rosbag2")
+            reader.wrong(
+                pages.place(messages.root),
+                "the table `messages`",
+                format!("without {name}"),
+                "not a rosbag2",
+            )
         })
     };
-    let layout = Layout { pages, topic: column("topic_id")?, time: column("timestamp")?, data: column("data")? };
+    let layout =
+        Layout { pages, topic: column("topic_id")?, time: column("timestamp")?, data: column("data")? };
     let known: HashMap<u32, ()> = index.channels.iter().map(|c| (c.id, ())).collect();
     let mut data = Vec::new();
     let mut entries = Vec::new();
     let mut lost = Damage { allowed: allow_damage, first: None, pages: 0, rows: 0 };
-    pages.leaves(reader, messages.root, |error| damage.page(error), |reader, leaf, rows| {
-        for row in 0..rows {
-            let found = layout.row(reader, leaf, row).and_then(|(channel, log_time, ..)| {
-                if !known.contains_key(&channel) {
-                    let place = pages.place(leaf.number());
-                    return Err(reader.damaged(place, format!("the topic of row {row}"), channel));
+    pages.leaves(
+        reader,
+        messages.root,
+        |error| damage.page(error),
+        |reader, leaf, rows| {
+            for row in 0..rows {
+                let found = layout.row(reader, leaf, row).and_then(|(channel, log_time, ..)| {
+                    if !known.contains_key(&channel) {
+                        let place = pages.place(leaf.number());
+                        return Err(reader.damaged(place, format!("the topic of row {row}"), channel));
+                    }
+                    if allow_damage {
+                        // What the index has can be read later.
+                        layout.read_from(reader, leaf, row, &mut data)?;
+                    }
+                    Ok(Entry { channel, log_time, place: leaf.number(), within: row })
+                });
+                match found {
+                    Ok(entry) => entries.push(entry),
+                    Err(error) => lost.row(error)?,
                 }
-                if allow_damage {
-                    // What the index has can be read later.
-                    layout.read_from(reader, leaf, row, &mut data)?;
-                }
-                Ok(Entry { channel, log_time, place: leaf.number(), within: row })
-            });
-            match found {
-                Ok(entry) => entries.push(entry),
-                Err(error) => lost.row(error)?,
             }
-        }
-        Ok(())
-    })?;
+            Ok(())
+        },
+    )?;
     damage.pages += lost.pages;
     damage.rows += lost.rows;
     index.entries = entries;
@@ -178,22 +189,27 @@ fn rows<const N: usize>(
     mut take: impl FnMut(&FileReader, u64, [Value; N]) -> Result<()>,
 ) -> Result<()> {
     let places = names.map(|name| table.column(name));
-    pages.leaves(reader, table.root, |error| damage.page(error), |reader, leaf, count| {
-        for row in 0..count {
-            let cell = pages.cell(reader, leaf, row)?;
-            let found = columns(pages, reader, leaf, &cell)?;
-            let mut values = [const { Value::Null }; N];
-            for (slot, place) in values.iter_mut().zip(places) {
-                let Some(place) = place else { continue };
-                *slot = value(pages, reader, leaf, &cell, found.get(place))?;
-                if *slot == Value::Null && table.is_rowid(place) {
-                    *slot = Value::Integer(cell.rowid);
+    pages.leaves(
+        reader,
+        table.root,
+        |error| damage.page(error),
+        |reader, leaf, count| {
+            for row in 0..count {
+                let cell = pages.cell(reader, leaf, row)?;
+                let found = columns(pages, reader, leaf, &cell)?;
+                let mut values = [const { Value::Null }; N];
+                for (slot, place) in values.iter_mut().zip(places) {
+                    let Some(place) = place else { continue };
+                    *slot = value(pages, reader, leaf, &cell, found.get(place))?;
+                    if *slot == Value::Null && table.is_rowid(place) {
+                        *slot = Value::Integer(cell.rowid);
+                    }
                 }
+                take(reader, pages.place(leaf.number()), values)?;
             }
-            take(reader, pages.place(leaf.number()), values)?;
-        }
-        Ok(())
-    })
+            Ok(())
+        },
+    )
 }
 
 /// Language and text of the definition of each type.
@@ -232,8 +248,16 @@ fn read_topics(
             // The first rosbag2 had no such column and no other format.
             Value::Null => Ok(Encoding::Cdr),
             Value::Text(f) if f == "cdr" || f.is_empty() => Ok(Encoding::Cdr),
-            Value::Text(other) => Err(format!("{name}: its messages are written as {other:?}, which is not read")),
-            other => return Err(reader.damaged(place, "the serialization format of a topic", format!("{other:?}"))),
+            Value::Text(other) => {
+                Err(format!("{name}: its messages are written as {other:?}, which is not read"))
+            }
+            other => {
+                return Err(reader.damaged(
+                    place,
+                    "the serialization format of a topic",
+                    format!("{other:?}"),
+                ));
+            }
         };
         let topic = topic.and_then(|encoding| {
             let none = (String::new(), String::new());

@@ -143,7 +143,9 @@ mod tests {
     #[test]
     fn columns_are_found_in_any_spelling() {
         let names = |sql: &str| column_names(sql).map(|(n, r)| (n.join(" "), r));
-        let is = |sql: &str, columns: &str, rowid| assert_eq!(names(sql), Some((columns.to_owned(), rowid)), "{sql}");
+        let is = |sql: &str, columns: &str, rowid| {
+            assert_eq!(names(sql), Some((columns.to_owned(), rowid)), "{sql}")
+        };
         is(
             "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,timestamp INTEGER NOT NULL, data BLOB NOT NULL)",
             "id topic_id timestamp data",
