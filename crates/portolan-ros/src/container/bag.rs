@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use super::cache::ChunkCache;
 use super::index::{Channel, FileIndex, NO_CHUNK};
 use super::kind::ContainerKind;
-use super::reader::{CUT, FileReader};
+use super::reader::{CUT, FileReader, one_line};
 use super::source::{FileSource, Source};
 use super::topic::{Encoding, MessageRef, Topic};
 use super::unpack::{Packing, UNPACKED_LIMIT, Unpacked, ZSTD_MAGIC};
@@ -150,7 +150,7 @@ impl Bag {
 
     fn take_index(&mut self, file: &mut BagFile, index: FileIndex) {
         let name = file.source.name();
-        self.notes.extend(index.notes.into_iter().map(|note| format!("{name}: {note}")));
+        self.notes.extend(index.notes.into_iter().map(|note| format!("{name}: {}", one_line(&note))));
         let mut refused = HashMap::new();
         for Channel { id, topic } in index.channels {
             match topic {
@@ -174,8 +174,9 @@ impl Bag {
         }
         let mut refused: Vec<_> = refused.into_iter().collect();
         refused.sort_by_key(|(id, _)| *id);
-        let notes =
-            refused.into_iter().map(|(_, (reason, n))| format!("{name}: {reason} ({n} messages left out)"));
+        let notes = refused
+            .into_iter()
+            .map(|(_, (reason, n))| format!("{name}: {} ({n} messages left out)", one_line(&reason)));
         self.notes.extend(notes);
     }
 
