@@ -199,7 +199,7 @@ impl Summary {
         if counts.iter().any(|(id, n)| statistics.channel_message_counts.get(id).is_some_and(|m| m != n)) {
             return Ok(Err("its index contradicts its counts".into()));
         }
-        if let Some(id) = counts.keys().find(|id| !channels.records.contains_key(id)) {
+        if let Some(id) = counts.keys().filter(|id| !channels.records.contains_key(id)).min() {
             return Ok(Err(format!("its index lacks channel {id}")));
         }
         Ok(Ok(FileIndex { channels: channels.found, entries, notes: Vec::new() }))

@@ -133,6 +133,17 @@ fn single_messages_may_be_compressed() {
     let packed =
         run.iter().map(|(n, t, b)| (n.clone(), *t, pack(Some(Packing::Zstd), b))).collect::<Vec<_>>();
     holds(&open(&[&built(&packed, 6, None).0], false).unwrap(), &run);
+    let mut damaged = packed;
+    damaged[7].2.truncate(20);
+    let file = built(&damaged, 6, None).0;
+    says(content(&open(&[&file], false).unwrap()), "a compressed message is damaged zstd data");
+    let bag = open(&[&file], true).unwrap();
+    assert!(
+        bag.notes().len() == 1 && bag.notes()[0].ends_with("1 messages like it are left out"),
+        "{:?}",
+        bag.notes()
+    );
+    holds(&bag, &[&run[..7], &run[8..]].concat());
 }
 
 #[test]
