@@ -216,15 +216,14 @@ fn the_same_map_gives_the_same_bytes() {
 /// By definitions of their own (rosbags) and by those of the file (mcap-ros2-support).
 const ROSBAGS: &str = "
 import sys
-from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from rosbags.rosbag2.storage_mcap import McapReader
 from pathlib import Path
 store = get_typestore(Stores.ROS2_HUMBLE)
-reader = McapReader([Path(sys.argv[1])], [])
+reader = McapReader(Path(sys.argv[1]))
 reader.open()
 seen = {}
-for connection, time, data in reader.messages(None):
+for connection, time, data in reader.messages(reader.connections):
     seen[connection.topic] = store.deserialize_cdr(data, connection.msgtype)
     assert time == 0
     assert connection.ext.offered_qos_profiles[0].durability.name == 'TRANSIENT_LOCAL'
