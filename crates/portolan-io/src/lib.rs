@@ -13,6 +13,7 @@
 //! | 3-D poses (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
 //! | logs of 3-D scans with poses | [`scan_log::ScanLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
 //! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`]; its chunks: [`ContainerWriter`] |
+//! | messages of ROS 2 in MCAP | | of a map: [`write_map_mcap`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | costs of Nav2, as a map_server map | | [`write_costmap`] |
@@ -46,6 +47,7 @@ mod kitti_bin;
 mod laser_log;
 mod log_writer;
 mod map_file;
+mod map_messages;
 mod map_server;
 mod mesh;
 mod numpy;
@@ -83,6 +85,7 @@ pub use map_file::{
     AttenuationBricks, ColorBricks, MapFile, MapHeader, OccupancyBricks, TsdfBricks, map_dimension, sweep_of,
     sweep_word, weights_of, weights_word,
 };
+pub use map_messages::{MapMessages, write_map_mcap};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{
     MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, parse_mesh_counts, ply_mesh_to_bytes, write_glb,

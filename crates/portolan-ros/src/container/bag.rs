@@ -6,9 +6,9 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use super::cache::ChunkCache;
-use super::index::{Channel, FileIndex, NO_CHUNK};
+use super::index::{Channel, FileIndex, NO_CHUNK, told};
 use super::kind::ContainerKind;
-use super::reader::{CUT, FileReader};
+use super::reader::{CUT, FileReader, one_line};
 use super::source::{FileSource, Source};
 use super::topic::{Encoding, MessageRef, Topic};
 use super::unpack::{Packing, UNPACKED_LIMIT, Unpacked, ZSTD_MAGIC};
@@ -109,6 +109,15 @@ impl Bag {
         for source in sources {
             bag.add(source, options)?;
         }
+        if options.allow_truncated {
+            bag.keep_readable()?;
+        }
+        for message in &bag.messages {
+            let count = &mut bag.counts[message.topic as usize];
+            let (first, last) = count.log_times.unwrap_or((message.log_time, message.log_time));
+            count.log_times = Some((first.min(message.log_time), last.max(message.log_time)));
+            count.messages += 1;
+        }
         Ok(bag)
     }
 
@@ -150,7 +159,7 @@ impl Bag {
 
     fn take_index(&mut self, file: &mut BagFile, index: FileIndex) {
         let name = file.source.name();
-        self.notes.extend(index.notes.into_iter().map(|note| format!("{name}: {note}")));
+        self.notes.extend(index.notes.into_iter().map(|note| format!("{name}: {}", one_line(&note))));
         let mut refused = HashMap::new();
         for Channel { id, topic } in index.channels {
             match topic {
@@ -165,18 +174,38 @@ impl Bag {
                 refused.entry(entry.channel).and_modify(|(_, n)| *n += 1);
                 continue;
             };
-            let count = &mut self.counts[topic as usize];
-            let (first, last) = count.log_times.unwrap_or((entry.log_time, entry.log_time));
-            count.log_times = Some((first.min(entry.log_time), last.max(entry.log_time)));
-            count.messages += 1;
             let (log_time, place, within) = (entry.log_time, entry.place, entry.within);
             self.messages.push(MessageRef { topic, log_time, file: number, place, within });
         }
         let mut refused: Vec<_> = refused.into_iter().collect();
         refused.sort_by_key(|(id, _)| *id);
-        let notes =
-            refused.into_iter().map(|(_, (reason, n))| format!("{name}: {reason} ({n} messages left out)"));
+        let notes = refused
+            .into_iter()
+            .map(|(_, (reason, n))| format!("{name}: {} ({n} messages left out)", one_line(&reason)));
         self.notes.extend(notes);
+    }
+
+    /// Takes messages that cannot be read out of the index and tells how many.
+    fn keep_readable(&mut self) -> Result<()> {
+        let (mut first, mut lost, mut scratch) = (None, 0, Vec::new());
+        let mut kept = Vec::with_capacity(self.messages.len());
+        for message in &self.messages {
+            match self.with_message(message, &mut scratch, |_, _| ()) {
+                Ok(()) => kept.push(*message),
+                Err(error @ BagError::Damaged { .. }) => {
+                    lost += 1;
+                    first.get_or_insert(error);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        self.messages = kept;
+        if let Some(error) = first {
+            let name = if let BagError::Damaged { name, .. } = &error { name } else { "" };
+            let what = format!("{lost} messages like it are left out");
+            self.notes.push(format!("{name}: {}", one_line(&told(&error, &what))));
+        }
+        Ok(())
     }
 
     /// The index of a topic, which is added where there is none like it.

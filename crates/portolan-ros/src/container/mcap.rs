@@ -23,7 +23,9 @@ const MESSAGE_HEAD: usize = 22;
 /// damage is allowed the whole file is read in any case, so that what the index has can be read later.
 pub(crate) fn index(reader: &mut FileReader, allow_damage: bool) -> Result<FileIndex> {
     if allow_damage {
-        return scan(reader, true);
+        // Channels are known from there also where the chunk that introduces them is damaged.
+        let known = summary(reader).ok().and_then(|s| s.ok()).map(|s| s.channels);
+        return scan(reader, known.unwrap_or_default(), true);
     }
     let mut end = [0; 8];
     let end_at = reader.size().saturating_sub(8).max(8);
@@ -31,10 +33,14 @@ pub(crate) fn index(reader: &mut FileReader, allow_damage: bool) -> Result<FileI
     if end != MAGIC {
         return Err(reader.damaged(end_at, "the closing magic", format!("{:02x?}", end)));
     }
-    match summary(reader)? {
+    let index = match summary(reader)? {
+        Ok(summary) => summary.index(reader)?,
+        Err(reason) => Err(reason),
+    };
+    match index {
         Ok(index) => Ok(index),
         Err(reason) => {
-            let mut index = scan(reader, false)?;
+            let mut index = scan(reader, Channels::default(), false)?;
             index.notes.insert(0, format!("{reason}: the whole file was read to find its messages"));
             Ok(index)
         }
@@ -119,8 +125,15 @@ fn topic(channel: &records::Channel, schema: Option<&(String, String, String)>) 
     })
 }
 
-/// The index that the file has itself; the reason where it cannot be used.
-fn summary(reader: &mut FileReader) -> Result<Result<FileIndex, String>> {
+/// What the end of the file says of it.
+struct Summary {
+    channels: Channels,
+    chunks: Vec<records::ChunkIndex>,
+    statistics: Option<records::Statistics>,
+}
+
+/// The summary that the file has; the reason where it cannot be used.
+fn summary(reader: &mut FileReader) -> Result<Result<Summary, String>> {
     let (footer_at, mut bytes) = (reader.size().saturating_sub(8 + 20 + RECORD_HEAD), Vec::new());
     reader.bytes_at(footer_at, RECORD_HEAD + 20, &mut bytes, "the footer")?;
     if bytes[0] != op::FOOTER || u64_at(&bytes, 1) != 20 {
@@ -165,24 +178,32 @@ fn summary(reader: &mut FileReader) -> Result<Result<FileIndex, String>> {
             return Ok(Err(format!("its index is damaged ({field} is {value})")));
         }
     }
-    let Some(statistics) = statistics else { return Ok(Err("its index has no counts".into())) };
-    let entries = match entries(reader, chunks)? {
-        Ok(entries) => entries,
-        Err(reason) => return Ok(Err(reason)),
-    };
-    let mut counts: HashMap<u16, u64> = HashMap::new();
-    entries.iter().for_each(|e| *counts.entry(e.channel as u16).or_default() += 1);
-    let said: u64 = statistics.message_count;
-    if entries.len() as u64 != said {
-        return Ok(Err(format!("its index has {} messages of {said}", entries.len())));
+    Ok(Ok(Summary { channels, chunks, statistics }))
+}
+
+impl Summary {
+    /// The index that the summary gives; the reason where it contradicts itself.
+    fn index(self, reader: &mut FileReader) -> Result<Result<FileIndex, String>> {
+        let Self { channels, chunks, statistics } = self;
+        let Some(statistics) = statistics else { return Ok(Err("its index has no counts".into())) };
+        let entries = match entries(reader, chunks)? {
+            Ok(entries) => entries,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        let mut counts: HashMap<u16, u64> = HashMap::new();
+        entries.iter().for_each(|e| *counts.entry(e.channel as u16).or_default() += 1);
+        let said: u64 = statistics.message_count;
+        if entries.len() as u64 != said {
+            return Ok(Err(format!("its index has {} messages of {said}", entries.len())));
+        }
+        if counts.iter().any(|(id, n)| statistics.channel_message_counts.get(id).is_some_and(|m| m != n)) {
+            return Ok(Err("its index contradicts its counts".into()));
+        }
+        if let Some(id) = counts.keys().filter(|id| !channels.records.contains_key(id)).min() {
+            return Ok(Err(format!("its index lacks channel {id}")));
+        }
+        Ok(Ok(FileIndex { channels: channels.found, entries, notes: Vec::new() }))
     }
-    if counts.iter().any(|(id, n)| statistics.channel_message_counts.get(id).is_some_and(|m| m != n)) {
-        return Ok(Err("its index contradicts its counts".into()));
-    }
-    if let Some(id) = counts.keys().find(|id| !channels.records.contains_key(id)) {
-        return Ok(Err(format!("its index lacks channel {id}")));
-    }
-    Ok(Ok(FileIndex { channels: channels.found, entries, notes: Vec::new() }))
 }
 
 /// The messages of the chunks, by the message index after each.
@@ -223,8 +244,8 @@ fn entries(
 
 /// Reads the whole file. Without `allow_damage` the first damage is the error; with it a damaged chunk is left out and
 /// told, and a damaged record outside of chunks, whose length cannot be trusted, ends the file.
-fn scan(reader: &mut FileReader, allow_damage: bool) -> Result<FileIndex> {
-    let (mut index, mut channels) = (FileIndex::default(), Channels::default());
+fn scan(reader: &mut FileReader, mut channels: Channels, allow_damage: bool) -> Result<FileIndex> {
+    let mut index = FileIndex::default();
     let mut place = 8;
     let mut ended = false;
     while !ended {

@@ -9,6 +9,11 @@ use crate::{BagError, Result};
 pub(crate) const CUT: &str =
     "the file is cut off or damaged: record or copy it again, or map what could be read by --allow-truncated";
 
+/// Text of a file as part of a line.
+pub(crate) fn one_line(text: &str) -> String {
+    text.replace(char::is_control, " ")
+}
+
 /// A reader of one file of a bag.
 pub(crate) struct FileReader {
     name: String,
@@ -46,8 +51,8 @@ impl FileReader {
         value: impl ToString,
         advice: impl Into<String>,
     ) -> BagError {
-        let (name, value) = (self.name.clone(), value.to_string());
-        BagError::Damaged { name, offset, field: field.into(), value, advice: advice.into() }
+        let (name, value) = (self.name.clone(), one_line(&value.to_string()));
+        BagError::Damaged { name, offset, field: one_line(&field.into()), value, advice: advice.into() }
     }
 
     /// The error of a value that can only come from damage.

@@ -89,7 +89,7 @@ impl Pages {
 
     /// The first byte of a page, for errors.
     pub(super) fn place(&self, number: u64) -> u64 {
-        number.saturating_sub(1) * self.size
+        number.saturating_sub(1).saturating_mul(self.size)
     }
 
     fn page(&self, reader: &mut FileReader, number: u64, bytes: &mut Vec<u8>) -> Result<()> {
@@ -102,7 +102,8 @@ impl Pages {
 
     /// Brings a page of a table into `leaf`.
     pub(super) fn leaf(&self, reader: &mut FileReader, number: u64, leaf: &mut Leaf) -> Result<()> {
-        if leaf.number != number {
+        // 0 is the number of a leaf that was never read, and of no page.
+        if leaf.number != number || number == 0 {
             leaf.number = 0;
             self.page(reader, number, &mut leaf.bytes)?;
             leaf.number = number;

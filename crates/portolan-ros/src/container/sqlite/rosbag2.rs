@@ -57,7 +57,6 @@ pub(crate) fn index(reader: &mut FileReader, allow_damage: bool) -> Result<(File
     let layout =
         Layout { pages, topic: column("topic_id")?, time: column("timestamp")?, data: column("data")? };
     let known: HashMap<u32, ()> = index.channels.iter().map(|c| (c.id, ())).collect();
-    let mut data = Vec::new();
     let mut entries = Vec::new();
     let mut lost = Damage { allowed: allow_damage, first: None, pages: 0, rows: 0 };
     pages.leaves(
@@ -70,10 +69,6 @@ pub(crate) fn index(reader: &mut FileReader, allow_damage: bool) -> Result<(File
                     if !known.contains_key(&channel) {
                         let place = pages.place(leaf.number());
                         return Err(reader.damaged(place, format!("the topic of row {row}"), channel));
-                    }
-                    if allow_damage {
-                        // What the index has can be read later.
-                        layout.read_from(reader, leaf, row, &mut data)?;
                     }
                     Ok(Entry { channel, log_time, place: leaf.number(), within: row })
                 });
@@ -136,19 +131,9 @@ impl Layout {
         data: &mut Vec<u8>,
     ) -> Result<(u32, i64)> {
         self.pages.leaf(reader, place, leaf)?;
-        self.read_from(reader, leaf, within, data)
-    }
-
-    fn read_from(
-        &self,
-        reader: &mut FileReader,
-        leaf: &Leaf,
-        row: u32,
-        data: &mut Vec<u8>,
-    ) -> Result<(u32, i64)> {
-        let (channel, time, cell, columns) = self.row(reader, leaf, row)?;
+        let (channel, time, cell, columns) = self.row(reader, leaf, within)?;
         let column = columns.get(self.data).filter(|c| c.is_data()).ok_or_else(|| {
-            reader.damaged(self.pages.place(leaf.number()), format!("the data of row {row}"), "not bytes")
+            reader.damaged(self.pages.place(leaf.number()), format!("the data of row {within}"), "not bytes")
         })?;
         self.pages.payload(reader, leaf, &cell, column.bytes.clone(), data)?;
         Ok((channel, time))
