@@ -8,7 +8,7 @@ use portolan_io::scan_log::{Intrinsics, ScanLog, ScanLogKind, ScanLogOptions};
 use portolan_io::{BagChoice, FileKind, LaserLog, bag_dimension, detect, detect_no_return};
 use serde::{Deserialize, Serialize};
 
-use crate::arguments::{finite, length, length_or_zero, or_zero, point3};
+use crate::arguments::{finite, length, length_or_zero, or_zero, point3, seconds};
 use crate::dimension::{Dimension, ONLY_2D, ONLY_3D};
 use crate::error::bad_call;
 
@@ -88,6 +88,10 @@ pub(crate) struct BagArgs {
     /// Bags: frame that --pose-topic poses [default: what its messages say, else base_link or base_footprint, else the sensor]
     #[arg(long, value_name = "FRAME", conflicts_with = "poses")]
     pub(crate) base_frame: Option<String>,
+    /// Bags: added to the stamps of scans before their poses are looked up (seconds) [default: 0; half a turn back for lasers
+    /// whose stamps are of the end of a turn, which is told]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    pub(crate) time_offset: Option<f64>,
     /// Bags: use what can be read of a bag that is cut or damaged
     #[arg(long)]
     pub(crate) allow_truncated: bool,
@@ -96,8 +100,8 @@ pub(crate) struct BagArgs {
 impl BagArgs {
     /// As the reader takes it.
     pub(crate) fn choice(&self) -> BagChoice {
-        let Self { topics, pose_topic, fixed_frame, base_frame, allow_truncated } = self.clone();
-        BagChoice { topics, pose_topic, fixed_frame, base_frame, allow_truncated }
+        let Self { topics, pose_topic, fixed_frame, base_frame, time_offset, allow_truncated } = self.clone();
+        BagChoice { topics, pose_topic, fixed_frame, base_frame, time_offset, allow_truncated }
     }
 
     /// The first option that was given.
@@ -107,6 +111,7 @@ impl BagArgs {
             (self.pose_topic.is_some(), "--pose-topic"),
             (self.fixed_frame.is_some(), "--fixed-frame"),
             (self.base_frame.is_some(), "--base-frame"),
+            (self.time_offset.is_some(), "--time-offset"),
             (self.allow_truncated, "--allow-truncated"),
         ]
         .into_iter()

@@ -50,7 +50,7 @@ pub(crate) fn open_bag(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let numbers: Vec<u32> = sensors.names.iter().flat_map(|name| contents.numbers(name)).collect();
     let decoders = contents.decoders(&numbers)?;
     decoders.notes(&mut stats.notes);
-    let mut scans = scan_messages(&contents, &numbers, &decoders, &mut stats)?;
+    let mut scans = scan_messages(&contents, &numbers, &decoders, options.bag.time_offset, &mut stats)?;
     let poses = match &options.poses {
         Some(file) => {
             stats.poses = file.display().to_string();
@@ -90,6 +90,7 @@ fn scan_messages(
     contents: &Contents,
     numbers: &[u32],
     decoders: &Decoders,
+    time_offset: Option<f64>,
     stats: &mut BagLogStats,
 ) -> Result<Vec<ScanMessage>> {
     let mut scans: Vec<ScanMessage> = Vec::new();
@@ -117,6 +118,8 @@ fn scan_messages(
     if unstamped > 0 {
         stats.notes.push(format!("{unstamped} scans have the stamp 0: the time of their recording is taken"));
     }
+    let offset = time_offset.map_or(0, |s| (s * 1e9).round() as i64);
+    scans.iter_mut().for_each(|s| s.header.stamp = s.header.stamp.saturating_add(offset));
     scans.sort_by_key(|s| s.message.log_time);
     for scan in &scans {
         if !stats.sensor_frames.contains(&scan.header.frame) {

@@ -42,15 +42,34 @@ impl LaserLog {
             notes: contents.bag.notes().to_vec(),
             ..BagLogStats::default()
         };
-        let numbers: Vec<u32> = sensors.names.iter().flat_map(|name| contents.numbers(name)).collect();
-        let scans = read_scans(&contents, &numbers, &mut stats)?;
+        let mut scans = Vec::new();
+        for name in &sensors.names {
+            let mut of_topic = read_scans(&contents, name, &mut stats)?;
+            // A file's poses have the stamps of the scans that they were made of.
+            let guess = options.poses.is_none();
+            move_in_time(&mut of_topic, name, options.bag.time_offset, guess, &mut stats);
+            scans.append(&mut of_topic);
+        }
+        scans.sort_by_key(|s| s.log_time);
+        let readings: usize = scans.iter().map(|s| s.scan.ranges.len()).sum();
+        if readings > MOST_READINGS || scans.len() > MOST_SCANS {
+            let value = format!("over {MOST_READINGS} readings or {MOST_SCANS} scans");
+            return Err(IoError::layout(path, "the log", value, "split the bag into parts"));
+        }
         let poses = Poses::new(&contents, options, scans.len(), &mut stats)?;
         Reading::default().run(&contents, &scans, &poses, stats)
     }
 }
 
-/// All scans of these topics, in the order of their log times.
-fn read_scans(contents: &Contents, numbers: &[u32], stats: &mut BagLogStats) -> Result<Vec<LaserScan>> {
+/// A scan, and when it was recorded (nanoseconds).
+struct Recorded {
+    scan: LaserScan,
+    log_time: i64,
+}
+
+/// All scans of a topic, in the order of their log times.
+fn read_scans(contents: &Contents, name: &str, stats: &mut BagLogStats) -> Result<Vec<Recorded>> {
+    let numbers = &contents.numbers(name)[..];
     let decoders = contents.decoders(numbers)?;
     decoders.notes(&mut stats.notes);
     let mut scans = Vec::new();
@@ -82,11 +101,11 @@ fn read_scans(contents: &Contents, numbers: &[u32], stats: &mut BagLogStats) -> 
             stats.sensor_frames.push(scan.header.frame.clone());
         }
         readings += scan.ranges.len();
-        if readings > MOST_READINGS || scans.len() >= MOST_SCANS {
-            let value = format!("over {MOST_READINGS} readings or {MOST_SCANS} scans");
+        if readings > MOST_READINGS {
+            let value = format!("over {MOST_READINGS} readings");
             return Err(IoError::layout(&contents.path, "the log so far", value, "split the bag into parts"));
         }
-        scans.push(scan);
+        scans.push(Recorded { scan, log_time: message.log_time });
     }
     if unstamped > 0 {
         stats.notes.push(format!("{unstamped} scans have the stamp 0: the time of their recording is taken"));
@@ -95,6 +114,53 @@ fn read_scans(contents: &Contents, numbers: &[u32], stats: &mut BagLogStats) -> 
         stats.guesses.push("of several echoes of a beam the first is taken".into());
     }
     Ok(scans)
+}
+
+/// The earliest stamp that is of the world's clock and not of a simulation (nanoseconds): the year 2001.
+const WORLD_CLOCK: i64 = 1_000_000_000_000_000_000;
+
+/// Moves stamps by what was asked for, or by half a turn where they are of the end of one.
+///
+/// The stamp of a `LaserScan` is the time of its first ray. Drivers that make it of a turning lidar's cloud stamp it at the end, and
+/// then it is recorded sooner after its stamp than the turn takes, which a turn that begins there cannot be. The pose in the
+/// middle of the turn is the best single one. Simulated lasers have no such time: their stamps are of another clock.
+fn move_in_time(
+    scans: &mut [Recorded],
+    name: &str,
+    asked: Option<f64>,
+    guess: bool,
+    stats: &mut BagLogStats,
+) {
+    let offset = asked.or_else(|| {
+        let offset = turn_before_stamp(scans).filter(|_| guess)?;
+        stats.guesses.push(format!(
+            "scans of {name} are recorded before a turn after their stamp could end: poses are those of {:.0} ms before it, \
+             the middle of the turn (--time-offset)",
+            -1e3 * offset
+        ));
+        Some(offset)
+    });
+    let nanoseconds = offset.map_or(0, |s| (s * 1e9).round() as i64);
+    scans.iter_mut().for_each(|s| s.scan.header.stamp = s.scan.header.stamp.saturating_add(nanoseconds));
+}
+
+/// Minus half a turn (seconds), where stamps are of the end of a turn.
+fn turn_before_stamp(scans: &[Recorded]) -> Option<f64> {
+    let silent = |s: &LaserScan| {
+        let whole = s.angle_increment.abs() * s.ranges.len() as f64 > 0.95 * std::f64::consts::TAU;
+        s.time_increment == 0.0 && s.scan_time == 0.0 && s.header.stamp > WORLD_CLOCK && whole
+    };
+    if !scans.iter().all(|s| silent(&s.scan)) {
+        return None;
+    }
+    let median = |mut all: Vec<i64>| {
+        all.sort_unstable();
+        all.get(all.len() / 2).map(|ns| *ns as f64 * 1e-9)
+    };
+    let period = median(scans.windows(2).map(|w| w[1].scan.header.stamp - w[0].scan.header.stamp).collect())?;
+    let delay = median(scans.iter().map(|s| s.log_time - s.scan.header.stamp).collect())?;
+    // Slower than once in a second no lidar turns: scans were left out.
+    (period > 0.0 && period <= 1.0 && delay >= 0.0 && delay < 0.5 * period).then_some(-0.5 * period)
 }
 
 /// Whether the numbers of a scan can be.
@@ -170,11 +236,11 @@ impl Reading {
     fn run(
         mut self,
         contents: &Contents,
-        scans: &[LaserScan],
+        scans: &[Recorded],
         poses: &Poses,
         mut stats: BagLogStats,
     ) -> Result<LaserLog> {
-        for (i, scan) in scans.iter().enumerate() {
+        for (i, Recorded { scan, .. }) in scans.iter().enumerate() {
             let frame = &scan.header.frame;
             let found = match poses {
                 Poses::Counted(all) => Ok((all[i], false)),

@@ -16,14 +16,18 @@ mod choice;
 mod clouds;
 mod contents;
 mod frames;
+mod info;
 mod lasers;
 mod pictures;
 mod pose_source;
 mod sensors;
 mod stats;
+#[cfg(test)]
+mod tests;
 
 pub use choice::BagChoice;
 pub(crate) use contents::{Contents, is_bag};
 pub(crate) use frames::open_bag;
+pub use info::{BagInfo, EdgeOfBag, TopicOfBag};
 pub use sensors::bag_dimension;
 pub use stats::BagLogStats;

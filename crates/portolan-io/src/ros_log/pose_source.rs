@@ -129,6 +129,16 @@ impl PoseSource {
         Ok(Self { tree, fixed, topic, tolerance })
     }
 
+    /// The tree of frames.
+    pub(crate) fn tree(&self) -> &FrameTree {
+        &self.tree
+    }
+
+    /// The topic that has the poses; `None`: the tree has them.
+    pub(crate) fn topic(&self) -> Option<&str> {
+        self.topic.as_ref().map(|t| &*t.name)
+    }
+
     /// The pose of a frame in the fixed frame at a stamp (nanoseconds).
     pub(crate) fn at(&self, sensor: &str, stamp: i64) -> Result<Pose<3>, NoPose> {
         let lookup = |target: &str, source: &str| {
