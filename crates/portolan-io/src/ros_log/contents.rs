@@ -1,6 +1,7 @@
 //! An opened bag: the kinds of its topics, and its tree of frames.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use portolan_ros::container::{Bag, BagOptions, ContainerKind, MessageRef};
 use portolan_ros::message::{Decoder, MessageKind, Record, transforms};
@@ -15,6 +16,8 @@ pub(crate) struct Contents {
     pub(crate) bag: Bag,
     /// Of each topic; `None`: its messages are not read.
     pub(crate) kinds: Vec<Option<MessageKind>>,
+    /// Messages so far with bytes behind their end.
+    longer: AtomicU64,
 }
 
 /// The file that describes a folder of rosbag2.
@@ -57,7 +60,7 @@ impl Contents {
         let options = BagOptions { allow_truncated: choice.allow_truncated };
         let bag = Bag::open(path, &options).map_err(bag_error)?;
         let kinds = bag.topics().iter().map(|t| MessageKind::of(&t.type_name)).collect();
-        Ok(Self { path: path.into(), bag, kinds })
+        Ok(Self { path: path.into(), bag, kinds, longer: AtomicU64::new(0) })
     }
 
     /// The numbers of the topics of a name: a topic of several publishers has several.
@@ -113,8 +116,30 @@ impl Contents {
         let bag_error = IoError::bag(&self.path);
         self.bag.read(message, &mut bytes).map_err(bag_error)?;
         let decoder = decoders.of(message.topic, &self.path)?;
-        let message = decoder.decode(&bytes).map_err(bag_error)?;
-        with(&message.record).map_err(bag_error)
+        self.decode(decoder, &bytes).and_then(|record| with(&record)).map_err(bag_error)
+    }
+
+    /// The fields of a message. Bytes behind its end are counted.
+    pub(crate) fn decode<'a>(
+        &self,
+        decoder: &'a Decoder,
+        bytes: &'a [u8],
+    ) -> portolan_ros::Result<Record<'a>> {
+        let message = decoder.decode(bytes)?;
+        if message.trailing > 0 {
+            self.longer.fetch_add(1, Ordering::Relaxed);
+        }
+        Ok(message.record)
+    }
+
+    /// What is to be told of messages that were longer than their definition.
+    pub(crate) fn note_of_longer(&self) -> Option<String> {
+        let longer = self.longer.load(Ordering::Relaxed);
+        (longer > 0).then(|| {
+            format!(
+                "{longer} messages have bytes behind their end: they may be of another version of their type"
+            )
+        })
     }
 
     /// The tree of all transforms, with what it brought up. A message that cannot be read is left out and told.
@@ -133,8 +158,9 @@ impl Contents {
                 Some(publisher) => format!("{} by {publisher}", topic.name),
                 None => topic.name.clone(),
             };
-            let found =
-                decoders.find(message.topic).map(|d| d.decode(bytes).and_then(|m| transforms(&m.record)));
+            let found = decoders
+                .find(message.topic)
+                .map(|d| self.decode(d, bytes).and_then(|record| transforms(&record)));
             match found {
                 Some(Ok(found)) => found.iter().for_each(|t| builder.add(t, is_static, &source)),
                 Some(Err(error)) => {

@@ -68,6 +68,7 @@ pub(crate) fn open_bag(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     }
     let clouds = Clouds::new(&contents, &scans, &decoders, options, &mut stats)?;
     let pictures = Pictures::new(&contents, &sensors.names, &scans, &decoders, options, &mut stats)?;
+    stats.notes.extend(contents.note_of_longer());
     let camera = pictures.camera().cloned();
     let ids = scans.iter().map(|s| ScanId {
         path: PathBuf::from(path),
@@ -98,7 +99,7 @@ fn scan_messages(
     let visited = contents.bag.for_each(numbers, |message, bytes| {
         stats.messages += 1;
         let Some(decoder) = decoders.find(message.topic) else { return Ok(()) };
-        match decoder.decode(bytes).and_then(|m| Header::of(&m.record)) {
+        match contents.decode(decoder, bytes).and_then(|record| Header::of(&record)) {
             Ok(mut header) => {
                 if header.stamp == 0 {
                     unstamped += 1;

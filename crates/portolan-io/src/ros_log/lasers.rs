@@ -57,6 +57,7 @@ impl LaserLog {
             return Err(IoError::layout(path, "the log", value, "split the bag into parts"));
         }
         let poses = Poses::new(&contents, options, scans.len(), &mut stats)?;
+        stats.notes.extend(contents.note_of_longer());
         Reading::default().run(&contents, &scans, &poses, stats)
     }
 }

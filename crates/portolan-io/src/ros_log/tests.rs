@@ -8,7 +8,7 @@ use portolan::scan::{BeamKind, Frame, RangeLimits};
 
 use super::*;
 use crate::scan_log::{ScanLog, ScanLogOptions};
-use crate::testing::{real_data, says, temporary};
+use crate::testing::{no_panic, real_data, says, temporary};
 use crate::{FileKind, LaserLog, LaserLogStats, detect, detect_no_return};
 
 const HEADER: &str = "===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
@@ -588,4 +588,31 @@ fn real_bags_of_planar_lasers() {
         assert_eq!(log.len(), 99);
         assert!(stats(&log).notes.iter().any(|n| n.contains("no definition of sensor_msgs/LaserScan")));
     }
+}
+
+#[test]
+fn no_bytes_of_a_bag_make_it_panic() {
+    let mut run = robot();
+    run.scan("/scan", "base_link", START + 0.1, [0.0, 0.1], &[1.0]);
+    run.cloud("/points", "base_link", START + 0.1, &[[1.0, 2.0, 3.0]; 3]);
+    let (_folder, path) = temporary("run.mcap");
+    let topics =
+        |name: &str| BagChoice { topics: vec![name.into()], allow_truncated: true, ..BagChoice::default() };
+    no_panic(run.bytes(), 11, 400, |bytes| {
+        std::fs::write(&path, bytes).unwrap();
+        let _ = LaserLog::read_bag(&path, &options(topics("/scan")));
+        let _ = BagInfo::read(&path, &options(BagChoice::default()));
+        ScanLog::open(&path, &options(topics("/points"))).and_then(|log| log.frame(0))
+    });
+}
+
+#[test]
+fn messages_that_are_longer_than_their_type_are_told() {
+    let mut run = robot();
+    let mut m = Message::header(START + 0.1, "base_link");
+    m.f32(&[0.0, 0.0, 0.1, 0.0, 0.0, 0.5, 10.0]).u32(&[1]).f32(&[2.0]).u32(&[0]).u32(&[7]);
+    run.put("/scan", "sensor_msgs/LaserScan", SCAN, START + 0.1, &m);
+    let (_folder, path) = run.save();
+    let log = LaserLog::read_bag(&path, &ScanLogOptions::default()).unwrap();
+    assert!(stats(&log).notes.iter().any(|n| n.contains("1 messages have bytes behind their end")));
 }
