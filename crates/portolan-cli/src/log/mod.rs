@@ -13,6 +13,7 @@ use portolan_io::scan_log::ScanLog;
 use portolan_io::{BagLogStats, FileKind, LaserLog, LaserLogStats, detect, read_poses_2d};
 use serde_json::{Value, json};
 
+use crate::error::bad_call;
 use crate::json;
 
 pub(crate) use arguments::{LimitArgs, LogArgs, NoReturnArgs, RangeArgs};
@@ -182,6 +183,11 @@ pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool) -> anyhow::Resul
 pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<LaserLog> {
     if args.is_bag(path)? {
         return Ok(LaserLog::read_bag(path, &args.options(false))?);
+    }
+    if args.time_tolerance.is_some() {
+        return Err(bad_call(
+            "--time-tolerance is for bags and 3-D logs; a CARMEN log has a pose with each scan",
+        ));
     }
     if args.format.is_none() {
         match detect(path)? {

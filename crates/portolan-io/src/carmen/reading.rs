@@ -101,6 +101,7 @@ impl Reading {
             time: head.time,
             declared: None,
             time_increment: None,
+            laser: 0,
         });
         if let Some(declared) = head.max_range {
             into.max_range = Some(into.max_range.map_or(declared, |m: f64| m.min(declared)));
@@ -155,6 +156,7 @@ impl Reading {
             entries: used.entries,
             fans: self.fans.into_all(),
             readings: used.readings,
+            trajectories: Vec::new(),
             stats: LaserLogStats::Carmen(Box::new(stats)),
         })
     }

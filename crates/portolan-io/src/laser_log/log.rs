@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use portolan::geom::Pose;
+use portolan::geom::{Pose, Trajectory};
 use portolan::scan::{RangeLimits, Scan};
 
 use super::fans::Fan;
@@ -44,8 +44,7 @@ impl RawLaserScan<'_> {
     /// stands instead of the declared maximum.
     pub fn to_scan(&self, limits: &RangeLimits) -> Scan<2> {
         let limits = self.within_declared(limits);
-        let clockwise = self.bearings.first() > self.bearings.last();
-        let scan = if clockwise {
+        let scan = if self.is_clockwise() {
             let [bearings, readings] =
                 [self.bearings, self.readings].map(|all| all.iter().rev().copied().collect());
             let (bearings, readings): (Vec<f64>, Vec<f64>) = (bearings, readings);
@@ -58,6 +57,19 @@ impl RawLaserScan<'_> {
             Some(seconds) => scan.at_time(seconds),
             None => scan,
         }
+    }
+
+    /// Seconds after [`RawLaserScan::time`] at which each beam was measured, in the order of [`RawLaserScan::to_scan`]; `None` where
+    /// the log does not say it.
+    pub fn beam_times(&self) -> Option<Vec<f32>> {
+        let step = self.time_increment?;
+        let beams = self.readings.len();
+        let place = |k: usize| if self.is_clockwise() { beams - 1 - k } else { k };
+        Some((0..beams).map(|k| (place(k) as f64 * step) as f32).collect())
+    }
+
+    fn is_clockwise(&self) -> bool {
+        self.bearings.first() > self.bearings.last()
     }
 
     /// Limits that keep to what the sensor declares.
@@ -77,6 +89,8 @@ pub(crate) struct Entry {
     pub(crate) time: Option<f64>,
     pub(crate) time_increment: Option<f64>,
     pub(crate) declared: Option<[f64; 2]>,
+    /// Its place among [`LaserLog::trajectories`].
+    pub(crate) laser: u32,
 }
 
 /// What else was found in a log, by its format.
@@ -109,6 +123,8 @@ pub struct LaserLog {
     pub(crate) entries: Vec<Entry>,
     pub(crate) fans: Vec<Fan>,
     pub(crate) readings: Vec<f64>,
+    /// Of each laser; empty where the log says nothing of times within scans.
+    pub(crate) trajectories: Vec<Trajectory<2>>,
     pub(crate) stats: LaserLogStats,
 }
 
@@ -162,10 +178,18 @@ impl LaserLog {
             let value = world_from_laser.len().to_string();
             return Err(IoError::unwritable(&self.path, "the number of external poses", value, advice));
         }
+        self.trajectories.clear();
         for (entry, &pose) in self.entries.iter_mut().zip(world_from_laser) {
             entry.world_from_laser = pose;
         }
         Ok(self)
+    }
+
+    /// The poses of the laser of scan `i` while it scans, on the clock of [`RawLaserScan::time`]; `None` where the log says nothing
+    /// of times within a scan.
+    pub fn trajectory(&self, i: usize) -> Option<&Trajectory<2>> {
+        let entry = self.entries.get(i).filter(|e| e.time_increment.is_some())?;
+        self.trajectories.get(entry.laser as usize).filter(|t| !t.is_empty())
     }
 
     /// What else was found in the log.

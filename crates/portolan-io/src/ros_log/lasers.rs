@@ -15,6 +15,10 @@ use crate::{IoError, Result, read_poses_2d};
 const MOST_BEAMS: usize = 100_000;
 /// Scans whose plane is tilted by more than this (radians) are refused: what they see is not at one height.
 const MOST_TILT: f64 = 0.26;
+/// Poses that are asked for while a scan goes on, beside that of its begin.
+const KNOTS: u32 = 8;
+/// No scan of a planar laser lasts longer (seconds).
+const LONGEST_SCAN: f64 = 2.0;
 /// Scans whose plane is tilted by more than this (radians) are counted.
 const TOLD_TILT: f64 = 0.035;
 
@@ -231,6 +235,8 @@ struct Reading {
     readings: Vec<f64>,
     upside_down: u64,
     undeclared: u64,
+    /// Stamped poses of each laser while it scans, by its frame.
+    lasers: Vec<(String, Vec<(f64, Pose<2>)>)>,
 }
 
 impl Reading {
@@ -273,7 +279,12 @@ impl Reading {
                 },
             };
             match found {
-                Ok((pose, upside_down)) => self.push(scan, pose, upside_down, &contents.path)?,
+                Ok((pose, upside_down)) => {
+                    self.push(scan, pose, upside_down, &contents.path)?;
+                    if let Poses::Bag(source) = poses {
+                        self.follow(scan, source);
+                    }
+                }
                 Err(NoPose { missing, text }) => stats.no_pose(&missing, || text),
             }
         }
@@ -300,7 +311,11 @@ impl Reading {
                 advice,
             ));
         }
+        // Poses of one time come from one question, so that they agree.
+        let trajectory =
+            |(_, poses): (String, Vec<_>)| Trajectory::new(poses).or_else(|_| Trajectory::new([])).ok();
         Ok(LaserLog {
+            trajectories: self.lasers.into_iter().filter_map(trajectory).collect(),
             path: contents.path.clone(),
             entries: self.entries,
             fans: self.fans.into_all(),
@@ -322,17 +337,48 @@ impl Reading {
         // Infinity is a maximum: such sensors say "no echo" by infinity alone.
         let declared = (most > 0.0 && least < most).then_some([if least > 0.0 { least } else { 0.0 }, most]);
         self.undeclared += u64::from(declared.is_none());
+        let laser = self.laser(&scan.header.frame);
         self.entries.push(Entry {
             world_from_laser: pose,
             first_reading: self.readings.len(),
             fan,
             time: Some(scan.header.stamp as f64 * 1e-9),
+            laser: laser as u32,
             time_increment: (scan.time_increment > 0.0 && scan.time_increment.is_finite())
                 .then_some(scan.time_increment),
             declared,
         });
         self.readings.extend(scan.ranges.iter().map(|r| f64::from(*r)));
         Ok(())
+    }
+}
+
+impl Reading {
+    /// The place of the laser of a frame.
+    fn laser(&mut self, frame: &str) -> usize {
+        let known = self.lasers.iter().position(|(name, _)| name == frame);
+        known.unwrap_or_else(|| {
+            self.lasers.push((frame.to_owned(), Vec::new()));
+            self.lasers.len() - 1
+        })
+    }
+
+    /// Asks for the poses while the scan goes on, where its beams have times.
+    fn follow(&mut self, scan: &LaserScan, source: &PoseSource) {
+        let long = scan.time_increment * scan.ranges.len() as f64;
+        if !(long > 0.0 && long < LONGEST_SCAN) {
+            return;
+        }
+        let laser = self.laser(&scan.header.frame);
+        for k in 0..=KNOTS {
+            let after = (long * 1e9 * f64::from(k) / f64::from(KNOTS)) as i64;
+            let stamp = scan.header.stamp.saturating_add(after);
+            if let Ok((pose, ..)) =
+                source.at(&scan.header.frame, stamp).map_err(drop).and_then(|p| level(&p).map_err(drop))
+            {
+                self.lasers[laser].1.push((stamp as f64 * 1e-9, pose));
+            }
+        }
     }
 }
 

@@ -616,3 +616,26 @@ fn messages_that_are_longer_than_their_type_are_told() {
     let log = LaserLog::read_bag(&path, &ScanLogOptions::default()).unwrap();
     assert!(stats(&log).notes.iter().any(|n| n.contains("1 messages have bytes behind their end")));
 }
+
+#[test]
+fn beams_have_times_and_the_laser_poses_at_them() {
+    let mut run = robot();
+    for (k, step) in [(0u32, 0.1f32), (1, -0.1)] {
+        let mut m = Message::header(START + 0.25 + 0.5 * f64::from(k), "base_link");
+        m.f32(&[0.0, 0.0, step, 0.01, 0.1, 0.5, 10.0]).u32(&[11]).f32(&[2.0; 11]).u32(&[0]);
+        run.put("/scan", "sensor_msgs/LaserScan", SCAN, START + 0.5, &m);
+    }
+    let (_folder, path) = run.save();
+    let log = LaserLog::read_bag(&path, &ScanLogOptions::default()).unwrap();
+    for i in 0..2 {
+        let (scan, motion) = (log.raw(i), log.trajectory(i).unwrap());
+        let times = scan.beam_times().unwrap();
+        // The order is that of the beams of the scan, which is counter-clockwise.
+        assert!((times[if i == 0 { 10 } else { 0 }] - 0.1).abs() < 1e-6, "{times:?}");
+        for time in times {
+            let at = motion.at(scan.time.unwrap() + f64::from(time), 0.02).unwrap();
+            let x = scan.world_from_laser.translation[0] + f64::from(time);
+            assert!((at.translation[0] - x).abs() < 1e-5, "{time}: {at:?}");
+        }
+    }
+}

@@ -32,7 +32,8 @@ pub struct TrackBuilder {
 pub(super) fn pose(raw: &RawTransform) -> Option<(Pose<3>, bool)> {
     let length = dot(raw.quaternion, raw.quaternion).sqrt();
     // A shorter one is noise about zero.
-    if !(length > 1e-6 && length.is_finite()) || !raw.translation.iter().all(|v| v.is_finite()) {
+    let finite = length.is_finite() && raw.translation.iter().all(|v| v.is_finite());
+    if !finite || length <= 1e-6 {
         return None;
     }
     let pose = Pose::<3>::from_quaternion(raw.translation, raw.quaternion)?;

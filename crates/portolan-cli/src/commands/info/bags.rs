@@ -100,7 +100,7 @@ fn text(info: &BagInfo, command: Option<&str>) -> String {
         let _ = writeln!(text, "  note: {note}");
     }
     if let Some(command) = command {
-        let _ = writeln!(text, "  {command}");
+        let _ = writeln!(text, "  map it by: {command}");
     }
     text
 }
