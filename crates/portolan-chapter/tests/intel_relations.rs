@@ -2,7 +2,7 @@
 
 use portolan::geom::Pose;
 use portolan_chapter::poses::PoseErrors;
-use portolan_io::CarmenLog;
+use portolan_io::LaserLog;
 use portolan_sim::planar;
 use std::collections::HashMap;
 use std::io::Write as _;
@@ -120,8 +120,8 @@ fn corrected_intel_poses_agree_with_the_verified_relations() {
     let relations =
         parse_relations(&std::fs::read_to_string(folder.join("intel.relations")).unwrap()).unwrap();
     assert_eq!(relations.len(), 2984);
-    let corrected = CarmenLog::read(folder.join("intel-corrected.log.gz")).unwrap();
-    let raw = CarmenLog::read(folder.join("intel.clf.bz2")).unwrap();
+    let corrected = LaserLog::read_carmen(folder.join("intel-corrected.log.gz")).unwrap();
+    let raw = LaserLog::read_carmen(folder.join("intel.clf.bz2")).unwrap();
     // The corrected log has a clock of its own; its readings are those of the raw log, to the centimeter.
     let key = |readings: &[f64]| readings.iter().map(|z| (100.0 * z).round() as i64).collect::<Vec<_>>();
     let stamps: HashMap<_, _> = raw.raw_scans().filter_map(|s| Some((key(s.readings), s.time?))).collect();

@@ -26,6 +26,11 @@ pub(crate) fn length_or_zero(text: &str) -> Result<f64, String> {
     number_that(text, |v| v >= 0.0 && v.is_finite(), "a finite length in meters, not negative")
 }
 
+/// Seconds within a day, of either sign.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    number_that(text, |v| v.abs() <= 86_400.0, "seconds, at most a day")
+}
+
 /// A weight above zero; `inf` is one.
 pub(crate) fn weight(text: &str) -> Result<f32, String> {
     number_that(text, |v| v as f32 > 0.0, "a positive number, or inf to never forget").map(|v| v as f32)

@@ -3,7 +3,7 @@
 use portolan::geom::{Aabb, Grid};
 use portolan::scan::{RefusedBeams, ScanStats, ScanWays, Way, WhyRays};
 use portolan_io::scan_log::ScanLogStats;
-use portolan_io::{CarmenStats, TimeOrder};
+use portolan_io::{BagLogStats, CarmenStats, LaserLog, LaserLogStats, TimeOrder};
 use serde_json::{Map, Value, json};
 
 /// An object of these fields.
@@ -91,6 +91,44 @@ pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
             TimeOrder::Ascending => "ascending",
             TimeOrder::NotAscending => "not ascending",
         },
+    })
+}
+
+/// What else was found in a 2-D log of any format.
+pub(crate) fn laser_log_stats(log: &LaserLog) -> Value {
+    match log.stats() {
+        LaserLogStats::Carmen(stats) => log_stats(stats),
+        LaserLogStats::Bag(stats) => {
+            let mut value = bag_log_stats(stats);
+            value["declared_max_range"] = json!(log.declared_max_range().filter(|r| r.is_finite()));
+            value
+        }
+    }
+}
+
+/// What was chosen and left out of a bag.
+pub(crate) fn bag_log_stats(stats: &BagLogStats) -> Value {
+    json!({
+        "topics": stats.topics,
+        "sensor_frames": stats.sensor_frames,
+        "fixed_frame": stats.fixed_frame,
+        "poses_from": stats.poses,
+        "point_times": stats.point_times,
+        "guesses": stats.guesses,
+        "messages": stats.messages,
+        "refused_scans": {
+            "total": stats.refused_messages(),
+            "by_cause": stats.refused,
+            "first": stats.first_refused,
+        },
+        "scans_without_pose": {
+            "total": stats.scans_without_pose(),
+            "by_missing": stats.without_pose,
+            "first": stats.first_without_pose,
+        },
+        "tilted_scans": stats.tilted,
+        "worst_tilt": stats.worst_tilt,
+        "notes": stats.notes,
     })
 }
 

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, OctomapTree, Pgm, Polyline, detect, read_geojson,
+    BagChoice, EsdfFile, FileKind, LaserLog, MapFile, MapServerMap, OctomapTree, Pgm, Polyline,
+    bag_dimension, detect, read_geojson,
 };
 
 use crate::dimension::{Dimension, Given};
@@ -30,7 +31,7 @@ pub(crate) enum Source {
     /// A `.bt` or `.ot`
     Octomap(Box<OctomapTree>),
     /// A log of 2-D scans
-    Log2(Box<CarmenLog>),
+    Log2(Box<LaserLog>),
     /// A log of 3-D scans
     Log3(Box<ScanLog>),
 }
@@ -48,8 +49,13 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         },
         FileKind::GeoJson => Source::Contour(read_geojson(path)?),
         FileKind::OctomapBt | FileKind::OctomapOt => Source::Octomap(Box::new(OctomapTree::read(path)?)),
-        FileKind::CarmenLog => Source::Log2(Box::new(CarmenLog::read(path)?)),
-        FileKind::ScanLog(_) => Source::Log3(Box::new(ScanLog::open(path, &ScanLogOptions::default())?)),
+        FileKind::CarmenLog => Source::Log2(Box::new(LaserLog::read_carmen(path)?)),
+        FileKind::Bag if bag_dimension(path, &BagChoice::default())? == 2 => {
+            Source::Log2(Box::new(LaserLog::read_bag(path, &ScanLogOptions::default())?))
+        }
+        FileKind::Bag | FileKind::ScanLog(_) => {
+            Source::Log3(Box::new(ScanLog::open(path, &ScanLogOptions::default())?))
+        }
         FileKind::Unknown(what) => bail!("{}: not recognized: {what}", path.display()),
         kind => bail!("{}: is {}, which cannot be read yet", path.display(), describe(&kind)),
     })
@@ -112,6 +118,7 @@ impl Source {
             Self::Contour(_) => "a contour (GeoJSON)",
             Self::Octomap(file) if file.is_binary() => "an OctoMap tree of free and occupied (.bt)",
             Self::Octomap(_) => "an OctoMap tree of log odds (.ot)",
+            Self::Log2(log) if log.format() == "bag" => "a bag of ROS",
             Self::Log2(_) => "a CARMEN log",
             Self::Log3(log) => log.kind().label(),
         }

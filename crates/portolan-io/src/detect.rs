@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::bytes::open;
 use crate::mesh::{MeshFormat, mesh_format};
+use crate::ros_log::is_bag;
 use crate::scan_log::ScanLogKind;
 use crate::{Result, container, esdf_bin};
 
@@ -14,8 +15,11 @@ const HEAD: u64 = 64 << 10;
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FileKind {
-    /// A CARMEN log: [`crate::CarmenLog`].
+    /// A CARMEN log: [`crate::LaserLog::read_carmen`].
     CarmenLog,
+    /// A bag of ROS 1 or ROS 2, a file or a folder: [`crate::LaserLog::read_bag`] or [`crate::scan_log::ScanLog`], by its
+    /// [`crate::bag_dimension`].
+    Bag,
     /// portolan's own map: [`crate::Container`].
     Portolan,
     /// A folder with a `map.portolan`, as `map` and `demo` write it.
@@ -53,15 +57,26 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind> {
             return Ok(FileKind::PortolanFolder);
         }
         if let Some(kind) = ScanLogKind::recognize(path) {
-            return Ok(FileKind::ScanLog(kind));
+            return Ok(of_log(kind));
         }
         let what = "a folder without map.portolan and without scans of a known layout; name a file inside it";
         return Ok(FileKind::Unknown(what.into()));
     }
+    if path.is_file() && is_bag(path) {
+        return Ok(FileKind::Bag);
+    }
     let head = open(path)?.read_up_to(HEAD)?;
-    let as_log = || ScanLogKind::recognize(path).map(FileKind::ScanLog);
+    let as_log = || ScanLogKind::recognize(path).map(of_log);
     let kind = by_content(path, &head).or_else(as_log).or_else(|| by_name(path, &head));
     Ok(kind.unwrap_or_else(|| unknown(&head)))
+}
+
+/// A bag is a log of either dimension.
+fn of_log(kind: ScanLogKind) -> FileKind {
+    match kind {
+        ScanLogKind::Bag => FileKind::Bag,
+        kind => FileKind::ScanLog(kind),
+    }
 }
 
 fn by_content(path: &Path, head: &[u8]) -> Option<FileKind> {

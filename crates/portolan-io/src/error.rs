@@ -95,6 +95,14 @@ pub enum IoError {
         /// What to do.
         advice: String,
     },
+    /// A bag of ROS, or a message in it, cannot be read.
+    #[error("{}{cause}", named(path, cause))]
+    Bag {
+        /// The bag.
+        path: PathBuf,
+        /// What is wrong.
+        cause: portolan_ros::BagError,
+    },
     /// The format cannot hold what the caller wants to write or to combine.
     #[error("{}: {field} is {value}; {advice}", shown_path(path))]
     Unwritable {
@@ -168,6 +176,10 @@ impl IoError {
         Self::Layout { path: path.into(), field, value, advice }
     }
 
+    pub(crate) fn bag(path: &Path) -> impl Fn(portolan_ros::BagError) -> Self + Copy + '_ {
+        move |cause| Self::Bag { path: path.into(), cause }
+    }
+
     pub(crate) fn os(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
         Self::Os { path: path.into(), action, cause }
     }
@@ -182,8 +194,17 @@ impl IoError {
             | Self::Binary { path, .. }
             | Self::NoScans { path, .. }
             | Self::Layout { path, .. }
+            | Self::Bag { path, .. }
             | Self::Unwritable { path, .. } => path,
         }
+    }
+}
+
+/// The bag before an error that does not name its file.
+fn named(path: &Path, cause: &portolan_ros::BagError) -> String {
+    match cause {
+        portolan_ros::BagError::Message { .. } => format!("{}: ", shown_path(path)),
+        _ => String::new(),
     }
 }
 

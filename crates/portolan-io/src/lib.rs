@@ -2,7 +2,8 @@
 //!
 //! | format | read | write |
 //! |---|---|---|
-//! | CARMEN log (plain, gzip, bzip2) | [`CarmenLog`], [`detect_no_return`] | |
+//! | CARMEN log (plain, gzip, bzip2) | [`LaserLog`], [`detect_no_return`] | |
+//! | bags of ROS 1 and ROS 2 | [`LaserLog`], [`scan_log::ScanLog`], [`BagInfo`] | |
 //! | pose files (`x y theta`, `t x y theta`, TUM) | [`read_poses_2d`] | |
 //! | PCD (text, binary, packed) | [`read_pcd`] | [`write_pcd`] |
 //! | PLY clouds (text, binary) | [`read_ply_cloud`] | [`write_ply_cloud`] |
@@ -12,6 +13,7 @@
 //! | 3-D poses (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
 //! | logs of 3-D scans with poses | [`scan_log::ScanLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
 //! | `map.portolan` | [`MapFile`]; its chunks: [`Container`] | [`MapFile::write`]; its chunks: [`ContainerWriter`] |
+//! | messages of ROS 2 in MCAP | | of a map: [`write_map_mcap`] |
 //! | `esdf.bin` | [`EsdfFile`] | [`write_esdf`] |
 //! | ROS map_server (yaml + pgm) | [`MapServerMap`] | [`write_map_server`] |
 //! | costs of Nav2, as a map_server map | | [`write_costmap`] |
@@ -42,8 +44,10 @@ mod error;
 mod esdf_bin;
 mod geojson;
 mod kitti_bin;
+mod laser_log;
 mod log_writer;
 mod map_file;
+mod map_messages;
 mod map_server;
 mod mesh;
 mod numpy;
@@ -55,6 +59,7 @@ mod points;
 mod points_csv;
 mod poses;
 pub mod poses3;
+mod ros_log;
 mod scan_graph;
 pub mod scan_log;
 mod svg;
@@ -66,10 +71,7 @@ pub use answer_row::{
     AnswerRow, HELD_BACK, certified_reach, unknown_word, write_answer, write_answer_header,
 };
 pub use bytes::{Compression, Input, open, write_atomic};
-pub use carmen::{
-    CarmenLog, CarmenScan, CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage, TimeOrder,
-    detect_no_return,
-};
+pub use carmen::{CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage};
 pub use container::{Chunk, Container, ContainerWriter};
 pub use costmap::write_costmap;
 pub use detect::{FileKind, detect};
@@ -77,11 +79,13 @@ pub use error::{IoError, Result};
 pub use esdf_bin::{EsdfFile, esdf_to_bytes, write_esdf};
 pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
+pub use laser_log::{LaserLog, LaserLogStats, RawLaserScan, TimeOrder, detect_no_return};
 pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{
     AttenuationBricks, ColorBricks, MapFile, MapHeader, OccupancyBricks, TsdfBricks, map_dimension, sweep_of,
     sweep_word, weights_of, weights_word,
 };
+pub use map_messages::{MapMessages, write_map_mcap};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{
     MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, parse_mesh_counts, ply_mesh_to_bytes, write_glb,
@@ -99,6 +103,7 @@ pub use points::{
 };
 pub use points_csv::QueryPoints;
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};
+pub use ros_log::{BagChoice, BagInfo, BagLogStats, EdgeOfBag, TopicOfBag, bag_dimension};
 pub use scan_graph::{ScanGraphNode, parse_scan_graph, read_scan_graph};
 pub use svg::{SvgStyle, write_svg};
 pub use xyz::read_xyz;

@@ -43,4 +43,14 @@ pub enum BagError {
         /// What to do.
         advice: String,
     },
+    /// A file or folder that holds no bag that can be read.
+    #[error("{name}: {reason}; {advice}")]
+    Refused {
+        /// The file or folder.
+        name: String,
+        /// What it is.
+        reason: String,
+        /// What to do.
+        advice: String,
+    },
 }

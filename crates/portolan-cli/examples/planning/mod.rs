@@ -13,7 +13,7 @@ use portolan::plan::{Demand, PathCheck, Waypoints, check_path};
 use portolan::scan::{RangeLimits, Scan};
 use portolan::surface::{Contour, ContourSettings, marching_squares};
 use portolan_draw::{Anchor, Canvas, Chart, Color, Entry, Font, Pen, PixelRect, Swatch, View, color};
-use portolan_io::{CarmenLog, detect_no_return};
+use portolan_io::{LaserLog, detect_no_return};
 
 /// A map, the clearance in it, and where the robot was that made it.
 pub(crate) struct Place {
@@ -36,7 +36,7 @@ impl Place {
     pub(crate) fn of(log: Option<&Path>) -> anyhow::Result<Self> {
         let (name, scans): (String, Vec<(Pose<2>, Scan<2>)>) = match log {
             Some(path) => {
-                let log = CarmenLog::read(path)?;
+                let log = LaserLog::read_carmen(path)?;
                 let no_return = detect_no_return(&log).unwrap_or(f64::INFINITY);
                 let limits = RangeLimits { no_return, ..RangeLimits::default() };
                 (

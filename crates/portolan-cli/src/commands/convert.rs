@@ -29,6 +29,7 @@ use crate::source::{Source, open};
 mod arrays;
 mod costs;
 mod field;
+mod messages;
 
 pub(crate) use arrays::UnknownArg;
 
@@ -36,13 +37,15 @@ pub(crate) use arrays::UnknownArg;
 #[command(after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  \
                   portolan convert intel intel.npz --layout casadi --unknown pessimistic\n  \
                   portolan convert intel costs.yaml --inflate 0.55 --inscribed 0.22\n  \
-                  portolan convert kitchen floor.yaml --z 0.1:1.2 --unknown pessimistic")]
+                  portolan convert kitchen floor.yaml --z 0.1:1.2 --unknown pessimistic\n  \
+                  portolan convert intel intel.mcap")]
 pub(crate) struct Args {
     #[command(flatten)]
     given: Given<()>,
     /// map.portolan or its folder, map_server yaml, esdf.bin, GeoJSON contour, or OctoMap .bt or .ot
     input: PathBuf,
-    /// File to write: .portolan, .yaml (with its .pgm), .bin, .npz, .npy, .geojson, .svg, .bt, .ot, .ply, .glb or .obj
+    /// File to write: .portolan, .yaml (with its .pgm), .bin, .npz, .npy, .geojson, .svg, .bt, .ot, .ply, .glb, .obj, or
+    /// .mcap (messages of ROS 2)
     out: PathBuf,
     /// Method of the distance field [default: as the map was made, else accurate]
     #[arg(long, value_enum)]
@@ -76,6 +79,7 @@ enum Target {
     OctomapBt,
     OctomapOt,
     Mesh,
+    Messages,
 }
 
 /// Converts the file.
@@ -131,6 +135,7 @@ fn target(out: &Path) -> Option<Target> {
         "bt" => Some(Target::OctomapBt),
         "ot" => Some(Target::OctomapOt),
         "ply" | "glb" | "obj" => Some(Target::Mesh),
+        "mcap" => Some(Target::Messages),
         _ => None,
     }
 }
@@ -139,16 +144,16 @@ fn target(out: &Path) -> Option<Target> {
 fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
     let possible = match source {
         Source::Map2(_) => {
-            ".yaml, .bin (esdf), .npz, .npy, .geojson, .svg or .portolan, as far as its maps go"
+            ".yaml, .bin (esdf), .npz, .npy, .geojson, .svg, .mcap or .portolan, as far as its maps go"
         }
-        Source::Server(_) => ".bin (esdf), .npz, .npy, .geojson, .svg, .portolan or .yaml",
+        Source::Server(_) => ".bin (esdf), .npz, .npy, .geojson, .svg, .mcap, .portolan or .yaml",
         Source::Esdf(EsdfFile::Two(_)) => ".yaml, .npz, .npy, .geojson, .svg or .bin",
         Source::Esdf(EsdfFile::Three(_)) => ".bin, .npz, .npy, or .yaml with --z",
         Source::Contour(_) => ".geojson or .svg",
         Source::Image(_) => "a map only together with its yaml file",
         Source::Octomap(_) => ".bt or .ot",
         Source::Map3(_) => {
-            ".ply, .glb, .obj, .bt, .ot, .bin (esdf), .npz, .npy, .yaml with --z, or .portolan, as far as its maps go"
+            ".ply, .glb, .obj, .bt, .ot, .bin (esdf), .npz, .npy, .mcap, .yaml with --z, or .portolan, as far as its maps go"
         }
         Source::Log2(_) | Source::Log3(_) => "a map, by `portolan map`",
     };
@@ -166,22 +171,30 @@ fn yaml(out: &Path) -> PathBuf {
 }
 
 fn convert_map2(file: &MapFile<2>, target: Target, args: &Args) -> anyhow::Result<bool> {
-    match (target, &file.tsdf) {
-        (Target::Portolan, _) => file.write(&args.out)?,
-        (Target::MapServer, _) => {
+    match target {
+        Target::Portolan => file.write(&args.out)?,
+        Target::MapServer => {
             let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
             write_map_server(yaml(&args.out), &grid, &cells)?;
         }
-        (Target::Contour, Some(tsdf)) => {
-            return write_lines(&marching_squares(tsdf, &ContourSettings::of(tsdf)), args);
+        Target::Contour => {
+            let Some(contour) = contour_of_map(file)? else { return Ok(false) };
+            return write_lines(&contour, args);
         }
-        (Target::Contour, None) => {
-            let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(false) };
-            return write_lines(&contour_of(&esdf_of_cells(grid, &cells))?, args);
-        }
+        Target::Messages => return messages::of_map2(file, args),
         _ => return Ok(false),
     }
     Ok(true)
+}
+
+/// The contour of a map: of its signed distances, else around its occupied cells. `None`: it has no cells that an array
+/// can hold.
+fn contour_of_map(file: &MapFile<2>) -> anyhow::Result<Option<Contour>> {
+    if let Some(tsdf) = &file.tsdf {
+        return Ok(Some(marching_squares(tsdf, &ContourSettings::of(tsdf))));
+    }
+    let Some((grid, cells)) = cells_for_map_server(file) else { return Ok(None) };
+    Ok(Some(contour_of(&esdf_of_cells(grid, &cells))?))
 }
 
 /// `false`: the map lacks what the format needs, or the format is for 2-D.
@@ -202,6 +215,7 @@ fn convert_map3(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Resul
             let colors = file.color_bricks.as_ref().map(|c| &c.store);
             return write_mesh(&args.out, &marching_cubes(map, colors, &MeshSettings::default()));
         }
+        (Target::Messages, ..) => return messages::of_map3(file, args),
         _ => return Ok(false),
     }
     Ok(true)
@@ -209,10 +223,10 @@ fn convert_map3(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Resul
 
 fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Result<bool> {
     let turned = map.yaw != 0.0;
-    if turned && target != Target::Contour {
+    if turned && !matches!(target, Target::Contour | Target::Messages) {
         bail!(
             "{}: the map is turned by yaw {} rad, which {} cannot hold; turn the image and set yaw to 0, or \
-             convert it to .geojson",
+             convert it to .geojson or .mcap",
             args.input.display(),
             map.yaw,
             args.out.display()
@@ -229,6 +243,7 @@ fn convert_server(map: &MapServerMap, target: Target, args: &Args) -> anyhow::Re
             }
             return write_lines(&contour, args);
         }
+        Target::Messages => return messages::of_server(map, args),
         _ => return Ok(false),
     }
     Ok(true)

@@ -15,6 +15,7 @@ use crate::log::describe;
 use crate::output::Output;
 use crate::source::{Source, open};
 
+mod bags;
 mod logs;
 mod maps;
 
@@ -30,7 +31,14 @@ pub(crate) struct Args {
 /// Prints what the file is.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let kind = detect(&args.file)?;
+    let mut bag_text = None;
     let mut document = match kind {
+        FileKind::Bag => {
+            let (mut document, text) = bags::about(&args.file)?;
+            document["kind"] = json!(describe(&kind));
+            bag_text = Some(text);
+            document
+        }
         FileKind::Svg => json!({ "kind": describe(&kind) }),
         _ => {
             let source = open(&args.file)?;
@@ -43,7 +51,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     document["file"] = json!(args.file.display().to_string());
     document["bytes"] = json!(size(&args.file));
     let mut text = format!("{}: {}\n", args.file.display(), document["kind"].as_str().unwrap_or_default());
-    lines(&document, "  ", &mut text);
+    match bag_text {
+        Some(about) => text.push_str(&about),
+        None => lines(&document, "  ", &mut text),
+    }
     args.output.print(&document, text)
 }
 

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use portolan::scan::{Body, FrameFilter, RangeLimits};
 use portolan_io::poses3::PoseConvention;
 use portolan_io::scan_log::{Intrinsics, ScanLog, ScanLogKind, ScanLogOptions};
-use portolan_io::{CarmenLog, FileKind, detect, detect_no_return};
+use portolan_io::{BagChoice, FileKind, LaserLog, bag_dimension, detect, detect_no_return};
 use serde::{Deserialize, Serialize};
 
-use crate::arguments::{finite, length, length_or_zero, or_zero, point3};
+use crate::arguments::{finite, length, length_or_zero, or_zero, point3, seconds};
 use crate::dimension::{Dimension, ONLY_2D, ONLY_3D};
 use crate::error::bad_call;
 
@@ -17,6 +17,8 @@ use crate::error::bad_call;
 pub(crate) enum LogFormat {
     /// CARMEN text logs (.log, .clf; plain, gzip, bzip2)
     Carmen,
+    /// Bags of ROS 1 and ROS 2
+    Bag,
     /// Logs of 3-D scans
     Space(ScanLogKind),
 }
@@ -25,6 +27,7 @@ pub(crate) enum LogFormat {
 fn log_format(word: &str) -> Result<LogFormat, String> {
     match ScanLogKind::from_word(word) {
         _ if word == "carmen" => Ok(LogFormat::Carmen),
+        _ if word == ScanLogKind::Bag.word() => Ok(LogFormat::Bag),
         Some(kind) => Ok(LogFormat::Space(kind)),
         None => Err(format!("must be one of carmen, {}", ScanLogKind::ALL.map(ScanLogKind::word).join(", "))),
     }
@@ -44,7 +47,7 @@ pub(crate) struct LogArgs {
     /// lidar (the Tr of calib.txt is not applied)
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
-    /// Format of LOG, where it is not recognized: carmen (2-D); seven-scenes, tum, redwood, bigbird, kitti, stanford,
+    /// Format of LOG, where it is not recognized: carmen (2-D); bag (2-D or 3-D); seven-scenes, tum, redwood, bigbird, kitti, stanford,
     /// scan-graph, clouds (3-D)
     #[arg(long, value_name = "KIND", value_parser = log_format)]
     pub(crate) format: Option<LogFormat>,
@@ -63,19 +66,86 @@ pub(crate) struct LogArgs {
     #[arg(long, value_name = "N", value_parser = length, allow_negative_numbers = true, help_heading = ONLY_3D)]
     pub(crate) depth_scale: Option<f64>,
     /// Largest difference in time between a scan and its pose (seconds) [default: 0.02]
-    #[arg(long, value_name = "S", value_parser = length_or_zero, allow_negative_numbers = true, help_heading = ONLY_3D)]
+    #[arg(long, value_name = "S", value_parser = length_or_zero, allow_negative_numbers = true)]
     pub(crate) time_tolerance: Option<f64>,
+    #[command(flatten)]
+    pub(crate) bag: BagArgs,
+}
+
+/// Topics and frames of a bag.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct BagArgs {
+    /// Bags: topic with scans; may be given several times, for several sensors [default: the one with the most messages, of
+    /// clouds before planar lasers before depth images]
+    #[arg(long = "topic", value_name = "NAME")]
+    pub(crate) topics: Vec<String>,
+    /// Bags: topic with poses [default: the tree of transforms, where it has the sensor's frame]
+    #[arg(long, value_name = "NAME", conflicts_with = "poses")]
+    pub(crate) pose_topic: Option<String>,
+    /// Bags: frame of the map [default: map, else the root of the tree, else the frame of the poses]
+    #[arg(long, value_name = "FRAME", conflicts_with = "poses")]
+    pub(crate) fixed_frame: Option<String>,
+    /// Bags: frame that --pose-topic poses [default: what its messages say, else base_link or base_footprint, else the sensor]
+    #[arg(long, value_name = "FRAME", conflicts_with = "poses")]
+    pub(crate) base_frame: Option<String>,
+    /// Bags: added to the stamps of scans before their poses are looked up (seconds) [default: 0; half a turn back for lasers
+    /// whose stamps are of the end of a turn, which is told]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    pub(crate) time_offset: Option<f64>,
+    /// Bags: use what can be read of a bag that is cut or damaged
+    #[arg(long)]
+    pub(crate) allow_truncated: bool,
+}
+
+impl BagArgs {
+    /// As the reader takes it.
+    pub(crate) fn choice(&self) -> BagChoice {
+        let Self { topics, pose_topic, fixed_frame, base_frame, time_offset, allow_truncated } = self.clone();
+        BagChoice { topics, pose_topic, fixed_frame, base_frame, time_offset, allow_truncated }
+    }
+
+    /// The first option that was given.
+    fn given(&self) -> Option<&'static str> {
+        [
+            (!self.topics.is_empty(), "--topic"),
+            (self.pose_topic.is_some(), "--pose-topic"),
+            (self.fixed_frame.is_some(), "--fixed-frame"),
+            (self.base_frame.is_some(), "--base-frame"),
+            (self.time_offset.is_some(), "--time-offset"),
+            (self.allow_truncated, "--allow-truncated"),
+        ]
+        .into_iter()
+        .find_map(|(given, option)| given.then_some(option))
+    }
 }
 
 impl LogArgs {
     /// The dimension of the log's scans. What is not recognized counts as 2-D: that reader reports what is wrong.
     pub(crate) fn dimension(&self, path: &Path) -> anyhow::Result<Dimension> {
         Ok(match self.format {
-            Some(LogFormat::Carmen) => Dimension::Two,
             Some(LogFormat::Space(_)) => Dimension::Three,
+            _ if self.is_bag(path)? => match bag_dimension(path, &self.bag.choice())? {
+                2 => Dimension::Two,
+                _ => Dimension::Three,
+            },
+            Some(_) => Dimension::Two,
             None if matches!(detect(path)?, FileKind::ScanLog(_)) => Dimension::Three,
             None => Dimension::Two,
         })
+    }
+
+    /// Whether the log is a bag. Options of bags are refused where it is not.
+    pub(crate) fn is_bag(&self, path: &Path) -> anyhow::Result<bool> {
+        let bag = match self.format {
+            Some(format) => format == LogFormat::Bag,
+            None => detect(path)? == FileKind::Bag,
+        };
+        match self.bag.given() {
+            Some(option) if !bag => {
+                Err(bad_call(format!("{option} is only for bags; {} is none", path.display())))
+            }
+            _ => Ok(bag),
+        }
     }
 
     /// Refuses options that the sensor of a 3-D log has no use for.
@@ -96,7 +166,11 @@ impl LogArgs {
     pub(super) fn options(&self, color: bool) -> ScanLogOptions {
         let default = ScanLogOptions::default();
         ScanLogOptions {
-            format: self.format.and_then(|f| if let LogFormat::Space(kind) = f { Some(kind) } else { None }),
+            format: match self.format {
+                Some(LogFormat::Space(kind)) => Some(kind),
+                Some(LogFormat::Bag) => Some(ScanLogKind::Bag),
+                Some(LogFormat::Carmen) | None => None,
+            },
             poses: self.poses.clone(),
             pose_convention: self.pose_convention,
             origin: self.origin,
@@ -104,6 +178,7 @@ impl LogArgs {
             depth_scale: self.depth_scale,
             color,
             time_tolerance: self.time_tolerance.unwrap_or(default.time_tolerance),
+            bag: self.bag.choice(),
         }
     }
 }
@@ -167,7 +242,7 @@ impl RangeArgs {
 
 impl LimitArgs {
     /// The limits for a 2-D log; the range of "no echo" is detected where it was not given.
-    pub(crate) fn limits(&self, log: &CarmenLog) -> RangeLimits {
+    pub(crate) fn limits(&self, log: &LaserLog) -> RangeLimits {
         let open = RangeLimits::default();
         RangeLimits {
             min: self.range.min_range.unwrap_or(open.min),

@@ -10,9 +10,10 @@ use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{RangeLimits, Scan};
 use portolan_io::scan_log::ScanLog;
-use portolan_io::{CarmenLog, FileKind, detect, read_poses_2d};
+use portolan_io::{BagLogStats, FileKind, LaserLog, LaserLogStats, detect, read_poses_2d};
 use serde_json::{Value, json};
 
+use crate::error::bad_call;
 use crate::json;
 
 pub(crate) use arguments::{LimitArgs, LogArgs, NoReturnArgs, RangeArgs};
@@ -21,7 +22,7 @@ pub(crate) use selection::Selection;
 /// A log of either dimension.
 pub(crate) enum Log {
     /// Scans of a laser.
-    Two(Box<CarmenLog>),
+    Two(Box<LaserLog>),
     /// Depth images or clouds.
     Three(Box<ScanLog>),
 }
@@ -48,7 +49,7 @@ impl Log {
     /// The word for its format.
     pub(crate) fn format(&self) -> &'static str {
         match self {
-            Self::Two(_) => "carmen",
+            Self::Two(log) => log.format(),
             Self::Three(log) => log.kind().word(),
         }
     }
@@ -62,7 +63,7 @@ impl Log {
     pub(crate) fn to_json(&self) -> Value {
         let mut value = match self {
             Self::Two(log) => {
-                let mut value = json::log_stats(log.stats());
+                let mut value = json::laser_log_stats(log);
                 value["path"] = json!(log.path().display().to_string());
                 value["path_length"] = json!(path_length(log));
                 value
@@ -71,11 +72,30 @@ impl Log {
                 "name": log.name(),
                 "path_length": log.path_length(),
                 "poses": json::space_log_stats(log.stats()),
+                "bag": log.bag().map(json::bag_log_stats),
             }),
         };
         value["format"] = json!(self.format());
         value["scans"] = json!(self.len());
         value
+    }
+
+    /// What was chosen of a bag, a sentence each.
+    pub(crate) fn choices(&self) -> Vec<String> {
+        let stats = match self {
+            Self::Two(log) => match log.stats() {
+                LaserLogStats::Bag(stats) => stats,
+                LaserLogStats::Carmen(_) => return Vec::new(),
+            },
+            Self::Three(log) => match log.bag() {
+                Some(stats) => stats,
+                None => return Vec::new(),
+            },
+        };
+        let mut all = vec![format!("scans of {}, poses: {}", stats.topics.join(", "), stats.poses)];
+        all.extend(stats.point_times.iter().map(|t| format!("times of points: {t}")));
+        all.extend(stats.guesses.iter().map(|g| format!("guessed: {g}")));
+        all
     }
 
     /// What reading it brought up.
@@ -87,8 +107,39 @@ impl Log {
     }
 }
 
-fn warnings_2d(log: &CarmenLog) -> Vec<String> {
-    let stats = log.stats();
+/// What lowers the trust in what was read of a bag.
+fn bag_warnings(stats: &BagLogStats) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if let Some(first) = &stats.first_refused {
+        let causes: Vec<String> = stats.refused.iter().map(|(cause, n)| format!("{n} {cause}")).collect();
+        warnings.push(format!("scans could not be used: {} (first: {first})", causes.join(", ")));
+    }
+    if let Some(first) = &stats.first_without_pose {
+        let missing: Vec<String> =
+            stats.without_pose.iter().map(|(what, n)| format!("{n} for {what}")).collect();
+        warnings.push(format!(
+            "{} of {} scans have no pose at their time and were left out: {} (first: {first})",
+            stats.scans_without_pose(),
+            stats.messages,
+            missing.join(", ")
+        ));
+    }
+    if stats.tilted > 0 {
+        warnings.push(format!(
+            "{} scans are tilted by up to {:.1} degrees and were used as if level",
+            stats.tilted,
+            stats.worst_tilt.to_degrees()
+        ));
+    }
+    warnings.extend(stats.notes.iter().cloned());
+    warnings
+}
+
+fn warnings_2d(log: &LaserLog) -> Vec<String> {
+    let stats = match log.stats() {
+        LaserLogStats::Carmen(stats) => stats,
+        LaserLogStats::Bag(stats) => return bag_warnings(stats),
+    };
     let mut warnings = Vec::new();
     if let Some(first) = &stats.refused.first {
         warnings.push(format!("{} scan lines could not be used (first: {first})", stats.refused.total()));
@@ -102,6 +153,7 @@ fn warnings_2d(log: &CarmenLog) -> Vec<String> {
 
 fn warnings_3d(log: &ScanLog) -> Vec<String> {
     let stats = log.stats();
+    let mut warnings: Vec<_> = log.bag().map(bag_warnings).unwrap_or_default();
     let counts = [
         (stats.missing_files, "files of scans that the log names are missing"),
         (stats.poses_without_scan, "poses belong to no scan"),
@@ -109,8 +161,7 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
         (stats.unmatched_times, "scans have no pose near in time and were left out"),
         (stats.scans_without_color, "scans have no color picture"),
     ];
-    let mut warnings: Vec<_> =
-        counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    warnings.extend(counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")));
     if let Some(first) = stats.refused_poses.first() {
         warnings.push(format!("{} poses could not be used (first: {first})", stats.refused_poses.len()));
     }
@@ -129,7 +180,15 @@ pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool) -> anyhow::Resul
 }
 
 /// Reads a 2-D log.
-pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> {
+pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<LaserLog> {
+    if args.is_bag(path)? {
+        return Ok(LaserLog::read_bag(path, &args.options(false))?);
+    }
+    if args.time_tolerance.is_some() {
+        return Err(bad_call(
+            "--time-tolerance is for bags and 3-D logs; a CARMEN log has a pose with each scan",
+        ));
+    }
     if args.format.is_none() {
         match detect(path)? {
             FileKind::CarmenLog => {}
@@ -141,7 +200,7 @@ pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> 
             kind => bail!("{}: is {}, not a log of 2-D scans", path.display(), describe(&kind)),
         }
     }
-    let log = CarmenLog::read(path)?;
+    let log = LaserLog::read_carmen(path)?;
     let Some(file) = &args.poses else { return Ok(log) };
     let poses: Vec<_> = read_poses_2d(file)?.iter().map(|p| p.pose).collect();
     if poses.len() != log.len() {
@@ -159,6 +218,7 @@ pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<CarmenLog> 
 pub(crate) fn describe(kind: &FileKind) -> String {
     match kind {
         FileKind::CarmenLog => "a CARMEN log".into(),
+        FileKind::Bag => "a bag of ROS".into(),
         FileKind::ScanLog(kind) => kind.label().into(),
         FileKind::Mesh(format) => format.label().into(),
         FileKind::Portolan => "a portolan map".into(),
@@ -175,12 +235,12 @@ pub(crate) fn describe(kind: &FileKind) -> String {
 }
 
 /// These scans of the log, with their poses.
-pub(crate) fn scans(log: &CarmenLog, indices: &[usize], limits: &RangeLimits) -> Vec<(Pose<2>, Scan<2>)> {
+pub(crate) fn scans(log: &LaserLog, indices: &[usize], limits: &RangeLimits) -> Vec<(Pose<2>, Scan<2>)> {
     indices.iter().map(|&i| (log.raw(i).world_from_laser, log.raw(i).to_scan(limits))).collect()
 }
 
 /// Length of the sensor's path over all scans (meters).
-pub(crate) fn path_length(log: &CarmenLog) -> f64 {
+pub(crate) fn path_length(log: &LaserLog) -> f64 {
     let at = |i: usize| log.raw(i).world_from_laser.translation;
     (1..log.len()).map(|i| distance(at(i - 1), at(i))).sum()
 }

@@ -8,7 +8,7 @@ use portolan::mapper::MapperMaps;
 use portolan::scan::Scan;
 use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan_io::scan_log::ScanLog;
-use portolan_io::{AttenuationBricks, CarmenLog, ColorBricks, MapFile, OccupancyBricks, TsdfBricks};
+use portolan_io::{AttenuationBricks, ColorBricks, LaserLog, MapFile, OccupancyBricks, TsdfBricks};
 use serde_json::Map;
 
 use super::extent::{Extent, check_memory, grid_over, seen, with_outlier};
@@ -63,7 +63,7 @@ impl<'a> Run<'a> {
 
     /// Maps over the box of all that the scans see, which become dense in the end: scans are read first.
     fn new_2d(
-        log: &CarmenLog,
+        log: &LaserLog,
         indices: &[usize],
         settings: &Settings,
         before: Option<Box<MapFile<2>>>,

@@ -233,6 +233,9 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         stats.beams.hit,
         stats.beams.no_return
     );
+    for choice in summary.log.choices() {
+        let _ = writeln!(text, "{choice}");
+    }
     let r = summary.settings.resolution();
     let _ = match &summary.extent {
         Extent::Two(grid) => {

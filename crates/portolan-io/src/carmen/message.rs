@@ -5,28 +5,15 @@ use std::f64::consts::{PI, TAU};
 use super::stats::{ScanFault, ScanMessage};
 use crate::bytes::{fields, parse_f64};
 use crate::error::shown;
+use crate::laser_log::FanShape;
 
 /// More beams than this in a scan are taken for a broken line.
 pub(super) const MOST_BEAMS: usize = 100_000;
 
-/// The bearings of a scan, as its line defines them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct FanShape {
-    pub(super) start: f64,
-    pub(super) step: f64,
-    pub(super) beams: usize,
-}
-
-impl FanShape {
-    /// The fan of a `FLASER` scan.
-    fn flaser(beams: usize) -> Self {
-        let steps = if beams.is_multiple_of(2) { beams } else { (beams - 1).max(1) };
-        Self { start: -PI / 2.0, step: PI / steps as f64, beams }
-    }
-
-    pub(super) fn bearing(&self, i: usize) -> f64 {
-        self.start + i as f64 * self.step
-    }
+/// The fan of a `FLASER` scan.
+fn flaser_fan(beams: usize) -> FanShape {
+    let steps = if beams.is_multiple_of(2) { beams } else { (beams - 1).max(1) };
+    FanShape { start: -PI / 2.0, step: PI / steps as f64, beams }
 }
 
 /// The other values of a scan line.
@@ -76,7 +63,7 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Words<I> {
             self.number("odometry pose")?;
         }
         let time = self.tail()?;
-        Ok(ScanHead { fan: FanShape::flaser(beams), pose, time, max_range: None })
+        Ok(ScanHead { fan: flaser_fan(beams), pose, time, max_range: None })
     }
 
     fn robot_laser(&mut self, readings: &mut Vec<f64>) -> Result<ScanHead, Refusal> {
@@ -90,8 +77,8 @@ impl<'a, I: Iterator<Item = &'a [u8]>> Words<I> {
         let beams = self.beams()?;
         let fan = FanShape { start, step, beams };
         // A single beam needs no resolution; more than a turn (and some rounding) is not a 2-D fan.
-        let turns = step * (beams - 1) as f64 / TAU;
-        if !(start.abs() <= 2.0 * TAU && step.is_finite() && (beams == 1 || (step > 0.0 && turns <= 1.01))) {
+        let turns = step.abs() * (beams - 1) as f64 / TAU;
+        if !(start.abs() <= 2.0 * TAU && step.is_finite() && (beams == 1 || (step != 0.0 && turns <= 1.01))) {
             let text = format!(
                 "ROBOTLASER1 has start_angle {start} and angular_resolution {step} for {beams} beams"
             );

@@ -9,15 +9,11 @@
 //! `FLASER` lines have no bearings: `-pi/2 + i pi/n` for even `n` (180, 360) and `-pi/2 + i pi/(n - 1)` for
 //! odd `n` (181, 361) is what the SICK scanners of these logs do.
 //!
-//! Nor does a log define which readings mean "no echo": [`detect_no_return`] finds them. Time stamps are
+//! Nor does a log define which readings mean "no echo": [`crate::detect_no_return`] finds them. Time stamps are
 //! kept as they are given (they may be zero, relative, or wrap) and nothing depends on them.
 
-mod log;
 mod message;
-mod no_return;
 mod reading;
 mod stats;
 
-pub use log::{CarmenLog, CarmenScan};
-pub use no_return::detect_no_return;
-pub use stats::{CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage, TimeOrder};
+pub use stats::{CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage};

@@ -1,41 +1,35 @@
 //! Reading a log line by line.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use portolan::geom::Pose;
 
-use super::log::{CarmenLog, Entry, Fan};
-use super::message::{FanShape, ScanHead, parse_scan};
-use super::stats::{CarmenStats, RefusedScan, RefusedScans, ScanMessage, TimeOrder};
+use super::message::{ScanHead, parse_scan};
+use super::stats::{CarmenStats, RefusedScan, RefusedScans, ScanMessage};
 use crate::bytes::{Input, Lines, open};
+use crate::laser_log::{Entry, Fans, LaserLog, LaserLogStats, MOST_READINGS, MOST_SCANS, time_order};
 use crate::{IoError, Result, error::shown};
 
-/// The most readings that a log may hold: half a gigabyte of them.
-const MOST_READINGS: usize = 1 << 26;
-/// The most scans that a log may hold.
-const MOST_SCANS: usize = 1 << 22;
-/// The most beams of all different fans together.
-const MOST_FAN_BEAMS: usize = 1 << 23;
 /// The most message names that are counted apart.
 const MOST_NAMES: usize = 64;
 
-impl CarmenLog {
-    /// Reads a log file. Linear in its length.
+impl LaserLog {
+    /// Reads a CARMEN log. Linear in its length.
     ///
     /// # Errors
-    /// See [`CarmenLog::parse`] and [`open`].
-    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        Self::parse(open(path)?)
+    /// See [`LaserLog::parse_carmen`] and [`open`].
+    pub fn read_carmen(path: impl AsRef<Path>) -> Result<Self> {
+        Self::parse_carmen(open(path)?)
     }
 
-    /// Reads a log.
+    /// Reads a CARMEN log.
     ///
     /// # Errors
     /// [`IoError::NoScans`] where no line is a usable scan, [`IoError::Text`] for a line longer than 4 MiB or
     /// a log that would need gigabytes, and the errors of reading.
-    pub fn parse(input: Input) -> Result<Self> {
+    pub fn parse_carmen(input: Input) -> Result<Self> {
         Reading::default().run(Lines::of(input))
     }
 }
@@ -53,9 +47,7 @@ struct Collected {
 pub(super) struct Reading {
     flaser: Collected,
     robot_laser: Collected,
-    fans: Vec<Fan>,
-    fan_of_shape: HashMap<(u64, u64, usize), u32>,
-    fan_beams: usize,
+    fans: Fans,
     refused: RefusedScans,
     other: BTreeMap<Vec<u8>, u64>,
     rare: u64,
@@ -63,7 +55,7 @@ pub(super) struct Reading {
 
 impl Reading {
     /// Reads all lines.
-    pub(super) fn run(mut self, mut lines: Lines<impl BufRead>) -> Result<CarmenLog> {
+    pub(super) fn run(mut self, mut lines: Lines<impl BufRead>) -> Result<LaserLog> {
         while let Some(line) = lines.next_line()? {
             let line = line.trim_ascii();
             let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
@@ -99,7 +91,7 @@ impl Reading {
 
     /// Whether there was room for the scan.
     fn push(&mut self, message: ScanMessage, head: &ScanHead) -> bool {
-        let Some(fan) = self.fan(head.fan) else { return false };
+        let Some(fan) = self.fans.number(head.fan) else { return false };
         let into = self.of(message);
         let [x, y, theta] = head.pose;
         into.entries.push(Entry {
@@ -107,6 +99,9 @@ impl Reading {
             first_reading: into.readings.len() - head.fan.beams,
             fan,
             time: head.time,
+            declared: None,
+            time_increment: None,
+            laser: 0,
         });
         if let Some(declared) = head.max_range {
             into.max_range = Some(into.max_range.map_or(declared, |m: f64| m.min(declared)));
@@ -114,23 +109,6 @@ impl Reading {
         let scans = self.flaser.entries.len() + self.robot_laser.entries.len();
         let readings = self.flaser.readings.len() + self.robot_laser.readings.len();
         scans <= MOST_SCANS && readings <= MOST_READINGS
-    }
-
-    fn fan(&mut self, shape: FanShape) -> Option<u32> {
-        let key = (shape.start.to_bits(), shape.step.to_bits(), shape.beams);
-        if let Some(&fan) = self.fan_of_shape.get(&key) {
-            return Some(fan);
-        }
-        self.fan_beams += shape.beams;
-        if self.fan_beams > MOST_FAN_BEAMS {
-            return None;
-        }
-        let bearings: Vec<f64> = (0..shape.beams).map(|i| shape.bearing(i)).collect();
-        let directions = bearings.iter().map(|b| [b.cos(), b.sin()]).collect();
-        let fan = self.fans.len() as u32;
-        self.fans.push(Fan { bearings, directions });
-        self.fan_of_shape.insert(key, fan);
-        Some(fan)
     }
 
     fn count_other(&mut self, word: &[u8]) {
@@ -148,7 +126,7 @@ impl Reading {
         }
     }
 
-    fn finish(self, path: PathBuf, lines: u64) -> Result<CarmenLog> {
+    fn finish(self, path: PathBuf, lines: u64) -> Result<LaserLog> {
         let mut other_messages = BTreeMap::new();
         for (name, count) in self.other {
             let quoted = shown(&name);
@@ -173,7 +151,14 @@ impl Reading {
             declared_max_range: used.max_range,
             times: time_order(&used.entries),
         };
-        Ok(CarmenLog { path, entries: used.entries, fans: self.fans, readings: used.readings, stats })
+        Ok(LaserLog {
+            path,
+            entries: used.entries,
+            fans: self.fans.into_all(),
+            readings: used.readings,
+            trajectories: Vec::new(),
+            stats: LaserLogStats::Carmen(Box::new(stats)),
+        })
     }
 }
 
@@ -192,34 +177,29 @@ fn found(refused: &RefusedScans, other: &BTreeMap<String, u64>) -> String {
     if parts.is_empty() { "the file is empty".into() } else { parts.join(", ") }
 }
 
-fn time_order(entries: &[Entry]) -> TimeOrder {
-    let mut times = entries.iter().map(|e| e.time);
-    let Some(Some(first)) = times.next() else { return TimeOrder::Absent };
-    let (mut last, mut ascending, mut constant) = (first, true, true);
-    for time in times {
-        let Some(time) = time else { return TimeOrder::Absent };
-        ascending &= last <= time;
-        constant &= time == first;
-        last = time;
-    }
-    match (constant && entries.len() > 1, ascending) {
-        (true, _) => TimeOrder::Absent,
-        (_, true) => TimeOrder::Ascending,
-        (_, false) => TimeOrder::NotAscending,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laser_log::TimeOrder;
     use crate::testing::{no_panic, real_data, says};
     use crate::{Input, ScanFault};
     use portolan::scan::RangeLimits;
     use std::f64::consts::PI;
     use std::path::Path;
 
-    fn parse(text: impl Into<Vec<u8>>) -> Result<CarmenLog> {
-        CarmenLog::parse(Input::from_reader(std::io::Cursor::new(text.into()), Path::new("a.log")).unwrap())
+    fn parse(text: impl Into<Vec<u8>>) -> Result<LaserLog> {
+        LaserLog::parse_carmen(
+            Input::from_reader(std::io::Cursor::new(text.into()), Path::new("a.log")).unwrap(),
+        )
+    }
+
+    impl LaserLog {
+        fn carmen(&self) -> &CarmenStats {
+            match self.stats() {
+                LaserLogStats::Carmen(stats) => stats,
+                LaserLogStats::Bag(_) => panic!("no CARMEN log"),
+            }
+        }
     }
 
     const ROBOT: &str =
@@ -238,10 +218,10 @@ mod tests {
         assert_eq!((even.time, odd.time), (Some(100.25), None));
         assert!(even.readings[2].is_nan() && even.readings[3] == 81.83);
         assert_eq!(
-            log.stats().other_messages,
+            log.carmen().other_messages,
             [("#", 1), ("ODOM", 1), ("PARAM", 1)].map(|(n, c)| (n.to_owned(), c)).into()
         );
-        assert_eq!((log.stats().lines, log.stats().times), (6, TimeOrder::Absent));
+        assert_eq!((log.carmen().lines, log.carmen().times), (6, TimeOrder::Absent));
         let limits = RangeLimits { no_return: 80.0, ..RangeLimits::default() };
         let (_, scan) = log.scans(&limits).next().unwrap();
         assert_eq!((scan.counts().hit, scan.counts().no_return, scan.refused().not_finite), (2, 1, 1));
@@ -257,7 +237,7 @@ mod tests {
         assert_eq!(scan.world_from_laser, Pose::<2>::new(10.0, 20.0, 0.5));
         assert_eq!(scan.time, Some(77.5));
         assert_eq!(
-            (log.stats().message, log.stats().declared_max_range),
+            (log.carmen().message, log.carmen().declared_max_range),
             (ScanMessage::RobotLaser1, Some(30.0))
         );
     }
@@ -267,9 +247,12 @@ mod tests {
         let log =
             parse(format!("{ROBOT}\nFLASER 1 5 0 0 0 0 0 0 2 h 2\n{ROBOT}\nFLASER 1 5 0 0 0 0 0 0 1 h 1\n"))
                 .unwrap();
-        assert_eq!((log.len(), log.stats().skipped_scans, log.stats().message), (2, 2, ScanMessage::Flaser));
-        assert_eq!(log.stats().times, TimeOrder::NotAscending);
-        assert_eq!(log.stats().declared_max_range, None);
+        assert_eq!(
+            (log.len(), log.carmen().skipped_scans, log.carmen().message),
+            (2, 2, ScanMessage::Flaser)
+        );
+        assert_eq!(log.carmen().times, TimeOrder::NotAscending);
+        assert_eq!(log.carmen().declared_max_range, None);
     }
 
     #[test]
@@ -291,7 +274,7 @@ mod tests {
         ];
         for (line, fault) in lines {
             let log = parse(format!("{line}\nFLASER 1 5 0 0 0 0 0 0 2 h 2\n")).unwrap();
-            let refused = &log.stats().refused;
+            let refused = &log.carmen().refused;
             assert_eq!(refused.by_fault, [(fault, 1)].into(), "{line}");
             assert_eq!((log.len(), refused.first.as_ref().unwrap().line), (1, 1));
             says(parse(line), "1 scan lines refused, first line 1:");
@@ -313,7 +296,7 @@ mod tests {
     #[test]
     fn no_bytes_make_it_panic() {
         let good = format!("PARAM x\n{ROBOT}\nFLASER 4 1.5 2 3 81.83 1 2 0.5 7 8 9 100.25 host 3\n");
-        let check = |log: CarmenLog| assert!(log.raw_scans().all(|s| s.bearings.len() == s.readings.len()));
+        let check = |log: LaserLog| assert!(log.raw_scans().all(|s| s.bearings.len() == s.readings.len()));
         no_panic(good, 1, 4000, |bytes| parse(bytes).map(check));
     }
 
@@ -333,10 +316,10 @@ mod tests {
             ("intel.clf.bz2", 13631, 180, 26915 + 9 + 2),
         ] {
             let Some(path) = real_data(&format!("lidar2d_carmen/{name}")) else { continue };
-            let log = CarmenLog::read(path).unwrap();
-            assert_eq!((log.len(), log.stats().refused.total()), (scans, 0));
+            let log = LaserLog::read_carmen(path).unwrap();
+            assert_eq!((log.len(), log.carmen().refused.total()), (scans, 0));
             assert!(log.raw_scans().all(|s| s.readings.len() == beams));
-            assert_eq!(log.stats().other_messages.values().sum::<u64>(), other);
+            assert_eq!(log.carmen().other_messages.values().sum::<u64>(), other);
         }
     }
 }

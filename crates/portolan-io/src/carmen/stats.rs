@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use crate::laser_log::TimeOrder;
+
 /// The two messages that carry scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScanMessage {
@@ -92,17 +94,6 @@ impl RefusedScans {
         *self.by_fault.entry(scan.fault).or_default() += 1;
         self.first.get_or_insert(scan);
     }
-}
-
-/// Whether the stamps of the scans can be used as time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TimeOrder {
-    /// Some scan has no stamp, or all stamps are equal (zero in many logs).
-    Absent,
-    /// From scan to scan the stamps grow or stay.
-    Ascending,
-    /// Somewhere the stamps go back: they wrap, or lines are out of order.
-    NotAscending,
 }
 
 /// Counts of a log.

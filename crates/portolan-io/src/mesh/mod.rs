@@ -9,6 +9,7 @@ pub(crate) use format::mesh_format;
 pub use format::{MeshCounts, MeshFormat, mesh_counts, parse_mesh_counts};
 pub use glb::{glb_to_bytes, write_glb};
 pub use obj::write_obj;
+pub(crate) use ply::NEAR;
 pub use ply::{ply_mesh_to_bytes, write_ply_mesh};
 
 use std::path::Path;
@@ -18,7 +19,7 @@ use portolan::surface::Mesh;
 use crate::{IoError, Result};
 
 /// Refuses a mesh whose arrays do not fit together, or with a coordinate that is not finite.
-fn check(path: &Path, mesh: &Mesh) -> Result<()> {
+pub(crate) fn check(path: &Path, mesh: &Mesh) -> Result<()> {
     let vertices = mesh.vertices.len();
     let refuse =
         |field: &str, value: String, advice: &str| Err(IoError::unwritable(path, field, value, advice));

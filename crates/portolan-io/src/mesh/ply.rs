@@ -9,7 +9,7 @@ use super::check;
 use crate::{IoError, Result, write_atomic};
 
 /// World coordinates beyond this (meters) are written as `double`: up to it an f32 is no coarser than 0.06 mm.
-const NEAR: f64 = 1000.0;
+pub(crate) const NEAR: f64 = 1000.0;
 
 /// Writes a mesh as binary little-endian PLY: `x y z`, then `nx ny nz` and `red green blue` where the mesh has them,
 /// faces as `list uchar uint vertex_indices`.

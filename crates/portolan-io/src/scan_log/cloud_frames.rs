@@ -51,7 +51,7 @@ impl CloudFrames {
 }
 
 /// What leads from points about `base` to those of the file. `None` where they are the same.
-pub(super) fn file_from_frames(base: [f64; 3]) -> Option<Pose<3>> {
+pub(crate) fn file_from_frames(base: [f64; 3]) -> Option<Pose<3>> {
     (base != [0.0; 3]).then_some(Pose { translation: base, ..Pose::IDENTITY })
 }
 
@@ -79,7 +79,7 @@ const FARTHEST_APART: f64 = 65_536.0;
 ///
 /// # Errors
 /// [`IoError::Layout`] for a cloud so far from there that its shape would be lost.
-pub(super) fn about(mut cloud: PointCloudFile, base: [f64; 3], path: &Path) -> Result<PointCloudFile> {
+pub(crate) fn about(mut cloud: PointCloudFile, base: [f64; 3], path: &Path) -> Result<PointCloudFile> {
     if cloud.offset != base {
         let apart = (0..3).any(|k| (cloud.offset[k] - base[k]).abs() > FARTHEST_APART);
         if apart && !cloud.points.is_empty() {
@@ -101,7 +101,7 @@ pub(super) fn about(mut cloud: PointCloudFile, base: [f64; 3], path: &Path) -> R
 
 /// A scan of rays from one point (in the file's frame), with an image about that point where the cloud has rows and columns
 /// that a sensor can have.
-fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
+pub(crate) fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
     let image = cloud.grid.as_ref().and_then(|grid| {
         let about_origin = |i: usize| std::array::from_fn(|k| (cloud.position(i)[k] - origin[k]) as f32);
         let points: Vec<[f32; 3]> = (0..cloud.points.len()).map(about_origin).collect();

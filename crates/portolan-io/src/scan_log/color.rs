@@ -16,7 +16,8 @@ pub(super) fn read_color(path: &Path, size: [usize; 2]) -> Result<Vec<[u8; 3]>> 
     decode_color(path, &read_picture(path)?, size)
 }
 
-fn decode_color(path: &Path, bytes: &[u8], size: [usize; 2]) -> Result<Vec<[u8; 3]>> {
+/// Reads a color picture from its bytes.
+pub(crate) fn decode_color(path: &Path, bytes: &[u8], size: [usize; 2]) -> Result<Vec<[u8; 3]>> {
     match Picture::open(path, bytes)? {
         Picture::Jpeg(mut decoder) => {
             check_size(path, jpeg_size(path, &decoder)?, size)?;

@@ -18,11 +18,11 @@ const MOST_BYTES: u64 = 256 << 20;
 const TIGHTEST: u64 = 1032;
 
 /// A depth image in meters; 0 for pixels without a reading.
-pub(super) struct Depth {
-    pub(super) columns: usize,
-    pub(super) rows: usize,
+pub(crate) struct Depth {
+    pub(crate) columns: usize,
+    pub(crate) rows: usize,
     /// Row by row.
-    pub(super) values: Vec<f32>,
+    pub(crate) values: Vec<f32>,
 }
 
 /// Reads a depth image of so many units per meter. The values 0 and 65535 are no reading.
@@ -30,17 +30,25 @@ pub(super) fn read_depth(path: &Path, units_per_metre: f64) -> Result<Depth> {
     decode_depth(path, &read_picture(path)?, units_per_metre)
 }
 
-fn decode_depth(path: &Path, bytes: &[u8], units_per_metre: f64) -> Result<Depth> {
+/// [`read_depth`] of the bytes of a picture.
+pub(crate) fn decode_depth(path: &Path, bytes: &[u8], units_per_metre: f64) -> Result<Depth> {
+    let ([columns, rows], raw) = decode_gray16(path, bytes)?;
+    let scale = units_per_metre as f32;
+    let value = |units| match units {
+        u16::MAX => 0.0,
+        units => f32::from(units) / scale,
+    };
+    Ok(Depth { columns, rows, values: raw.into_iter().map(value).collect() })
+}
+
+/// Columns and rows of a picture of 16-bit gray, and its values row by row.
+pub(crate) fn decode_gray16(path: &Path, bytes: &[u8]) -> Result<([usize; 2], Vec<u16>)> {
     let mut reader = png_reader(path, bytes)?;
     let [columns, rows] = depth_size(path, reader.info(), bytes.len())?;
     let mut raw = vec![0; columns * rows * 2];
     reader.next_frame(&mut raw).map_err(|e| damaged(path, &e.to_string()))?;
-    let scale = units_per_metre as f32;
-    let value = |pair: &[u8]| match u16::from_be_bytes([pair[0], pair[1]]) {
-        u16::MAX => 0.0,
-        units => f32::from(units) / scale,
-    };
-    Ok(Depth { columns, rows, values: raw.chunks_exact(2).map(value).collect() })
+    let values = raw.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
+    Ok(([columns, rows], values))
 }
 
 /// Columns and rows of a depth image; its pixels are not read.

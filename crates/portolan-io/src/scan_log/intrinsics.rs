@@ -75,7 +75,7 @@ pub struct Camera {
 impl Camera {
     /// # Errors
     /// [`IoError::Layout`] where the camera is not one of pictures of this size: a common mix-up.
-    pub(super) fn check_size(&self, picture: &Path, size: [usize; 2]) -> Result<()> {
+    pub(crate) fn check_size(&self, picture: &Path, size: [usize; 2]) -> Result<()> {
         let Pinhole { cx, cy, .. } = self.pinhole;
         let inside = |c: f64, n: usize| c > 0.0 && c < n as f64;
         let fits = match self.size {
@@ -95,6 +95,14 @@ impl Camera {
         };
         Err(IoError::layout(picture, "the size of the picture", format!("{} x {}", size[0], size[1]), advice))
     }
+}
+
+/// The camera that the caller gave.
+///
+/// # Errors
+/// Those of reading its file.
+pub(crate) fn given_camera(options: &ScanLogOptions) -> Result<Option<Camera>> {
+    options.intrinsics.as_ref().map(Intrinsics::camera).transpose()
 }
 
 /// The camera of a log: what the caller gave, else the first of these files that is there, else what the data set's makers

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::parts::Parts;
 use super::{ScanLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
 use crate::Result;
+use crate::ros_log::{is_bag, open_bag};
 
 /// A kind of log of 3-D scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -24,6 +25,8 @@ pub enum ScanLogKind {
     Stanford,
     /// A scan graph of OctoMap.
     ScanGraph,
+    /// A bag of ROS 1 or ROS 2: a file or a folder.
+    Bag,
     /// A folder of PCD, PLY, `.bin` or text files with a file of poses, or of PCD files in the world's frame; a single cloud.
     Clouds,
 }
@@ -33,7 +36,7 @@ type Functions = (fn(&Path) -> bool, fn(&Path, &ScanLogOptions) -> Result<Parts>
 
 impl ScanLogKind {
     /// All kinds, in the order in which they are tried.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::SevenScenes,
         Self::TumRgbd,
         Self::BigBird,
@@ -42,6 +45,7 @@ impl ScanLogKind {
         Self::Stanford,
         Self::ScanGraph,
         Self::Clouds,
+        Self::Bag,
     ];
 
     fn functions(self) -> Functions {
@@ -54,6 +58,7 @@ impl ScanLogKind {
             Self::Stanford => (stanford::is_it, stanford::open),
             Self::ScanGraph => (graph::is_it, graph::open),
             Self::Clouds => (clouds::is_it, clouds::open),
+            Self::Bag => (is_bag, open_bag),
         }
     }
 
@@ -68,6 +73,7 @@ impl ScanLogKind {
             Self::Stanford => ("stanford", "range scans with a .conf file (Stanford)"),
             Self::ScanGraph => ("scan-graph", "scan graph (OctoMap)"),
             Self::Clouds => ("clouds", "clouds of points"),
+            Self::Bag => ("bag", "a bag of ROS"),
         }
     }
 

@@ -11,7 +11,7 @@ use super::matching::{Match, match_poses};
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
 use super::{Camera, RefusedPose, ScanLogKind, ScanLogOptions, ScanLogStats, UnreadColors};
 use crate::poses3::{MENDED_FROM, PoseConvention, RawPose, TrackPose, read_poses_3d};
-use crate::{IoError, Result};
+use crate::{BagLogStats, IoError, Result};
 
 /// A scan that has a pose.
 struct Entry {
@@ -31,6 +31,7 @@ pub struct ScanLog {
     entries: Vec<Entry>,
     camera: Option<Camera>,
     stats: ScanLogStats,
+    bag: Option<Box<BagLogStats>>,
 }
 
 impl ScanLog {
@@ -54,7 +55,8 @@ impl ScanLog {
     }
 
     fn assemble(path: &Path, kind: ScanLogKind, parts: Parts, options: &ScanLogOptions) -> Result<Self> {
-        let Parts { name, source, scans, poses, convention, posed_from_sensor, camera, mut stats } = parts;
+        let Parts { name, source, scans, poses, convention, posed_from_sensor, camera, mut stats, bag } =
+            parts;
         if scans.is_empty() {
             return Err(IoError::layout(path, "the number of scans", "0", "give a log with scans"));
         }
@@ -88,7 +90,7 @@ impl ScanLog {
             };
             return Err(IoError::layout(path, "the number of scans with a usable pose", value, advice));
         }
-        Ok(Self { path: path.into(), kind, name, source, entries, camera, stats })
+        Ok(Self { path: path.into(), kind, name, source, entries, camera, stats, bag })
     }
 
     /// Only every `n`-th scan of it, from the first; 0 counts as 1. [`ScanLog::stats`] stays about all of it.
@@ -153,6 +155,11 @@ impl ScanLog {
     /// What was found, and what was left out.
     pub fn stats(&self) -> &ScanLogStats {
         &self.stats
+    }
+
+    /// What was chosen and left out, if the log is a bag.
+    pub fn bag(&self) -> Option<&BagLogStats> {
+        self.bag.as_deref()
     }
 
     /// The camera, if the log is of one: where its numbers come from.

@@ -69,7 +69,7 @@ pub(super) fn match_poses(
 }
 
 /// Of what is in order of time, the nearest to a time, if it is within the tolerance (seconds).
-pub(super) fn nearest_in_time<T>(sorted: &[(f64, T)], time: f64, tolerance: f64) -> Option<&T> {
+pub(crate) fn nearest_in_time<T>(sorted: &[(f64, T)], time: f64, tolerance: f64) -> Option<&T> {
     let after = sorted.partition_point(|(t, _)| *t < time);
     let around = [after.checked_sub(1), Some(after)].into_iter().flatten().filter_map(|i| sorted.get(i));
     let off = |entry: &&(f64, T)| (entry.0 - time).abs();

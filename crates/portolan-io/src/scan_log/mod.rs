@@ -47,8 +47,14 @@ mod stats;
 mod testing;
 mod tum_rgbd;
 
+pub(crate) use cloud_frames::{about, file_from_frames, scan_from};
+pub(crate) use color::decode_color;
+pub(crate) use depth_png::{decode_depth, decode_gray16};
+pub(crate) use intrinsics::given_camera;
 pub use intrinsics::{Camera, CameraFrom, Intrinsics};
 pub use kind::ScanLogKind;
 pub use log::ScanLog;
+pub(crate) use matching::nearest_in_time;
 pub use options::ScanLogOptions;
+pub(crate) use parts::{FrameSource, LayoutPoses, Parts, ScanId};
 pub use stats::{RefusedPose, ScanLogStats, UnreadColors};

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Intrinsics, ScanLogKind};
+use crate::BagChoice;
 use crate::poses3::PoseConvention;
 
 /// Settings of reading; the default leaves everything to the files.
@@ -27,6 +28,8 @@ pub struct ScanLogOptions {
     pub color: bool,
     /// How far a pose's time may lie from a scan's (seconds). Default 0.02, as in TUM's tools.
     pub time_tolerance: f64,
+    /// Bags: topics and frames.
+    pub bag: BagChoice,
 }
 
 impl Default for ScanLogOptions {
@@ -40,6 +43,7 @@ impl Default for ScanLogOptions {
             depth_scale: None,
             color: true,
             time_tolerance: 0.02,
+            bag: BagChoice::default(),
         }
     }
 }

@@ -9,7 +9,7 @@ use portolan::scan::Frame;
 use super::files::{name_of, names_in};
 use super::{Camera, ScanLogStats, UnreadColors};
 use crate::poses3::{PoseConvention, PoseFile, RawPose, read_poses_3d};
-use crate::{IoError, Result};
+use crate::{BagLogStats, IoError, Result};
 
 /// Reads scans by index, in any order, from any thread.
 pub(crate) trait FrameSource: Send + Sync {
@@ -66,11 +66,13 @@ pub(crate) struct Parts {
     pub(crate) camera: Option<Camera>,
     /// What the format counted by itself.
     pub(crate) stats: ScanLogStats,
+    /// What was chosen and left out of a bag.
+    pub(crate) bag: Option<Box<BagLogStats>>,
 }
 
 impl Parts {
     /// Scans of sensors whose poses are their own, `world_from_sensor`.
-    pub(super) fn new(
+    pub(crate) fn new(
         path: &Path,
         source: impl FrameSource + 'static,
         scans: Vec<ScanId>,
@@ -87,6 +89,7 @@ impl Parts {
             posed_from_sensor: None,
             camera: None,
             stats,
+            bag: None,
         }
     }
 }

@@ -16,6 +16,8 @@ mod grid;
 mod interpolation;
 mod lattice;
 mod pose;
+mod trajectory;
+mod twist;
 pub mod vector;
 mod walk;
 
@@ -26,4 +28,5 @@ pub use grid::Grid;
 pub use interpolation::interpolate;
 pub use lattice::Lattice;
 pub use pose::{Pose, PoseError};
+pub use trajectory::{Motion, NoPose, Trajectory, TrajectoryError};
 pub use walk::RayWalk;

@@ -2,13 +2,13 @@
 
 use portolan::geom::Aabb;
 use portolan_io::scan_log::{CameraFrom, ScanLog};
-use portolan_io::{CarmenLog, detect_no_return};
+use portolan_io::{LaserLog, detect_no_return};
 use serde_json::{Value, json};
 
 use crate::json;
 use crate::log::path_length;
 
-pub(super) fn of_2d(log: &CarmenLog) -> Value {
+pub(super) fn of_2d(log: &LaserLog) -> Value {
     let mut poses = Aabb::EMPTY;
     let mut beams = Vec::new();
     for scan in log.raw_scans() {
@@ -27,7 +27,7 @@ pub(super) fn of_2d(log: &CarmenLog) -> Value {
         "readings_without_echo": log.raw_scans().flat_map(|s| s.readings).filter(silent).count(),
         "path_length": path_length(log),
         "extent_of_poses": json::aabb(&poses),
-        "log": json::log_stats(log.stats()),
+        "log": json::laser_log_stats(log),
     })
 }
 

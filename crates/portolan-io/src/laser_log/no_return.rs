@@ -1,6 +1,6 @@
 //! Which readings of a log mean "no echo".
 
-use super::CarmenLog;
+use super::LaserLog;
 
 /// Readings of SICK scanners that mean "no echo" whatever else the log holds: 0x1FF7 and above in centimeters,
 /// and 0x7FFF in millimeters (meters; first, last).
@@ -22,17 +22,26 @@ const FEWEST: usize = 10;
 /// 3. a broad pile: within 3 % of the top, with nothing below it for a fifth of its range, and spread over a
 ///    quarter of the beams and half a percent of all readings.
 ///
-/// A maximum range that the log declares (`ROBOTLASER1`) counts as well, where readings reach it. The returned
-/// value lies slightly below the pile. Unit free: a log in centimeters gives centimeters. Linear in the number
+/// A maximum range that the log declares (`ROBOTLASER1`) is believed where readings reach it, however many do. Only where most
+/// readings exceed it and differ from each other is it a mistake. Scans of bags bring their range themselves
+/// ([`RawLaserScan::declared`](super::RawLaserScan::declared)): nothing is guessed for them.
+///
+/// The returned value lies slightly below the pile. Unit free: a log in centimeters gives centimeters. Linear in the number
 /// of readings.
-pub fn detect_no_return(log: &CarmenLog) -> Option<f64> {
+pub fn detect_no_return(log: &LaserLog) -> Option<f64> {
+    if log.raw_scans().any(|scan| scan.declared.is_some()) {
+        return None;
+    }
     let tail = Tail::of(log);
-    // A reading that most beams have is a surface, not a missing echo.
-    let pile = tail.pile().filter(|&from| readings(log).filter(|(r, _)| *r >= from).count() <= tail.all / 2);
-    let declared = log.stats().declared_max_range.map(|max| 0.9985 * max).filter(|&from| {
-        let beyond = readings(log).filter(|(r, _)| *r >= from).count();
-        // A range that most readings exceed is a mistake.
-        beyond > 0 && beyond <= tail.all / 2
+    // Where most beams read one value, and others read less, it is no surface: walls are not round about the sensor. A reading
+    // that all have may be one.
+    let pile = tail.pile().filter(|&from| {
+        let count = tail.count_from(from);
+        count <= tail.all / 2 || (tail.equal(0, count) >= 0.9 && count <= tail.all - tail.all / 100)
+    });
+    let declared = log.declared_max_range().map(|max| 0.9985 * max).filter(|&from| {
+        let beyond: Vec<f64> = readings(log).map(|(r, _)| r).filter(|r| *r >= from).collect();
+        !beyond.is_empty() && (beyond.len() <= tail.all / 2 || most_frequent(beyond) >= 0.5)
     });
     match (pile, declared) {
         (Some(a), Some(b)) => Some(a.min(b)),
@@ -40,8 +49,15 @@ pub fn detect_no_return(log: &CarmenLog) -> Option<f64> {
     }
 }
 
+/// The share of the value that most of these have.
+fn most_frequent(mut all: Vec<f64>) -> f64 {
+    all.sort_unstable_by(f64::total_cmp);
+    let most = all.chunk_by(|a, b| a == b).map(<[_]>::len).max();
+    most.unwrap_or(0) as f64 / all.len().max(1) as f64
+}
+
 /// The readings of a log that are positive and finite, with their beam numbers.
-fn readings(log: &CarmenLog) -> impl Iterator<Item = (f64, u32)> + '_ {
+fn readings(log: &LaserLog) -> impl Iterator<Item = (f64, u32)> + '_ {
     let all = log.raw_scans().flat_map(|s| s.readings.iter().copied().zip(0u32..));
     all.filter(|(r, _)| *r > 0.0 && r.is_finite())
 }
@@ -57,7 +73,7 @@ struct Tail {
 }
 
 impl Tail {
-    fn of(log: &CarmenLog) -> Self {
+    fn of(log: &LaserLog) -> Self {
         let mut all = 0;
         // Stray readings may lie far above all others: the pile is looked for below the largest few.
         let mut largest = [0.0f64; STRAYS + 1];
@@ -159,7 +175,7 @@ mod tests {
         room: f64,
         scans: usize,
         mut special: impl FnMut(&mut Random, usize, usize) -> Option<f64>,
-    ) -> CarmenLog {
+    ) -> LaserLog {
         let mut random = Random(3);
         let mut text = String::new();
         for scan in 0..scans {
@@ -175,9 +191,9 @@ mod tests {
         parse(text)
     }
 
-    fn parse(text: String) -> CarmenLog {
+    fn parse(text: String) -> LaserLog {
         let input = crate::Input::from_reader(std::io::Cursor::new(text), "x".as_ref()).unwrap();
-        CarmenLog::parse(input).unwrap()
+        LaserLog::parse_carmen(input).unwrap()
     }
 
     fn sometimes(random: &mut Random, share: f64, values: &[f64]) -> Option<f64> {
@@ -185,7 +201,7 @@ mod tests {
     }
 
     #[track_caller]
-    fn between(low: f64, high: f64, log: &CarmenLog) {
+    fn between(low: f64, high: f64, log: &LaserLog) {
         let found = detect_no_return(log);
         assert!(found.is_some_and(|t| low < t && t < high), "{found:?} is not in {low}..{high}");
     }
@@ -264,7 +280,7 @@ mod tests {
             ("intel.clf.bz2", 79.0, 81.83),
         ] {
             let Some(path) = real_data(&format!("lidar2d_carmen/{name}")) else { continue };
-            between(real, code, &CarmenLog::read(path).unwrap());
+            between(real, code, &LaserLog::read_carmen(path).unwrap());
         }
     }
 }

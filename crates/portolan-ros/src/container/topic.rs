@@ -1,4 +1,4 @@
-//! MCAP, sqlite3 and ROS 1 bags as one thing: topics, an index, messages as bytes.
+//! What every container has: topics, and places of messages.
 
 /// How the bytes of a topic's messages are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,8 @@
+//! All containers against what was written into them, whole, damaged and cut.
+
+mod damage;
+mod mcap;
+mod real;
+mod ros1;
+mod sqlite;
+mod support;

@@ -1,1 +1,0 @@
-//! Definitions of messages, bytes to values, and the messages that maps are made of.

@@ -1,1 +1,0 @@
-//! The tree of frames at a time.
