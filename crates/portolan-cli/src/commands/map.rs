@@ -179,7 +179,7 @@ impl Args {
             *no_return = no_return.or_else(|| detect_no_return(&log));
             return Ok(Log::Two(Box::new(log)));
         }
-        let log = log::read_3d(&self.log, &self.source, settings.shape.color)?;
+        let log = log::read_3d(&self.log, &self.source, settings.shape.color, settings.shape.deskew)?;
         self.source.check_sensor(&log)?;
         Ok(Log::Three(Box::new(log)))
     }

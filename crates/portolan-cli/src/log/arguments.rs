@@ -93,7 +93,7 @@ impl LogArgs {
     }
 
     /// How a log of 3-D scans is opened.
-    pub(super) fn options(&self, color: bool) -> ScanLogOptions {
+    pub(super) fn options(&self, color: bool, deskew: bool) -> ScanLogOptions {
         let default = ScanLogOptions::default();
         ScanLogOptions {
             format: self.format.and_then(|f| if let LogFormat::Space(kind) = f { Some(kind) } else { None }),
@@ -103,6 +103,7 @@ impl LogArgs {
             intrinsics: self.intrinsics.as_deref().map(Intrinsics::from_word),
             depth_scale: self.depth_scale,
             color,
+            deskew,
             time_tolerance: self.time_tolerance.unwrap_or(default.time_tolerance),
         }
     }

@@ -9,7 +9,7 @@ use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{RangeLimits, Scan};
-use portolan_io::scan_log::ScanLog;
+use portolan_io::scan_log::{MotionStats, PointClock, ScanLog};
 use portolan_io::{CarmenLog, FileKind, detect, read_poses_2d};
 use serde_json::{Value, json};
 
@@ -78,6 +78,37 @@ impl Log {
         value
     }
 
+    /// What became of the motion of the sensor within its scans, for `summary.json`; null where it was left in.
+    pub(crate) fn motion_json(&self) -> Value {
+        let Some(motion) = self.motion() else { return Value::Null };
+        json!({
+            "taken_out": motion.deskewed,
+            "still": motion.still,
+            "not_covered": motion.not_covered.0,
+            "largest": motion.largest,
+            "times": motion.clock.map(PointClock::words),
+        })
+    }
+
+    /// The same for people, where there was motion to take out.
+    pub(crate) fn motion_words(&self) -> Option<String> {
+        let motion = self.motion().filter(|motion| motion.deskewed > 0)?;
+        Some(format!(
+            "motion taken out of {} scans (points moved by up to {:.2} m; their times are taken to be {}); --no-deskew leaves \
+             it in",
+            motion.deskewed,
+            motion.largest,
+            motion.clock.map_or("unknown", PointClock::words)
+        ))
+    }
+
+    fn motion(&self) -> Option<MotionStats> {
+        match self {
+            Self::Two(_) => None,
+            Self::Three(log) => log.motion(),
+        }
+    }
+
     /// What reading it brought up.
     pub(crate) fn warnings(&self) -> Vec<String> {
         match self {
@@ -117,6 +148,12 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
     if let Some(why) = &stats.colors_left_out {
         warnings.push(format!("colors were left out: {why}"));
     }
+    if let Some(MotionStats { not_covered: (n @ 1.., Some(first)), .. }) = log.motion() {
+        warnings.push(format!(
+            "{n} scans have times of their points, and no poses around these: the motion of the sensor is left in them (first: \
+             {first})"
+        ));
+    }
     if let Some(lost) = log.unread_colors() {
         warnings.push(format!("{} color pictures could not be read (first: {})", lost.pictures, lost.first));
     }
@@ -124,8 +161,8 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
 }
 
 /// Opens a log of 3-D scans.
-pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<ScanLog> {
-    Ok(ScanLog::open(path, &args.options(color))?)
+pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool, deskew: bool) -> anyhow::Result<ScanLog> {
+    Ok(ScanLog::open(path, &args.options(color, deskew))?)
 }
 
 /// Reads a 2-D log.

@@ -53,6 +53,10 @@ pub(crate) struct Shape {
     /// Do not fuse color
     #[arg(long = "no-color", action = clap::ArgAction::SetFalse, help_heading = ONLY_3D)]
     pub(crate) color: bool,
+    /// Leave the motion of the sensor within a scan in. Without this it is taken out where points have times and poses cover
+    /// them
+    #[arg(long = "no-deskew", action = clap::ArgAction::SetFalse, help_heading = ONLY_3D)]
+    pub(crate) deskew: bool,
     /// Leave out readings inside this part of the sensor's frame, which belong to the robot itself: a box
     /// x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius (meters); may be given several times
     #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true, help_heading = ONLY_3D)]
@@ -113,6 +117,7 @@ impl Default for Shape {
             carve: true,
             carve_weight: CARVE_WEIGHT,
             color: true,
+            deskew: true,
             self_filter: Vec::new(),
             hold_out: None,
         }

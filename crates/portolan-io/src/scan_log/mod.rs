@@ -17,6 +17,9 @@
 //! [`ScanLog::open`] finds the files, reads the poses and counts in [`ScanLogStats`] what does not fit together; the scans
 //! themselves are read on request, by index and from any thread.
 //!
+//! Points with times were measured while the sensor moved: [`ScanLog::filtered_frame`] takes that motion out, after what is found
+//! in rows and columns as they are in the file (images, filters), since it leaves none.
+//!
 //! To add a format: a file here with a function `fn(&Path, &ScanLogOptions) -> Result<Parts>`, which finds the
 //! scans and where their poses are, and a kind in `kind.rs`. Matching poses with scans, conventions, mending and refusing
 //! happen once, in `log.rs`.
@@ -28,6 +31,7 @@ mod clouds;
 mod color;
 mod depth_frames;
 mod depth_png;
+mod deskew;
 mod files;
 mod graph;
 mod intrinsics;
@@ -47,6 +51,7 @@ mod stats;
 mod testing;
 mod tum_rgbd;
 
+pub use deskew::{MotionStats, PointClock};
 pub use intrinsics::{Camera, CameraFrom, Intrinsics};
 pub use kind::ScanLogKind;
 pub use log::ScanLog;

@@ -25,6 +25,8 @@ pub struct ScanLogOptions {
     pub depth_scale: Option<f64>,
     /// Whether colors are read where the log has them. Default: yes.
     pub color: bool,
+    /// Whether the motion of the sensor within a scan is taken out, where points have times and poses cover them. Default: yes.
+    pub deskew: bool,
     /// How far a pose's time may lie from a scan's (seconds). Default 0.02, as in TUM's tools.
     pub time_tolerance: f64,
 }
@@ -39,6 +41,7 @@ impl Default for ScanLogOptions {
             intrinsics: None,
             depth_scale: None,
             color: true,
+            deskew: true,
             time_tolerance: 0.02,
         }
     }
