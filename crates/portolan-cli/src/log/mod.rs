@@ -145,6 +145,13 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
     if let Some(first) = stats.refused_poses.first() {
         warnings.push(format!("{} poses could not be used (first: {first})", stats.refused_poses.len()));
     }
+    warnings.extend(stats.notes.iter().cloned());
+    if stats.pixels_beyond_lens > 0 {
+        warnings.push(format!(
+            "{} pixels of each undistorted depth image are beyond what the lens shows, and have no reading",
+            stats.pixels_beyond_lens
+        ));
+    }
     if let Some(why) = &stats.colors_left_out {
         warnings.push(format!("colors were left out: {why}"));
     }
@@ -162,7 +169,7 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
 
 /// Opens a log of 3-D scans.
 pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool, deskew: bool) -> anyhow::Result<ScanLog> {
-    Ok(ScanLog::open(path, &args.options(color, deskew))?)
+    Ok(ScanLog::open(path, &args.options(color, deskew)?)?)
 }
 
 /// Reads a 2-D log.

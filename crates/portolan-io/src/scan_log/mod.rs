@@ -9,6 +9,8 @@
 //! | [`Clouds`](ScanLogKind::Clouds) | `*.pcd`, `*.ply`, `*.bin` or `*.xyz`; one such file | a file like `*pose*.csv`, else PCD viewpoints |
 //! | [`TumRgbd`](ScanLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
 //! | [`Redwood`](ScanLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
+//! | [`Transforms`](ScanLogKind::Transforms) | `transforms.json` names pictures and depth images | in the file, of an OpenGL camera |
+//! | [`Colmap`](ScanLogKind::Colmap) | `sparse/0` a model, `depth/*.png`, `images` | in the model, of any scale |
 //! | [`BigBird`](ScanLogKind::BigBird) | `masked_depth/frameF_camC.png` | `pose/poses.txt` |
 //!
 //! Poses that the caller names ([`ScanLogOptions::poses`]) are those of the sensor itself: KITTI's `Tr` is not applied to
@@ -28,15 +30,18 @@ mod agreement;
 mod bigbird;
 mod cloud_frames;
 mod clouds;
+mod colmap;
 mod color;
 mod depth_frames;
 mod depth_png;
 mod deskew;
+mod distortion;
 mod files;
 mod graph;
 mod intrinsics;
 mod kind;
 mod kitti;
+mod lens;
 #[cfg(test)]
 mod lidar_tests;
 mod log;
@@ -49,11 +54,15 @@ mod stanford;
 mod stats;
 #[cfg(test)]
 mod testing;
+mod transforms;
 mod tum_rgbd;
+mod views;
 
 pub use deskew::{MotionStats, PointClock};
+pub use distortion::Distortion;
 pub use intrinsics::{Camera, CameraFrom, Intrinsics};
 pub use kind::ScanLogKind;
+pub use lens::ColorCamera;
 pub use log::ScanLog;
 pub use options::ScanLogOptions;
 pub use stats::{RefusedPose, ScanLogStats, UnreadColors};
