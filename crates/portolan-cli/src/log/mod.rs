@@ -78,6 +78,14 @@ impl Log {
         value
     }
 
+    /// What was taken for granted of its poses and pictures, in sentences.
+    pub(crate) fn notes(&self) -> &[String] {
+        match self {
+            Self::Two(_) => &[],
+            Self::Three(log) => &log.stats().notes,
+        }
+    }
+
     /// What became of the motion of the sensor within its scans, for `summary.json`; null where it was left in.
     pub(crate) fn motion_json(&self) -> Value {
         let Some(motion) = self.motion() else { return Value::Null };
@@ -145,7 +153,6 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
     if let Some(first) = stats.refused_poses.first() {
         warnings.push(format!("{} poses could not be used (first: {first})", stats.refused_poses.len()));
     }
-    warnings.extend(stats.notes.iter().cloned());
     if stats.pixels_beyond_lens > 0 {
         warnings.push(format!(
             "{} pixels of each undistorted depth image are beyond what the lens shows, and have no reading",

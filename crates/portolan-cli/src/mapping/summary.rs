@@ -250,6 +250,9 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     for (scans, words) in ways.into_iter().filter(|(scans, _)| *scans > 0) {
         let _ = writeln!(text, "{scans} scans {words}");
     }
+    for note in summary.log.notes() {
+        let _ = writeln!(text, "note: {note}");
+    }
     if let Some(words) = summary.log.motion_words() {
         let _ = writeln!(text, "{words}");
     }

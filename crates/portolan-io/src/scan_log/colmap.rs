@@ -379,7 +379,7 @@ mod tests {
         let line = |i: usize| {
             let numbers: Vec<String> = extrinsic(i).iter().map(ToString::to_string).collect();
             // A picture without points has an empty line.
-            let points = if i % 2 == 0 { "1.5 2.5 -1 3.5 4.5 7" } else { "" };
+            let points = if i.is_multiple_of(2) { "1.5 2.5 -1 3.5 4.5 7" } else { "" };
             format!("{} {} 3 picture {i}.jpg\n{points}\n", i + 1, numbers.join(" "))
         };
         ["# Camera list\n3 PINHOLE 8 6 10 12 4 3\n".into(), (0..count).map(line).collect()]
@@ -404,7 +404,7 @@ mod tests {
 
     fn depths_in(folder: &Path, count: usize) {
         for i in 0..count {
-            let name = if i % 2 == 0 {
+            let name = if i.is_multiple_of(2) {
                 format!("depth/picture {i}.png")
             } else {
                 format!("depth/picture {i}.jpg.png")

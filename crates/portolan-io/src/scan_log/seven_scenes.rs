@@ -11,7 +11,7 @@ use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
 use super::files::{has_name, names_in, number_in};
 use super::intrinsics::{color_camera, find_camera, pinhole};
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
-use super::{Distortion, ScanLogOptions, ScanLogStats};
+use super::{CameraFrom, Distortion, ScanLogOptions, ScanLogStats};
 use crate::Result;
 
 const DEPTH: &str = ".depth.png";
@@ -55,6 +55,13 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     if options.poses.is_none() {
         let name_of_scan = |pose: &str| Some(format!("{}{DEPTH}", pose.strip_suffix(POSE)?));
         stats.poses_without_scan = poses_beside_nothing(path, &names, name_of_scan)?;
+    }
+    let has_colors = options.color && frames.iter().any(|f| f.color.is_some());
+    if let Some(CameraFrom::DataSet(name)) = camera.color.as_ref().map(|c| &c.from).filter(|_| has_colors) {
+        stats.notes.push(format!(
+            "colors are looked up through the camera that is published for {name}; --color-intrinsics names another, the depth \
+             camera's if colors are registered to depth"
+        ));
     }
     let source = DepthFrames::new(frames, &mut camera, UNITS_PER_METRE, options, &mut stats)?;
     let poses = LayoutPoses::PerScan(poses);

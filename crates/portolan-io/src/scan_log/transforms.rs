@@ -135,7 +135,7 @@ fn camera_of(file: &Path, i: usize, from: [&Value; 2], depth: &Path) -> Result<V
     };
     let side = |name: &str| -> Result<Option<usize>> {
         let Some(value) = number(name)? else { return Ok(None) };
-        if value >= 1.0 && value <= 1e6 && value.fract() == 0.0 {
+        if (1.0..=1e6).contains(&value) && value.fract() == 0.0 {
             return Ok(Some(value as usize));
         }
         Err(IoError::layout(file, format!("{name} of frame {i}"), value, "give the pictures' size in pixels"))

@@ -81,11 +81,12 @@ impl Model {
         let mut poses = Vec::with_capacity(views.len());
         for view in views {
             let Some(depth) = view.depth else { continue };
-            let (lens, size, color_lens) = lenses.get(view.camera);
+            // Every camera of a view is there.
+            let lens = lenses.0[&view.camera];
             let color = view.color.filter(|_| options.color && colors_left_out.is_none());
             // The others are looked at when they are read.
             if let (true, Some(picture), Some(expected), None) =
-                (frames.is_empty(), &color, color_lens.1, &options.color_intrinsics)
+                (frames.is_empty(), &color, lens.color_size, &options.color_intrinsics)
                 && let Ok([w, h]) = color_size(picture)
                 && [w, h] != expected
             {
@@ -99,10 +100,10 @@ impl Model {
             frames.push(DepthFrame {
                 depth,
                 color,
-                lens,
-                color_camera: Some((color_lens.0, Pose::IDENTITY)),
-                size: Some(size),
-                color_size: color_lens.1,
+                lens: lens.depth,
+                color_camera: Some((lens.color, Pose::IDENTITY)),
+                size: Some(lens.depth_size),
+                color_size: lens.color_size,
             });
         }
         if colors_left_out.is_some() {
@@ -137,8 +138,18 @@ impl Model {
     }
 }
 
-/// The lens of each camera's depth images and their size, and the lens of its pictures and theirs.
-struct Lenses(HashMap<usize, (Lens, [usize; 2], (Lens, Option<[usize; 2]>))>);
+/// A camera as its depth images and its pictures have it.
+#[derive(Clone, Copy)]
+struct ViewLens {
+    depth: Lens,
+    depth_size: [usize; 2],
+    color: Lens,
+    /// `None`: as the first picture.
+    color_size: Option<[usize; 2]>,
+}
+
+/// Those of the cameras that have views, by their place among the model's.
+struct Lenses(HashMap<usize, ViewLens>);
 
 impl Lenses {
     /// By the first depth image of each camera.
@@ -162,7 +173,7 @@ impl Lenses {
             own.distortion = options.distortion.unwrap_or(own.distortion);
             own.pinhole = Pinhole { cx: own.pinhole.cx - 0.5, cy: own.pinhole.cy - 0.5, ..own.pinhole };
             check(&own.pinhole, file)?;
-            let picture = (Lens::new(own.pinhole, own.distortion), own.size);
+            let color = Lens::new(own.pinhole, own.distortion);
             let lens = match &given {
                 // Of the depth images, as they are.
                 Some(given) => {
@@ -177,16 +188,11 @@ impl Lenses {
                         let value = format!("{} x {}", size[0], size[1]);
                         return Err(IoError::layout(depth, "the size of the depth image", value, advice));
                     }
-                    picture.0.scaled(by)
+                    color.scaled(by)
                 }
             };
-            all.insert(view.camera, (lens, size, picture));
+            all.insert(view.camera, ViewLens { depth: lens, depth_size: size, color, color_size: own.size });
         }
         Ok(Self(all))
-    }
-
-    fn get(&self, camera: usize) -> (Lens, [usize; 2], (Lens, Option<[usize; 2]>)) {
-        // Every camera of a view is there.
-        self.0[&camera]
     }
 }
