@@ -54,9 +54,13 @@ fn hall() -> World3 {
 fn mesh_errors(world: &World3, frames: impl Iterator<Item = Frame>) -> ErrorSummary {
     let config = TsdfConfig { resolution: 0.1, truncation: 0.3, ..TsdfConfig::default() };
     let mut map = Tsdf3::new(config).unwrap();
+    let mut seconds = 0.0;
     for (i, frame) in frames.enumerate() {
+        let start = std::time::Instant::now();
         map.integrate(&spatial(TURN * i as f64), &frame).unwrap();
+        seconds += start.elapsed().as_secs_f64();
     }
+    println!("{:.1} ms a scan", 1e3 * seconds / SCANS as f64);
     let mesh = marching_cubes(map.store(), None, &MeshSettings::default());
     let errors = (0..mesh.vertices.len()).map(|i| world.signed_distance(mesh.vertex_world(i)));
     ErrorSummary::of(errors.collect()).unwrap()

@@ -259,10 +259,11 @@ impl Settings {
         let mut shaping: Vec<String> = object(json!(self.shape)).into_iter().map(|(key, _)| key).collect();
         // Which scans are held out depends on which are looked at.
         shaping.extend(self.shape.hold_out.map(|_| "every".to_owned()));
+        // A map that was made before there was a setting agrees with its default.
+        let usual = object(json!(Shape::default()));
         for key in shaping {
-            let (Some(new), old) = (ours.get(&key), saved.get(&key).unwrap_or(&Value::Null)) else {
-                continue;
-            };
+            let old = saved.get(&key).or(usual.get(&key)).unwrap_or(&Value::Null);
+            let Some(new) = ours.get(&key) else { continue };
             if new != old {
                 let other = if key == "w_max" { " or --half-life" } else { "" };
                 bail!(

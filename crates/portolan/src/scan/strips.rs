@@ -29,11 +29,14 @@ impl Delivered {
 /// Within a strip the lidar turns at most so far (radians) and moves at most this share of a cell: what is wrong within it then is
 /// far below what a cell resolves.
 const MOST_TURN: f64 = 0.0044;
-const MOST_WAY_CELLS: f64 = 0.05;
+const MOST_WAY_CELLS: f64 = 0.1;
 /// A strip has at least so many columns.
 const FEWEST_COLUMNS: usize = 8;
 /// Readings of a column whose times differ by more than this share of the scan are of two turns.
 const ONE_COLUMN: f64 = 0.02;
+
+/// Share of the readings that strips must show; else times are in no order of columns, and rays lose nothing.
+const FEWEST_SHOWN: f64 = 0.95;
 
 /// The strips of a scan, for maps with cells of this edge (meters): images with their `scan_from_image`, next to each other, that
 /// share a column each. `image` is about the common origin of what was delivered, with columns once round. `None` where columns
@@ -74,7 +77,8 @@ pub(crate) fn strips(scan: &PointScan, image: &RangeImage, cell: f64) -> Option<
             from = to;
         }
     }
-    Some(all)
+    let shown: usize = all.iter().map(|(_, strip): &(Pose<3>, RangeImage)| strip.hits()).sum();
+    (shown as f64 >= FEWEST_SHOWN * image.hits() as f64).then_some(all)
 }
 
 /// When the pixels of an image were measured.
@@ -215,4 +219,87 @@ fn filled(mut times: Vec<f64>) -> Option<Vec<f64>> {
 /// The angle in `(-pi, pi]`.
 fn wrapped(angle: f64) -> f64 {
     angle - TAU * ((angle - PI) / TAU).ceil()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Aabb;
+    use crate::scan::LayoutFinder;
+
+    const COLUMNS: usize = 512;
+
+    /// Constant twist: 2 m/s, 90 degrees/s about a leaning axis.
+    fn pose(time: f64) -> Pose<3> {
+        let half = 0.5 * std::f64::consts::FRAC_PI_2;
+        let axis = [0.1, -0.05, 1.0].map(|v: f64| v / (1.0f64 + 0.0125).sqrt());
+        let q = [axis[0] * half.sin(), axis[1] * half.sin(), axis[2] * half.sin(), half.cos()];
+        let second = Pose::<3>::from_quaternion([2.0, 0.0, 0.05], q).unwrap();
+        Pose::IDENTITY.toward(&second, time)
+    }
+
+    const ROOM: Aabb<3> = Aabb { min: [-6.0, -5.0, -1.0], max: [7.0, 5.0, 3.0] };
+
+    /// A turn of a lidar in a room, `direction` columns a time step; its first column looks along y.
+    fn turned(direction: f64) -> PointScan {
+        let (mut points, mut times) = (Vec::new(), Vec::new());
+        for column in 0..COLUMNS {
+            let share = column as f64 / COLUMNS as f64;
+            let (time, azimuth) = (0.1 * share, 0.5 * PI + direction * TAU * share);
+            let at = pose(time);
+            for ring in 0..32 {
+                let e = 0.35 - 0.02 * f64::from(ring);
+                let ray = [e.cos() * azimuth.cos(), e.cos() * azimuth.sin(), e.sin()];
+                let world = at.rotate(ray);
+                let range = (0..3)
+                    .map(|k| {
+                        let wall = if world[k] > 0.0 { ROOM.max[k] } else { ROOM.min[k] };
+                        (wall - at.translation[k]) / world[k]
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                points.push(ray.map(|v| (v * range) as f32));
+                times.push(time as f32);
+            }
+        }
+        let mut scan = PointScan::new(points, [0.0; 3]);
+        scan.times = times;
+        let trajectory = Trajectory::new((0..30).map(|k| 0.01 * f64::from(k)).map(|t| (t, pose(t)))).unwrap();
+        scan.deskew(&pose(0.0), &mut trajectory.motion(0.1), 0.0).unwrap();
+        scan
+    }
+
+    #[test]
+    fn every_strip_shows_the_room_where_it_is() {
+        for direction in [1.0, -1.0] {
+            let scan = turned(direction);
+            let (points, _, origin) = scan.delivered.as_deref().unwrap().rays();
+            let image = LayoutFinder::default().image(points, origin, 0.1).unwrap();
+            let strips = strips(&scan, &image, 0.1).unwrap();
+            assert!((30..50).contains(&strips.len()), "{}", strips.len());
+            let (mut shown, mut worst) = (0, 0.0f64);
+            for (scan_from_image, strip) in &strips {
+                assert_eq!(strip.check(), Ok(()));
+                shown += strip.hits();
+                for (_, p) in strip.points() {
+                    // The scan's pose is the identity.
+                    let p = scan_from_image.transform_point(p);
+                    let off = |k: usize| (p[k] - ROOM.min[k]).min(ROOM.max[k] - p[k]).abs();
+                    worst = worst.max((0..3).map(off).fold(f64::INFINITY, f64::min));
+                }
+            }
+            // Pixels of one column a strip are in two.
+            assert!(shown + 64 >= points.len(), "{direction}: {shown} of {}", points.len());
+            assert!(worst < 0.01, "{direction}: {worst}");
+        }
+    }
+
+    #[test]
+    fn times_without_order_are_no_turn() {
+        let mut scan = turned(1.0);
+        let count = scan.times.len();
+        scan.times = (0..count).map(|i| 0.1 * ((i * 7919) % count) as f32 / count as f32).collect();
+        let (points, _, origin) = scan.delivered.as_deref().unwrap().rays();
+        let image = LayoutFinder::default().image(points, origin, 0.1).unwrap();
+        assert!(strips(&scan, &image, 0.1).is_none());
+    }
 }
