@@ -1,7 +1,7 @@
 //! Values on the command line: read, checked, refused with a reason (clap then exits with status 2).
 
 use portolan::cell::TsdfRule;
-use portolan::geom::Aabb;
+use portolan::geom::{Aabb, Pose};
 use portolan::scan::Body;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -187,6 +187,16 @@ pub(crate) fn point3(text: &str) -> Result<[f64; 3], String> {
         [x, y, z] => Ok([x, y, z]),
         _ => Err("must be three numbers x,y,z in meters".to_owned()),
     }
+}
+
+/// `x,y,z` or `x,y,z,qx,qy,qz,qw` (meters).
+pub(crate) fn pose3(text: &str) -> Result<Pose<3>, String> {
+    let pose = match numbers(text)?[..] {
+        [x, y, z] => Some(Pose { translation: [x, y, z], ..Pose::IDENTITY }),
+        [x, y, z, qx, qy, qz, qw] => Pose::<3>::from_quaternion([x, y, z], [qx, qy, qz, qw]),
+        _ => None,
+    };
+    pose.ok_or_else(|| "must be x,y,z or x,y,z,qx,qy,qz,qw with a quaternion that is not zero".to_owned())
 }
 
 /// `x0,y0,z0,x1,y1,z1` in meters.

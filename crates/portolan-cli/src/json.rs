@@ -149,6 +149,8 @@ pub(crate) fn space_log_stats(stats: &ScanLogStats) -> Value {
         },
         "scans_without_color": stats.scans_without_color,
         "colors_left_out": stats.colors_left_out,
+        "notes": stats.notes,
+        "pixels_beyond_lens": stats.pixels_beyond_lens,
     })
 }
 

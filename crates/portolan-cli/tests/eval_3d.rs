@@ -113,6 +113,7 @@ fn ranges_of_scans_are_predicted() {
         rows: 10,
         values: (0..200).map(|i| if i < 20 { 0.0 } else { 0.8 }).collect(),
         colors: Vec::new(),
+        colored: Vec::new(),
         refused: RefusedBeams::default(),
     });
     for scan in 0..4 {

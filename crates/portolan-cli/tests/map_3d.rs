@@ -271,3 +271,63 @@ fn the_box_that_would_fit_fits() {
     let size = out.join("esdf.bin").metadata().unwrap().len();
     assert!(size <= 256 << 20 && size > 200 << 20, "{size}");
 }
+
+/// A lidar that drives and turns while it scans, with the time of every point.
+#[test]
+fn the_motion_of_a_lidar_is_taken_out_and_said() {
+    use portolan::geom::Pose;
+    use portolan::scan::Frame;
+    use portolan_io::{PointCloudFile, write_pcd};
+    use portolan_sim::building::{SpinningLidar, building_world, moving_lidar_frame};
+
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log");
+    std::fs::create_dir_all(&log).unwrap();
+    let building = building_world(1);
+    let [x, y] = building.path[0];
+    let lidar = SpinningLidar { rings: 24, columns: 360, organized: false, ..SpinningLidar::default() };
+    let directions = lidar.directions();
+    let (sin, cos) = (std::f64::consts::FRAC_PI_4.sin(), std::f64::consts::FRAC_PI_4.cos());
+    let second = Pose::<3>::from_quaternion([0.3, 0.0, 0.0], [0.0, 0.0, sin, cos]).unwrap();
+    let start = Pose { translation: [x, y, 1.2], ..Pose::IDENTITY };
+    let pose = |time: f64| start * Pose::IDENTITY.toward(&second, time);
+    let mut poses = String::new();
+    for i in 0..6 {
+        let stamp = 0.1 * f64::from(i);
+        let frame =
+            moving_lidar_frame(&building.world, |t| pose(stamp + t), &lidar, &directions, 0.1, (1, i as u64));
+        let Frame::Points(scan) = frame else { panic!("a lidar delivers points") };
+        let hits = scan.points.len();
+        let cloud = PointCloudFile {
+            points: scan.points,
+            times: scan.times[..hits].to_vec(),
+            start_time: 1000.0 + stamp,
+            ..PointCloudFile::default()
+        };
+        write_pcd(log.join(format!("{:.3}.pcd", 1000.0 + stamp)), &cloud).unwrap();
+        let ([a, b, c], half) =
+            (pose(stamp).translation, 0.5 * pose(stamp).rotation[1][0].atan2(pose(stamp).rotation[0][0]));
+        poses += &format!("{:.3} {a} {b} {c} 0 0 {} {}\n", 1000.0 + stamp, half.sin(), half.cos());
+    }
+    std::fs::write(log.join("poses.txt"), poses).unwrap();
+
+    let (with, without) = (folder.path().join("with"), folder.path().join("without"));
+    let text = map(&log, &with, &[]);
+    assert!(text.contains("motion taken out of 6 scans (points moved by up to "), "{text}");
+    assert!(text.contains("their times are taken to be of the clock of the stamps"), "{text}");
+    let motion = summary(&with)["motion"].clone();
+    assert_eq!((&motion["taken_out"], &motion["not_covered"]), (&6.into(), &0.into()));
+    assert!(motion["largest"].as_f64().unwrap() > 0.3, "{motion}");
+    map(&log, &without, &["--no-deskew"]);
+    assert_eq!(summary(&without)["motion"], serde_json::Value::Null);
+    let error = |out: &Path| {
+        let mesh = portolan_io::read_ply_mesh(out.join("mesh.ply")).unwrap();
+        let mut all: Vec<f64> = (0..mesh.vertices.len())
+            .map(|i| building.world.signed_distance(mesh.vertices[i]).abs())
+            .collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    };
+    let (with, without) = (error(&with), error(&without));
+    assert!(with < 0.5 * without, "{with} {without}");
+}

@@ -35,7 +35,7 @@ pub use accuracy::{ErrorSummary, Truth};
 pub use apartment::{Apartment, CHAIR_MOVE, apartment};
 pub use building::building_log;
 pub use drive::{Lap, LapConfig, SEED, lap, lap_poses};
-pub use lidar::{Lidar, scan_at};
+pub use lidar::{Lidar, scan_at, scan_while_moving};
 pub use odometry::{OdometryNoise, dead_reckon, heading, measure_motions, planar};
 pub use random::Random;
 pub use solid::{Solid, SolidKind};

@@ -28,14 +28,27 @@ impl Default for Lidar {
 
 /// The scan of the lidar from a pose. The noise depends on the stream `(seed, index)` alone.
 pub fn scan_at(world: &World, world_from_sensor: &Pose<2>, lidar: &Lidar, seed: u64, index: u64) -> Scan<2> {
+    scan_while_moving(world, |_| *world_from_sensor, lidar, seed, index)
+}
+
+/// The scan of a lidar that moves: `world_from_sensor` is its pose when it measured beam `i`. Beams are in the frame of their moment,
+/// as a driver delivers them. Without motion it is the scan of [`scan_at`].
+pub fn scan_while_moving(
+    world: &World,
+    world_from_sensor: impl Fn(usize) -> Pose<2>,
+    lidar: &Lidar,
+    seed: u64,
+    index: u64,
+) -> Scan<2> {
     let mut random = Random::stream(seed, index);
     let bearings: Vec<f64> =
         (0..lidar.beams).map(|i| (i as f64 / lidar.beams as f64 - 0.5) * std::f64::consts::TAU).collect();
-    let beams = bearings.iter().map(|&bearing| {
+    let beams = bearings.iter().enumerate().map(|(i, &bearing)| {
+        let pose = world_from_sensor(i);
         let direction = [libm::cos(bearing), libm::sin(bearing)];
         // Drawn for every beam, so that the result of one beam does not change the noise of the next.
         let (fate, noise) = (random.uniform(), random.normal());
-        let hit = world.cast_ray(world_from_sensor.translation, world_from_sensor.rotate(direction));
+        let hit = world.cast_ray(pose.translation, pose.rotate(direction));
         let (kind, range) = if fate < lidar.dropped_rate {
             (BeamKind::Dropped, 0.0)
         } else if fate < lidar.dropped_rate + lidar.no_return_rate {

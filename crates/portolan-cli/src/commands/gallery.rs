@@ -85,7 +85,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         let grid = apartment_grid(args.resolution);
         (Some(world), scans, grid, "the simulated Apartment".to_owned())
     } else {
-        let log = log::read_2d(&args.log, &args.source)?;
+        let log = log::read_2d(&args.log, &args.source, true)?;
         let limits = args.limits.limits(&log);
         let (fused, _) = Selection { every: args.every, hold_out: None }.split(log.len());
         let scans = log::scans(&log, &fused, &limits);

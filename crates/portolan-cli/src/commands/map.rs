@@ -174,12 +174,12 @@ impl Args {
     /// Opens the log. From a 2-D log comes the range of readings without echo, where it was not given.
     fn open(&self, settings: &mut Settings) -> anyhow::Result<Log> {
         if settings.dimension == Dimension::Two {
-            let log = log::read_2d(&self.log, &self.source)?;
+            let log = log::read_2d(&self.log, &self.source, settings.shape.deskew)?;
             let no_return = &mut settings.no_return.no_return;
             *no_return = no_return.or_else(|| detect_no_return(&log));
             return Ok(Log::Two(Box::new(log)));
         }
-        let log = log::read_3d(&self.log, &self.source, settings.shape.color)?;
+        let log = log::read_3d(&self.log, &self.source, settings.shape.color, settings.shape.deskew)?;
         self.source.check_sensor(&log)?;
         Ok(Log::Three(Box::new(log)))
     }

@@ -124,7 +124,7 @@ impl Args {
 
     fn log_2d(&self, path: &Path) -> anyhow::Result<Logs> {
         Dimension::Two.check::<Self, _>(&self.given, "the log")?;
-        let log = log::read_2d(path, &self.source)?;
+        let log = log::read_2d(path, &self.source, true)?;
         let (shown, _) = Selection { every: self.every, hold_out: None }.split(log.len());
         let scans = log::scans(&log, &shown, &self.limits.limits(&log));
         if scans.iter().all(|(_, scan)| scan.counts().hit == 0) {
@@ -140,7 +140,7 @@ impl Args {
     fn log_3d(&self, path: &Path) -> anyhow::Result<Logs> {
         Dimension::Three.check::<Self, _>(&self.given, "the log")?;
         let filter = self.limits.range.filter(Vec::new())?;
-        let log = log::read_3d(path, &self.source, true)?;
+        let log = log::read_3d(path, &self.source, true, true)?;
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
         Ok(Logs {
             source_3d: Source3d::Recorded { log: Box::new(log.every(every)), filter },

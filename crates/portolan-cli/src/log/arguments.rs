@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use portolan::geom::Pose;
 use portolan::scan::{Body, FrameFilter, RangeLimits};
 use portolan_io::poses3::PoseConvention;
-use portolan_io::scan_log::{Intrinsics, ScanLog, ScanLogKind, ScanLogOptions};
+use portolan_io::scan_log::{Distortion, Intrinsics, ScanLog, ScanLogKind, ScanLogOptions};
 use portolan_io::{BagChoice, FileKind, LaserLog, bag_dimension, detect, detect_no_return};
 use serde::{Deserialize, Serialize};
 
-use crate::arguments::{finite, length, length_or_zero, or_zero, point3, seconds};
+use crate::arguments::{finite, length, length_or_zero, or_zero, point3, pose3, seconds};
 use crate::dimension::{Dimension, ONLY_2D, ONLY_3D};
 use crate::error::bad_call;
 
@@ -48,7 +49,7 @@ pub(crate) struct LogArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
     /// Format of LOG, where it is not recognized: carmen (2-D); bag (2-D or 3-D); seven-scenes, tum, redwood, bigbird, kitti, stanford,
-    /// scan-graph, clouds (3-D)
+    /// scan-graph, transforms, colmap, clouds (3-D)
     #[arg(long, value_name = "KIND", value_parser = log_format)]
     pub(crate) format: Option<LogFormat>,
     /// How to read the poses, where the format's own convention does not apply: world-from-sensor, sensor-from-world,
@@ -62,6 +63,24 @@ pub(crate) struct LogArgs {
     /// Depth images: intrinsics of the camera, as fx,fy,cx,cy (pixels) or a file
     #[arg(long, value_name = "CAMERA", help_heading = ONLY_3D)]
     pub(crate) intrinsics: Option<String>,
+    /// Depth images: scale the camera to the pictures, where it is one of pictures of another size
+    #[arg(long, help_heading = ONLY_3D)]
+    pub(crate) scale_intrinsics: bool,
+    /// Depth images: distortion of the lens, as model:k1,k2,p1,p2[,k3[,k4,k5,k6]] with the model plumb_bob, rational or
+    /// fisheye (OpenCV's order) [default: none]
+    #[arg(long, value_name = "LENS", help_heading = ONLY_3D)]
+    pub(crate) distortion: Option<String>,
+    /// Depth images: intrinsics of a color camera that is not the depth camera, as fx,fy,cx,cy (pixels) or a file
+    /// [default: colors are registered to depth; 7-Scenes: 525,525,320,240]
+    #[arg(long, value_name = "CAMERA", help_heading = ONLY_3D)]
+    pub(crate) color_intrinsics: Option<String>,
+    /// Depth images: distortion of the color camera's lens, as for --distortion
+    #[arg(long, value_name = "LENS", help_heading = ONLY_3D)]
+    pub(crate) color_distortion: Option<String>,
+    /// Depth images: pose of the depth camera in the frame of the color camera, x,y,z or x,y,z,qx,qy,qz,qw (meters)
+    /// [default: both are at one place]
+    #[arg(long, value_name = "POSE", value_parser = pose3, allow_hyphen_values = true, help_heading = ONLY_3D)]
+    pub(crate) color_from_depth: Option<Pose<3>>,
     /// Depth images: units per meter, 1000 for millimeters
     #[arg(long, value_name = "N", value_parser = length, allow_negative_numbers = true, help_heading = ONLY_3D)]
     pub(crate) depth_scale: Option<f64>,
@@ -151,10 +170,17 @@ impl LogArgs {
     /// Refuses options that the sensor of a 3-D log has no use for.
     pub(crate) fn check_sensor(&self, log: &ScanLog) -> anyhow::Result<()> {
         let (camera, kind) = (log.camera().is_some(), log.kind().word());
-        if !camera && (self.intrinsics.is_some() || self.depth_scale.is_some()) {
-            return Err(bad_call(format!(
-                "--intrinsics and --depth-scale are for depth images; the log is {kind}"
-            )));
+        let given = [
+            (self.intrinsics.is_some(), "--intrinsics"),
+            (self.depth_scale.is_some(), "--depth-scale"),
+            (self.scale_intrinsics, "--scale-intrinsics"),
+            (self.distortion.is_some(), "--distortion"),
+            (self.color_intrinsics.is_some(), "--color-intrinsics"),
+            (self.color_distortion.is_some(), "--color-distortion"),
+            (self.color_from_depth.is_some(), "--color-from-depth"),
+        ];
+        if let Some((_, option)) = given.iter().find(|(given, _)| *given && !camera) {
+            return Err(bad_call(format!("{option} is for depth images; the log is {kind}")));
         }
         if camera && self.origin.is_some() {
             return Err(bad_call(format!("--origin is for point clouds; the log is {kind}")));
@@ -163,9 +189,12 @@ impl LogArgs {
     }
 
     /// How a log of 3-D scans is opened.
-    pub(super) fn options(&self, color: bool) -> ScanLogOptions {
+    pub(super) fn options(&self, color: bool, deskew: bool) -> anyhow::Result<ScanLogOptions> {
         let default = ScanLogOptions::default();
-        ScanLogOptions {
+        let lens = |word: &Option<String>, option: &str| {
+            word.as_deref().map(|word| Distortion::from_word(word, option)).transpose()
+        };
+        Ok(ScanLogOptions {
             format: match self.format {
                 Some(LogFormat::Space(kind)) => Some(kind),
                 Some(LogFormat::Bag) => Some(ScanLogKind::Bag),
@@ -175,11 +204,17 @@ impl LogArgs {
             pose_convention: self.pose_convention,
             origin: self.origin,
             intrinsics: self.intrinsics.as_deref().map(Intrinsics::from_word),
+            scale_intrinsics: self.scale_intrinsics,
+            distortion: lens(&self.distortion, "--distortion")?,
+            color_intrinsics: self.color_intrinsics.as_deref().map(Intrinsics::from_word),
+            color_distortion: lens(&self.color_distortion, "--color-distortion")?,
+            color_from_depth: self.color_from_depth,
             depth_scale: self.depth_scale,
             color,
+            deskew,
             time_tolerance: self.time_tolerance.unwrap_or(default.time_tolerance),
             bag: self.bag.choice(),
-        }
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{RangeLimits, Scan};
-use portolan_io::scan_log::ScanLog;
+use portolan_io::scan_log::{MotionStats, PointClock, ScanLog};
 use portolan_io::{BagLogStats, FileKind, LaserLog, LaserLogStats, detect, read_poses_2d};
 use serde_json::{Value, json};
 
@@ -98,6 +98,45 @@ impl Log {
         all
     }
 
+    /// What was taken for granted of its poses and pictures, in sentences.
+    pub(crate) fn notes(&self) -> &[String] {
+        match self {
+            Self::Two(_) => &[],
+            Self::Three(log) => &log.stats().notes,
+        }
+    }
+
+    /// What became of the motion of the sensor within its scans, for `summary.json`; null where it was left in.
+    pub(crate) fn motion_json(&self) -> Value {
+        let Some(motion) = self.motion() else { return Value::Null };
+        json!({
+            "taken_out": motion.deskewed,
+            "still": motion.still,
+            "not_covered": motion.not_covered.0,
+            "largest": motion.largest,
+            "times": motion.clock.map(PointClock::words),
+        })
+    }
+
+    /// The same for people, where there was motion to take out.
+    pub(crate) fn motion_words(&self) -> Option<String> {
+        let motion = self.motion().filter(|motion| motion.deskewed > 0)?;
+        Some(format!(
+            "motion taken out of {} scans (points moved by up to {:.2} m; their times are taken to be {}); --no-deskew leaves \
+             it in",
+            motion.deskewed,
+            motion.largest,
+            motion.clock.map_or("unknown", PointClock::words)
+        ))
+    }
+
+    fn motion(&self) -> Option<MotionStats> {
+        match self {
+            Self::Two(log) => log.motion(),
+            Self::Three(log) => log.motion(),
+        }
+    }
+
     /// What reading it brought up.
     pub(crate) fn warnings(&self) -> Vec<String> {
         match self {
@@ -138,7 +177,9 @@ fn bag_warnings(stats: &BagLogStats) -> Vec<String> {
 fn warnings_2d(log: &LaserLog) -> Vec<String> {
     let stats = match log.stats() {
         LaserLogStats::Carmen(stats) => stats,
-        LaserLogStats::Bag(stats) => return bag_warnings(stats),
+        LaserLogStats::Bag(stats) => {
+            return bag_warnings(stats).into_iter().chain(left_in(log.motion())).collect();
+        }
     };
     let mut warnings = Vec::new();
     if let Some(first) = &stats.refused.first {
@@ -165,24 +206,41 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
     if let Some(first) = stats.refused_poses.first() {
         warnings.push(format!("{} poses could not be used (first: {first})", stats.refused_poses.len()));
     }
+    if stats.pixels_beyond_lens > 0 {
+        warnings.push(format!(
+            "{} pixels of each undistorted depth image are beyond what the lens shows, and have no reading",
+            stats.pixels_beyond_lens
+        ));
+    }
     if let Some(why) = &stats.colors_left_out {
         warnings.push(format!("colors were left out: {why}"));
     }
+    warnings.extend(left_in(log.motion()));
     if let Some(lost) = log.unread_colors() {
         warnings.push(format!("{} color pictures could not be read (first: {})", lost.pictures, lost.first));
     }
     warnings
 }
 
+/// That motion was left in scans whose points have times.
+fn left_in(motion: Option<MotionStats>) -> Option<String> {
+    let MotionStats { not_covered: (n @ 1.., Some(first)), .. } = motion? else { return None };
+    Some(format!(
+        "{n} scans have times of their points, and no poses around these: the motion of the sensor is left in them (first: \
+         {first})"
+    ))
+}
+
 /// Opens a log of 3-D scans.
-pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<ScanLog> {
-    Ok(ScanLog::open(path, &args.options(color))?)
+pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool, deskew: bool) -> anyhow::Result<ScanLog> {
+    Ok(ScanLog::open(path, &args.options(color, deskew)?)?)
 }
 
 /// Reads a 2-D log.
-pub(crate) fn read_2d(path: &Path, args: &LogArgs) -> anyhow::Result<LaserLog> {
+pub(crate) fn read_2d(path: &Path, args: &LogArgs, deskew: bool) -> anyhow::Result<LaserLog> {
     if args.is_bag(path)? {
-        return Ok(LaserLog::read_bag(path, &args.options(false))?);
+        let log = LaserLog::read_bag(path, &args.options(false, deskew)?)?;
+        return Ok(if deskew { log } else { log.without_deskew() });
     }
     if args.time_tolerance.is_some() {
         return Err(bad_call(
@@ -236,7 +294,7 @@ pub(crate) fn describe(kind: &FileKind) -> String {
 
 /// These scans of the log, with their poses.
 pub(crate) fn scans(log: &LaserLog, indices: &[usize], limits: &RangeLimits) -> Vec<(Pose<2>, Scan<2>)> {
-    indices.iter().map(|&i| (log.raw(i).world_from_laser, log.raw(i).to_scan(limits))).collect()
+    indices.iter().map(|&i| (log.raw(i).world_from_laser, log.scan(i, limits))).collect()
 }
 
 /// Length of the sensor's path over all scans (meters).

@@ -59,9 +59,10 @@ pub(crate) fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
     let mut bounds = Aabb::EMPTY;
     for (world_from_sensor, scan) in scans {
         bounds.include(world_from_sensor.translation);
-        for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
+        for (i, beam) in scan.beams().enumerate().filter(|(_, b)| b.free_range() > 0.0) {
             let direction = world_from_sensor.rotate(beam.direction);
-            bounds.include(along(world_from_sensor.translation, direction, beam.free_range()));
+            let origin = world_from_sensor.transform_point(scan.origin(i));
+            bounds.include(along(origin, direction, beam.free_range()));
         }
     }
     bounds

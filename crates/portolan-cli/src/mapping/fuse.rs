@@ -122,7 +122,7 @@ type Read = (usize, Pose<3>, Result<(Frame, BeamCounts), IoError>);
 
 impl Frames<'_> {
     fn read(&self, &i: &usize) -> Read {
-        (i, *self.log.pose(i), self.log.frame(i).map(|frame| self.filter.apply(frame)))
+        (i, *self.log.pose(i), self.log.filtered_frame(i, &self.filter))
     }
 }
 

@@ -53,6 +53,10 @@ pub(crate) struct Shape {
     /// Do not fuse color
     #[arg(long = "no-color", action = clap::ArgAction::SetFalse, help_heading = ONLY_3D)]
     pub(crate) color: bool,
+    /// Leave the motion of the sensor within a scan in. Without this it is taken out where points have times and poses cover
+    /// them
+    #[arg(long = "no-deskew", action = clap::ArgAction::SetFalse)]
+    pub(crate) deskew: bool,
     /// Leave out readings inside this part of the sensor's frame, which belong to the robot itself: a box
     /// x0,y0,z0,x1,y1,z1 or a sphere x,y,z,radius (meters); may be given several times
     #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true, help_heading = ONLY_3D)]
@@ -113,6 +117,7 @@ impl Default for Shape {
             carve: true,
             carve_weight: CARVE_WEIGHT,
             color: true,
+            deskew: true,
             self_filter: Vec::new(),
             hold_out: None,
         }
@@ -254,10 +259,11 @@ impl Settings {
         let mut shaping: Vec<String> = object(json!(self.shape)).into_iter().map(|(key, _)| key).collect();
         // Which scans are held out depends on which are looked at.
         shaping.extend(self.shape.hold_out.map(|_| "every".to_owned()));
+        // A map that was made before there was a setting agrees with its default.
+        let usual = object(json!(Shape::default()));
         for key in shaping {
-            let (Some(new), old) = (ours.get(&key), saved.get(&key).unwrap_or(&Value::Null)) else {
-                continue;
-            };
+            let old = saved.get(&key).or(usual.get(&key)).unwrap_or(&Value::Null);
+            let Some(new) = ours.get(&key) else { continue };
             if new != old {
                 let other = if key == "w_max" { " or --half-life" } else { "" };
                 bail!(

@@ -148,6 +148,7 @@ impl Summary<'_> {
                         .as_ref()
                         .map(|t| { json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }) })
                 );
+                document["motion"] = self.log.motion_json();
                 document["sweeps"] = json::ways(&self.fusion.stats.ways);
                 document["points_without_pixel"] = json!(self.fusion.without_pixel);
             }
@@ -251,6 +252,12 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     let ways = Way::ALL.map(|way| (stats.ways.count(way), way_words(way)));
     for (scans, words) in ways.into_iter().filter(|(scans, _)| *scans > 0) {
         let _ = writeln!(text, "{scans} scans {words}");
+    }
+    for note in summary.log.notes() {
+        let _ = writeln!(text, "note: {note}");
+    }
+    if let Some(words) = summary.log.motion_words() {
+        let _ = writeln!(text, "{words}");
     }
     let sizes: Vec<_> =
         summary.bytes.iter().map(|(name, &n)| format!("{name} {}", shown_bytes(n as f64))).collect();

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::BufRead;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use portolan::geom::Pose;
 
@@ -157,6 +158,7 @@ impl Reading {
             fans: self.fans.into_all(),
             readings: used.readings,
             trajectories: Vec::new(),
+            fates: Some(Arc::default()),
             stats: LaserLogStats::Carmen(Box::new(stats)),
         })
     }

@@ -1,7 +1,9 @@
 //! A whole log in memory.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use portolan::geom::vector::{along, distance};
 use portolan::geom::{Pose, Trajectory};
 use portolan::scan::{RangeLimits, Scan};
 
@@ -9,6 +11,7 @@ use super::fans::Fan;
 use super::times::{TimeOrder, time_order};
 use crate::carmen::CarmenStats;
 use crate::ros_log::BagLogStats;
+use crate::scan_log::{BEYOND, Fate, Fates, MotionStats, PointClock};
 use crate::{IoError, Result};
 
 /// The most readings that a log may hold: half a gigabyte of them.
@@ -81,6 +84,15 @@ impl RawLaserScan<'_> {
     }
 }
 
+/// The largest distance between the end or the beginning of a beam before and after (meters).
+fn farthest(before: &Scan<2>, after: &Scan<2>) -> f64 {
+    let ends = |scan: &Scan<2>, i: usize| along(scan.origin(i), scan.beam(i).direction, scan.beam(i).range);
+    let seen = (0..before.len()).filter(|&i| before.beam(i).free_range() > 0.0);
+    seen.fold(0.0, |most: f64, i| {
+        most.max(distance(before.origin(i), after.origin(i))).max(distance(ends(before, i), ends(after, i)))
+    })
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Entry {
     pub(crate) world_from_laser: Pose<2>,
@@ -125,6 +137,8 @@ pub struct LaserLog {
     pub(crate) readings: Vec<f64>,
     /// Of each laser; empty where the log says nothing of times within scans.
     pub(crate) trajectories: Vec<Trajectory<2>>,
+    /// What became of the motion within scans; `None`: it stays.
+    pub(crate) fates: Option<Arc<Fates>>,
     pub(crate) stats: LaserLogStats,
 }
 
@@ -165,7 +179,7 @@ impl LaserLog {
         &'a self,
         limits: &'a RangeLimits,
     ) -> impl ExactSizeIterator<Item = (Pose<2>, Scan<2>)> + 'a {
-        self.raw_scans().map(|s| (s.world_from_laser, s.to_scan(limits)))
+        (0..self.len()).map(|i| (self.raw(i).world_from_laser, self.scan(i, limits)))
     }
 
     /// The same log with other poses of the laser, one per scan (a pose file beside a raw log).
@@ -183,6 +197,40 @@ impl LaserLog {
             entry.world_from_laser = pose;
         }
         Ok(self)
+    }
+
+    /// Scan `i` with its readings made beams, without the motion of the laser while it scanned: where the log says when beams were
+    /// measured and poses cover them, each points to where it did in the frame of the scan's pose, and begins where the laser
+    /// was ([`Scan::deskew`]); [`LaserLog::motion`] says what became of it. Panics for an `i` beyond the last.
+    pub fn scan(&self, i: usize, limits: &RangeLimits) -> Scan<2> {
+        let raw = self.raw(i);
+        let scan = raw.to_scan(limits);
+        let (Some(fates), Some(times), Some(taken_at)) = (&self.fates, raw.beam_times(), raw.time) else {
+            return scan;
+        };
+        let mut moved = scan.clone();
+        let fate = match self.trajectory(i) {
+            None => Fate::NotCovered("the poses have no times".into()),
+            Some(track) => {
+                match moved.deskew(&times, &raw.world_from_laser, &mut track.motion(BEYOND), taken_at) {
+                    Err(why) => Fate::NotCovered(why.to_string()),
+                    Ok(()) => Fate::of(farthest(&scan, &moved)),
+                }
+            }
+        };
+        let moves = matches!(fate, Fate::Moved(_));
+        fates.note(i, fate);
+        if moves { moved } else { scan }
+    }
+
+    /// The same log with the motion of the laser left within its scans.
+    pub fn without_deskew(self) -> Self {
+        Self { fates: None, ..self }
+    }
+
+    /// What became of the motion within the scans that were read so far; `None` where it is left in.
+    pub fn motion(&self) -> Option<MotionStats> {
+        Some(self.fates.as_ref()?.stats(Some(PointClock::Stamp)))
     }
 
     /// The poses of the laser of scan `i` while it scans, on the clock of [`RawLaserScan::time`]; `None` where the log says nothing

@@ -93,8 +93,10 @@ impl PointCloudFile {
             points: self.points,
             free_ends: Vec::new(),
             times: self.times,
+            start_time: self.start_time,
             colors: self.colors,
             image: None,
+            delivered: None,
             refused: RefusedBeams {
                 not_finite: self.refused.not_finite,
                 too_far: self.refused.too_far,

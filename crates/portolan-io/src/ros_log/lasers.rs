@@ -1,6 +1,7 @@
 //! 2-D: the scans of planar lasers in a bag.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use portolan::geom::{Pose, Trajectory};
 use portolan_ros::message::{EchoChoice, LaserScan, MessageKind};
@@ -316,6 +317,7 @@ impl Reading {
             |(_, poses): (String, Vec<_>)| Trajectory::new(poses).or_else(|_| Trajectory::new([])).ok();
         Ok(LaserLog {
             trajectories: self.lasers.into_iter().filter_map(trajectory).collect(),
+            fates: Some(Arc::default()),
             path: contents.path.clone(),
             entries: self.entries,
             fans: self.fans.into_all(),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use portolan::scan::{Pinhole, RangeImage};
 use portolan_ros::container::MessageRef;
@@ -11,7 +12,7 @@ use super::contents::Decoders;
 use super::frames::ScanMessage;
 use super::{BagLogStats, Contents};
 use crate::scan_log::{
-    Camera, CameraFrom, ScanLogOptions, decode_color, decode_depth, decode_gray16, given_camera,
+    Camera, CameraFrom, Distortion, ScanLogOptions, decode_color, decode_depth, decode_gray16, given_camera,
     nearest_in_time,
 };
 use crate::{IoError, Result};
@@ -27,7 +28,11 @@ pub(super) struct Pictures {
     /// Color pictures by their stamps (seconds), by the topic of the depth they belong to.
     colors: BTreeMap<u32, ColorTopic>,
     tolerance: f64,
+    sources: Mutex<Sources>,
 }
+
+/// The pixels of pictures without distortion in those of the lens, by topic and size.
+type Sources = BTreeMap<(u32, [usize; 2]), Option<Arc<[Option<u32>]>>>;
 
 struct ColorTopic {
     decoders: Decoders,
@@ -51,6 +56,15 @@ impl Pictures {
         options: &ScanLogOptions,
         stats: &mut BagLogStats,
     ) -> Result<Self> {
+        let other_camera = [
+            (options.color_intrinsics.is_some() || options.color_distortion.is_some(), "--color-intrinsics"),
+            (options.color_from_depth.is_some(), "--color-from-depth"),
+            (options.scale_intrinsics, "--scale-intrinsics"),
+        ];
+        if let Some((_, option)) = other_camera.iter().find(|(given, _)| *given) {
+            let advice = "in a bag colors are those that are registered to the depth images; leave it out";
+            return Err(IoError::layout(&contents.path, "the option", *option, advice));
+        }
         let units_per_metre = options.depth_scale.unwrap_or(UNITS_PER_METRE);
         let mut pictures = Self { units_per_metre, tolerance: options.time_tolerance, ..Self::default() };
         for name in names {
@@ -66,6 +80,7 @@ impl Pictures {
                     Some(camera) => camera,
                     None => camera_of(contents, name, &first.header, stats)?,
                 };
+                let camera = Camera { distortion: options.distortion.unwrap_or(camera.distortion), ..camera };
                 camera.check_size(&contents.path, [depth.columns, depth.rows])?;
                 pictures.cameras.insert(number, camera);
                 if options.color
@@ -100,8 +115,25 @@ impl Pictures {
             Ok(colors) => (colors, None),
             Err(error) => (Vec::new(), Some(error)),
         };
-        let image = RangeImage::from_depth(camera.pinhole, depth.columns, depth.rows, depth.values);
-        Ok((image.with_colors(colors), unread))
+        let Some(sources) = self.sources(scan.message.topic, camera, size) else {
+            let image = RangeImage::from_depth(camera.pinhole, depth.columns, depth.rows, depth.values);
+            return Ok((image.with_colors(colors), unread));
+        };
+        let values: Vec<f32> = sources.iter().map(|s| s.map_or(0.0, |s| depth.values[s as usize])).collect();
+        let image = RangeImage::from_depth(camera.pinhole, depth.columns, depth.rows, values);
+        // Colors are registered to the depth: they are of the same lens.
+        let colors = match colors.is_empty() {
+            true => Vec::new(),
+            false => sources.iter().map(|s| s.map(|s| colors[s as usize])).collect(),
+        };
+        Ok((image.with_some_colors(colors), unread))
+    }
+
+    /// Where the pixels of a picture without distortion are in one of the lens; `None` where it does not distort.
+    fn sources(&self, topic: u32, camera: &Camera, size: [usize; 2]) -> Option<Arc<[Option<u32>]>> {
+        let mut known = self.sources.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known.entry((topic, size)).or_insert_with(|| camera.lens().sources(size).map(Into::into));
+        found.clone()
     }
 
     fn depth(&self, contents: &Contents, decoders: &Decoders, scan: &ScanMessage) -> Result<Depth> {
@@ -188,18 +220,20 @@ fn camera_of(contents: &Contents, name: &str, header: &Header, stats: &mut BagLo
         else {
             continue;
         };
-        if info.is_distorted() && !rectified {
-            stats.notes.push(format!(
-                "{name}: the lens distortion that {info_name} declares ({}) is not undone",
-                info.distortion_model
-            ));
-        }
+        let distortion = match info.is_distorted() && !rectified {
+            false => Distortion::None,
+            true => Distortion::of_model(&info.distortion_model, &info.d).unwrap_or_else(|why| {
+                stats.notes.push(format!("{name}: the lens distortion of {info_name} is not undone: {why}"));
+                Distortion::None
+            }),
+        };
         if i >= beside.len() {
             stats.guesses.push(format!("the camera of {name} is {info_name}, which has the same frame"));
         }
         let pinhole = Pinhole { fx, fy, cx, cy };
         let size = (info.width > 0 && info.height > 0).then_some([info.width, info.height]);
-        return Ok(Camera { pinhole, from: CameraFrom::File(PathBuf::from(info_name)), size });
+        let from = CameraFrom::File(PathBuf::from(&info_name));
+        return Ok(Camera { distortion, ..Camera::new(pinhole, from, size) });
     }
     let advice = "the bag has no CameraInfo for it; give fx,fy,cx,cy with --intrinsics";
     Err(IoError::layout(&contents.path, format!("the camera of {name}"), "unknown", advice))

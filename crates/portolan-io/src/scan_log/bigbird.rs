@@ -12,7 +12,7 @@ use super::depth_frames::{DepthFrame, DepthFrames};
 use super::files::{has_name, names_in};
 use super::intrinsics::find_camera;
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{CameraFrom, ScanLogOptions, ScanLogStats};
+use super::{Camera, CameraFrom, ScanLogOptions, ScanLogStats};
 use crate::Result;
 use crate::poses3::{PoseConvention, read_poses_3d};
 
@@ -47,14 +47,15 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     names.sort_by_key(|name| {
         angle_and_camera(name).map(|(angle, camera)| ((angle + 360 - FIRST_ANGLE) % 360, camera))
     });
-    let camera = find_camera(path, &["camera-intrinsics.txt"], Some(("BigBIRD", CAMERAS[0])), options)?;
+    let mut camera = find_camera(path, &["camera-intrinsics.txt"], Some(("BigBIRD", CAMERAS[0])), options)?;
     let one_for_all = !matches!(camera.from, CameraFrom::DataSet(_));
     let mut stats = ScanLogStats::default();
     let mut frames = Vec::with_capacity(names.len());
     for (name, (_, c)) in names.iter().filter_map(|name| Some((name, angle_and_camera(name)?))) {
         let [fx, fy, cx, cy] = CAMERAS[c - 1];
         let pinhole = if one_for_all { camera.pinhole } else { Pinhole { fx, fy, cx, cy } };
-        frames.push(DepthFrame { depth: folder.join(name), color: None, pinhole });
+        let own = Camera { pinhole, ..camera.clone() };
+        frames.push(DepthFrame::of(&own, folder.join(name), None));
     }
     let scans = frames.iter().map(|f| ScanId { path: f.depth.clone(), number: None, time: None }).collect();
     let poses = path.join(POSES);
@@ -62,7 +63,7 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         None if poses.is_file() => LayoutPoses::File(read_poses_3d(poses)?),
         _ => LayoutPoses::Missing(POSES.into()),
     };
-    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let source = DepthFrames::new(frames, &mut camera, UNITS_PER_METRE, options, &mut stats)?;
     let (camera, convention) = (Some(camera), PoseConvention::TransposedRotation);
     Ok(Parts { convention, camera, stats, ..Parts::new(path, source, scans, poses) })
 }

@@ -16,6 +16,16 @@ pub(super) fn read_color(path: &Path, size: [usize; 2]) -> Result<Vec<[u8; 3]>> 
     decode_color(path, &read_picture(path)?, size)
 }
 
+/// Reads a color picture whatever its size, which is columns and rows.
+pub(super) fn read_color_of_any_size(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>)> {
+    let bytes = read_picture(path)?;
+    let size = match Picture::open(path, &bytes)? {
+        Picture::Jpeg(decoder) => jpeg_size(path, &decoder)?,
+        Picture::Png(reader) => png_size(path, &reader, bytes.len())?,
+    };
+    Ok((size, decode_color(path, &bytes, size)?))
+}
+
 /// Reads a color picture from its bytes.
 pub(crate) fn decode_color(path: &Path, bytes: &[u8], size: [usize; 2]) -> Result<Vec<[u8; 3]>> {
     match Picture::open(path, bytes)? {

@@ -3,10 +3,12 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use portolan::geom::Pose;
 use portolan::scan::Pinhole;
 use serde_json::Value;
 
-use super::ScanLogOptions;
+use super::lens::{Lens, scaled};
+use super::{ColorCamera, Distortion, ScanLogOptions};
 use crate::bytes::{open, parse_f64};
 use crate::{IoError, Result};
 
@@ -29,12 +31,13 @@ impl Intrinsics {
         }
     }
 
-    fn camera(&self) -> Result<Camera> {
+    /// `option` names where the numbers were given, for errors.
+    pub(super) fn camera(&self, option: &str) -> Result<Camera> {
         match self {
             Self::File(path) => read_intrinsics(path),
             Self::Pinhole(pinhole) => {
-                check(pinhole, Path::new("--intrinsics"))?;
-                Ok(Camera { pinhole: *pinhole, from: CameraFrom::Caller, size: None })
+                check(pinhole, Path::new(option))?;
+                Ok(Camera::new(*pinhole, CameraFrom::Caller, None))
             }
         }
     }
@@ -70,14 +73,55 @@ pub struct Camera {
     pub from: CameraFrom,
     /// Columns and rows of the pictures that they are for, if the file has them.
     pub size: Option<[usize; 2]>,
+    /// Its lens.
+    pub distortion: Distortion,
+    /// The color camera, where it is not this one.
+    pub color: Option<ColorCamera>,
 }
 
 impl Camera {
+    pub(crate) fn new(pinhole: Pinhole, from: CameraFrom, size: Option<[usize; 2]>) -> Self {
+        Self { pinhole, from, size, distortion: Distortion::None, color: None }
+    }
+
+    pub(crate) fn lens(&self) -> Lens {
+        Lens::new(self.pinhole, self.distortion)
+    }
+
+    /// Makes it the camera of pictures of this size, and returns by how much it was scaled. It is only done where the camera's own
+    /// size is known, and of the same shape to 1 %.
+    ///
+    /// # Errors
+    /// [`IoError::Layout`] where it is not.
+    pub(super) fn scale_to(&mut self, picture: &Path, [columns, rows]: [usize; 2]) -> Result<[f64; 2]> {
+        let Some([w, h]) = self.size else {
+            let advice =
+                "its size is not known; give --intrinsics a json with width and height, or scale it yourself";
+            return Err(IoError::layout(picture, "the camera to scale", self.from.to_string(), advice));
+        };
+        let by = [columns as f64 / w.max(1) as f64, rows as f64 / h.max(1) as f64];
+        if (by[0] / by[1] - 1.0).abs() > 0.01 || !by.iter().all(|s| s.is_normal()) {
+            let advice = format!(
+                "the camera is for {w} x {h}, which is of another shape; give the depth camera with --intrinsics"
+            );
+            return Err(IoError::layout(
+                picture,
+                "the size of the picture",
+                format!("{columns} x {rows}"),
+                advice,
+            ));
+        }
+        (self.pinhole, self.size) = (scaled(self.pinhole, by), Some([columns, rows]));
+        Ok(by)
+    }
+
+    /// A camera whose size is not known fits where its center is in the middle part of the picture.
+    ///
     /// # Errors
     /// [`IoError::Layout`] where the camera is not one of pictures of this size: a common mix-up.
     pub(crate) fn check_size(&self, picture: &Path, size: [usize; 2]) -> Result<()> {
         let Pinhole { cx, cy, .. } = self.pinhole;
-        let inside = |c: f64, n: usize| c > 0.0 && c < n as f64;
+        let inside = |c: f64, n: usize| (0.3..=0.7).contains(&((c + 0.5) / n as f64));
         let fits = match self.size {
             Some(own) => own == size,
             None => inside(cx, size[0]) && inside(cy, size[1]),
@@ -87,10 +131,14 @@ impl Camera {
         }
         let advice = match (self.size, &self.from) {
             (Some([w, h]), _) => {
-                format!("the camera is for {w} x {h}; give the depth camera with --intrinsics")
+                format!(
+                    "the camera is for {w} x {h}; give the camera of these pictures with --intrinsics, or scale it with \
+                     --scale-intrinsics"
+                )
             }
             (None, _) => format!(
-                "the camera has its center at {cx}, {cy}; give the camera of the depth images with --intrinsics"
+                "the camera has its center at {cx}, {cy}, far from the middle; give the camera of these pictures with \
+                 --intrinsics, as json with width and height if its center is there"
             ),
         };
         Err(IoError::layout(picture, "the size of the picture", format!("{} x {}", size[0], size[1]), advice))
@@ -102,7 +150,7 @@ impl Camera {
 /// # Errors
 /// Those of reading its file.
 pub(crate) fn given_camera(options: &ScanLogOptions) -> Result<Option<Camera>> {
-    options.intrinsics.as_ref().map(Intrinsics::camera).transpose()
+    options.intrinsics.as_ref().map(|given| given.camera("--intrinsics")).transpose()
 }
 
 /// The camera of a log: what the caller gave, else the first of these files that is there, else what the data set's makers
@@ -116,8 +164,18 @@ pub(super) fn find_camera(
     published: Option<(&'static str, [f64; 4])>,
     options: &ScanLogOptions,
 ) -> Result<Camera> {
+    let camera = camera_of(folder, files, published, options)?;
+    Ok(Camera { distortion: options.distortion.unwrap_or(camera.distortion), ..camera })
+}
+
+fn camera_of(
+    folder: &Path,
+    files: &[&str],
+    published: Option<(&'static str, [f64; 4])>,
+    options: &ScanLogOptions,
+) -> Result<Camera> {
     if let Some(given) = &options.intrinsics {
-        return given.camera();
+        return given.camera("--intrinsics");
     }
     if let Some(file) = files.iter().map(|name| folder.join(name)).find(|file| file.is_file()) {
         return read_intrinsics(&file);
@@ -126,7 +184,39 @@ pub(super) fn find_camera(
         let advice = format!("give fx,fy,cx,cy or a file with --intrinsics, or put it at {}", files[0]);
         return Err(IoError::layout(folder, "the camera", "unknown", advice));
     };
-    Ok(Camera { pinhole: Pinhole { fx, fy, cx, cy }, from: CameraFrom::DataSet(name), size: None })
+    // All that is published here is of the first Kinect and its like.
+    Ok(Camera::new(Pinhole { fx, fy, cx, cy }, CameraFrom::DataSet(name), Some([640, 480])))
+}
+
+/// The four numbers of a camera.
+pub(super) fn pinhole([fx, fy, cx, cy]: [f64; 4]) -> Pinhole {
+    Pinhole { fx, fy, cx, cy }
+}
+
+/// The color camera of a log: what the caller gave of it, else what is published for the data set. `None`: colors are pixels of
+/// the depth image.
+///
+/// # Errors
+/// Those of reading what the caller gave.
+pub(super) fn color_camera(
+    depth: &Camera,
+    published: Option<(&'static str, [f64; 4])>,
+    options: &ScanLogOptions,
+) -> Result<Option<ColorCamera>> {
+    let asked = options.color_from_depth.is_some() || options.color_distortion.is_some();
+    let camera = match (&options.color_intrinsics, published) {
+        (Some(given), _) => given.camera("--color-intrinsics")?,
+        (None, Some((name, numbers))) => Camera::new(pinhole(numbers), CameraFrom::DataSet(name), None),
+        // The depth camera's numbers, elsewhere or behind another lens.
+        (None, None) if asked => depth.clone(),
+        (None, None) => return Ok(None),
+    };
+    Ok(Some(ColorCamera {
+        pinhole: camera.pinhole,
+        distortion: options.color_distortion.unwrap_or_default(),
+        color_from_depth: options.color_from_depth.unwrap_or(Pose::IDENTITY),
+        from: camera.from,
+    }))
 }
 
 /// Reads the numbers of a camera: nine numbers of a 3x3 matrix, sixteen of a 4x4 one, four (`fx fy cx cy`), or json
@@ -168,7 +258,7 @@ fn read_intrinsics(path: &Path) -> Result<Camera> {
     }
     let pinhole = Pinhole { fx, fy, cx, cy };
     check(&pinhole, path)?;
-    Ok(Camera { pinhole, from: CameraFrom::File(path.into()), size })
+    Ok(Camera::new(pinhole, CameraFrom::File(path.into()), size))
 }
 
 /// Numbers of a matrix, perhaps nested, and columns and rows of the picture.
@@ -187,7 +277,7 @@ fn of_json(json: &Value) -> Option<(Vec<f64>, Option<[usize; 2]>)> {
     Some((vec![number("fx")?, number("fy")?, number("cx")?, number("cy")?], size))
 }
 
-fn check(p: &Pinhole, path: &Path) -> Result<()> {
+pub(super) fn check(p: &Pinhole, path: &Path) -> Result<()> {
     for (name, value, low) in
         [("fx", p.fx, 1e-3), ("fy", p.fy, 1e-3), ("cx", p.cx, -MOST), ("cy", p.cy, -MOST)]
     {
@@ -235,6 +325,17 @@ mod tests {
         let camera = read(OPEN3D.as_bytes()).unwrap();
         assert!(camera.check_size("x".as_ref(), [640, 480]).is_ok());
         says(camera.check_size("x".as_ref(), [320, 240]), "the camera is for 640 x 480");
+        // Without a size the center tells: in a corner, or in the middle of a quarter.
+        let unsized_camera = Camera { size: None, ..camera };
+        assert!(unsized_camera.check_size("x".as_ref(), [640, 480]).is_ok());
+        for other in [[320, 240], [1280, 960]] {
+            says(unsized_camera.check_size("x".as_ref(), other), "far from the middle");
+        }
+        let mut scaled = read(OPEN3D.as_bytes()).unwrap();
+        assert_eq!(scaled.scale_to("x".as_ref(), [320, 240]).unwrap(), [0.5, 0.5]);
+        assert_eq!(scaled.pinhole, Pinhole { fx: 262.5, fy: 263.0, cx: 159.5, cy: 119.5 });
+        says(scaled.scale_to("x".as_ref(), [320, 320]), "which is of another shape");
+        says(unsized_camera.clone().scale_to("x".as_ref(), [320, 240]), "its size is not known");
     }
 
     #[test]

@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use super::parts::Parts;
-use super::{ScanLogOptions, bigbird, clouds, graph, kitti, redwood, seven_scenes, stanford, tum_rgbd};
+use super::{
+    ScanLogOptions, bigbird, clouds, colmap, graph, kitti, redwood, seven_scenes, stanford, transforms,
+    tum_rgbd,
+};
 use crate::Result;
 use crate::ros_log::{is_bag, open_bag};
 
@@ -27,6 +30,10 @@ pub enum ScanLogKind {
     ScanGraph,
     /// A bag of ROS 1 or ROS 2: a file or a folder.
     Bag,
+    /// A folder with `transforms.json`, which names depth images (nerfstudio, instant-ngp).
+    Transforms,
+    /// A folder with a sparse model of COLMAP and depth images.
+    Colmap,
     /// A folder of PCD, PLY, `.bin` or text files with a file of poses, or of PCD files in the world's frame; a single cloud.
     Clouds,
 }
@@ -36,7 +43,7 @@ type Functions = (fn(&Path) -> bool, fn(&Path, &ScanLogOptions) -> Result<Parts>
 
 impl ScanLogKind {
     /// All kinds, in the order in which they are tried.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::SevenScenes,
         Self::TumRgbd,
         Self::BigBird,
@@ -44,6 +51,8 @@ impl ScanLogKind {
         Self::Kitti,
         Self::Stanford,
         Self::ScanGraph,
+        Self::Transforms,
+        Self::Colmap,
         Self::Clouds,
         Self::Bag,
     ];
@@ -57,6 +66,8 @@ impl ScanLogKind {
             Self::Kitti => (kitti::is_it, kitti::open),
             Self::Stanford => (stanford::is_it, stanford::open),
             Self::ScanGraph => (graph::is_it, graph::open),
+            Self::Transforms => (transforms::is_it, transforms::open),
+            Self::Colmap => (colmap::is_it, colmap::open),
             Self::Clouds => (clouds::is_it, clouds::open),
             Self::Bag => (is_bag, open_bag),
         }
@@ -72,6 +83,8 @@ impl ScanLogKind {
             Self::Kitti => ("kitti", "lidar scans with poses (KITTI)"),
             Self::Stanford => ("stanford", "range scans with a .conf file (Stanford)"),
             Self::ScanGraph => ("scan-graph", "scan graph (OctoMap)"),
+            Self::Transforms => ("transforms", "depth images with transforms.json (nerfstudio, instant-ngp)"),
+            Self::Colmap => ("colmap", "depth images with a COLMAP model"),
             Self::Clouds => ("clouds", "clouds of points"),
             Self::Bag => ("bag", "a bag of ROS"),
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
-use portolan::scan::{Frame, Origin, PointScan, Projection};
+use portolan::scan::{Body, Frame, FrameFilter, Origin, PointScan, Projection};
 
 use super::testing::{median_distance, with_convention};
 use super::{ScanLog, ScanLogKind, ScanLogOptions};
@@ -446,4 +446,86 @@ fn the_scan_graph_of_octomap() {
     let Some(path) = real_data("maps_octomap/scan.dat.bz2") else { return };
     let log = open(&path);
     assert_eq!((log.kind(), points(&log, 0).points.len()), (ScanLogKind::Clouds, 88_206));
+}
+
+/// A lidar that drives along x at 2 m/s past points of the world: each is measured at another time of its scan.
+fn moving_log(stamp_of: impl Fn(usize) -> f64, time_of: impl Fn(usize, f64) -> f64) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut poses = String::new();
+    for i in 0..8 {
+        let start = stamp_of(i);
+        let world: Vec<[f64; 3]> = (0..40).map(|k| [3.0, f64::from(k) - 20.0, 1.0]).collect();
+        let since = |k: usize| 0.1 * k as f64 / 40.0;
+        let local = world.iter().enumerate().map(|(k, p)| {
+            let x = 2.0 * (start + since(k) - 100.0);
+            [p[0] - x, p[1], p[2]].map(|v| v as f32)
+        });
+        let start_time = time_of(i, start);
+        let cloud = PointCloudFile {
+            points: local.collect(),
+            times: (0..40).map(|k| since(k) as f32).collect(),
+            start_time,
+            ..PointCloudFile::default()
+        };
+        write_pcd(folder.path().join(format!("{start:.3}.pcd")), &cloud).unwrap();
+        poses += &format!("{start:.3} {} 0 0 0 0 0 1\n", 2.0 * (start - 100.0));
+    }
+    fs::write(folder.path().join("poses.txt"), poses).unwrap();
+    folder
+}
+
+/// How far the points of all scans are from where they are in the world, at most (meters).
+fn off(log: &ScanLog, filter: &FrameFilter) -> f64 {
+    let mut most: f64 = 0.0;
+    for i in 0..log.len() {
+        let (Frame::Points(scan), _) = log.filtered_frame(i, filter).unwrap() else { panic!("points") };
+        for p in scan.points.iter().chain(&scan.free_ends) {
+            most = most.max((log.pose(i).transform_point(p.map(f64::from))[0] - 3.0).abs());
+        }
+    }
+    most
+}
+
+#[test]
+fn the_motion_within_scans_is_taken_out_where_poses_cover_it() {
+    let stamp = |i: usize| 100.0 + 0.1 * i as f64;
+    // Times of the stamps' own clock, and times since the stamp.
+    for time_of in [|_: usize, start: f64| start, |_: usize, _: f64| 0.0] {
+        let folder = moving_log(stamp, time_of);
+        let log = open(folder.path());
+        // The last scan lasts longer than the poses do: constant twist.
+        assert!(off(&log, &FrameFilter::default()) < 1e-4);
+        let motion = log.motion().unwrap();
+        assert_eq!((motion.deskewed, motion.still, motion.not_covered.0), (8, 0, 0));
+        assert!((motion.largest - 0.195).abs() < 1e-3, "{motion:?}");
+        let (Frame::Points(scan), _) = log.filtered_frame(3, &FrameFilter::default()).unwrap() else {
+            panic!()
+        };
+        assert!((scan.origin_of(39).unwrap()[0] - 0.195).abs() < 1e-3);
+        // The robot's body is where it is at the moment, and limits of range are from there.
+        let body = Body::Sphere { center: [2.9, 18.0, 1.0], radius: 0.25 };
+        let filter = FrameFilter { max_range: 19.0, body: vec![body], ..FrameFilter::default() };
+        let (Frame::Points(scan), counts) = log.filtered_frame(0, &filter).unwrap() else { panic!() };
+        assert_eq!((counts.self_hit, counts.max_range, scan.free_ends.len()), (1, 3, 3));
+        let end = scan.free_ends[2].map(f64::from);
+        let origin = scan.origin_of(scan.points.len() + 2).unwrap();
+        assert!((distance(end, origin) - 19.0).abs() < 1e-4 && origin[0] > 0.18, "{origin:?}");
+
+        let off_log =
+            ScanLog::open(folder.path(), &ScanLogOptions { deskew: false, ..ScanLogOptions::default() });
+        let off_log = off_log.unwrap();
+        assert!((off(&off_log, &FrameFilter::default()) - 0.195).abs() < 1e-3);
+        assert_eq!(off_log.motion(), None);
+    }
+    // Poses of a keyframe each second say nothing of the motion in between.
+    let folder = moving_log(|i| 100.0 + i as f64, |_, start| start);
+    let log = open(folder.path());
+    assert!(off(&log, &FrameFilter::default()) > 0.1);
+    let motion = log.motion().unwrap();
+    let why = motion.not_covered.1.unwrap();
+    assert!(
+        (motion.deskewed, motion.not_covered.0) == (0, 8)
+            && why.contains("the poses around it are 1.000 s apart"),
+        "{why}"
+    );
 }

@@ -4,9 +4,10 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use portolan::geom::vector::distance;
-use portolan::geom::{Aabb, Pose};
-use portolan::scan::Frame;
+use portolan::geom::{Aabb, Pose, Trajectory};
+use portolan::scan::{BeamCounts, Frame, FrameFilter};
 
+use super::deskew::{Deskew, MotionStats};
 use super::matching::{Match, match_poses};
 use super::parts::{FrameSource, LayoutPoses, Parts, ScanId};
 use super::{Camera, RefusedPose, ScanLogKind, ScanLogOptions, ScanLogStats, UnreadColors};
@@ -32,6 +33,8 @@ pub struct ScanLog {
     camera: Option<Camera>,
     stats: ScanLogStats,
     bag: Option<Box<BagLogStats>>,
+    /// Takes the motion out of scans; `None`: it stays.
+    deskew: Option<Deskew>,
 }
 
 impl ScanLog {
@@ -68,13 +71,13 @@ impl ScanLog {
         let convention = options.pose_convention.unwrap_or(convention);
         let mut resolver = Resolver { convention, posed_from_sensor, stats: &mut stats };
         let named = options.poses.as_ref().map(read_poses_3d).transpose()?;
-        let matches = match (named, poses) {
+        let (matches, trajectory) = match (named, poses) {
             (Some(file), _) | (None, LayoutPoses::File(file)) => {
                 let track: Vec<TrackPose> =
                     file.poses.iter().map(|raw| resolver.resolve(&file.path, raw)).collect();
                 match_poses(&scans, &track, options.time_tolerance, &file.path, &mut stats)?
             }
-            (None, LayoutPoses::PerScan(all)) => resolver.per_scan(&all),
+            (None, LayoutPoses::PerScan(all)) => (resolver.per_scan(&all), None),
             (None, LayoutPoses::Missing(looked_for)) => {
                 let advice = format!("looked for {looked_for}; name a file with --poses");
                 return Err(IoError::layout(path, "the pose file", "missing", advice));
@@ -90,7 +93,8 @@ impl ScanLog {
             };
             return Err(IoError::layout(path, "the number of scans with a usable pose", value, advice));
         }
-        Ok(Self { path: path.into(), kind, name, source, entries, camera, stats, bag })
+        let deskew = options.deskew.then(|| Deskew::new(trajectory.or_else(|| trajectory_of(&entries))));
+        Ok(Self { path: path.into(), kind, name, source, entries, camera, stats, bag, deskew })
     }
 
     /// Only every `n`-th scan of it, from the first; 0 counts as 1. [`ScanLog::stats`] stays about all of it.
@@ -144,6 +148,30 @@ impl ScanLog {
     /// is without colors then, and [`ScanLog::unread_colors`] counts it.
     pub fn frame(&self, i: usize) -> Result<Frame> {
         self.source.frame(self.entries[i].place)
+    }
+
+    /// Reads scan `i`, leaves out what the filter does not use, and takes out the motion of the sensor while it scanned: where
+    /// points have times and poses cover them, each is moved to where it is in the frame of the scan's pose and begins where the
+    /// sensor was ([`portolan::scan::PointScan::deskew`]); [`ScanLog::motion`] says what became of it. Panics for an `i` beyond
+    /// the last.
+    ///
+    /// # Errors
+    /// As [`ScanLog::frame`].
+    pub fn filtered_frame(&self, i: usize, filter: &FrameFilter) -> Result<(Frame, BeamCounts)> {
+        // The robot's own body is where it is in the frame of the moment, so that it is left out first.
+        let (frame, counts) = filter.apply(self.frame(i)?);
+        let Some(deskew) = &self.deskew else { return Ok((frame, counts)) };
+        let ends = || {
+            let last = self.len() - 1;
+            Some([(self.time(0)?, self.frame(0).ok()?), (self.time(last)?, self.frame(last).ok()?)])
+        };
+        Ok((deskew.apply(i, frame, (self.pose(i), self.time(i)), ends), counts))
+    }
+
+    /// What became of the motion within the scans that [`ScanLog::filtered_frame`] has read so far; `None` where it is left in
+    /// ([`ScanLogOptions::deskew`]).
+    pub fn motion(&self) -> Option<MotionStats> {
+        self.deskew.as_ref().map(Deskew::stats)
     }
 
     /// The color pictures that could not be read, among the frames that were read so far: they are found only then, so that
@@ -232,6 +260,12 @@ impl Resolver<'_> {
         };
         all.iter().map(one).collect()
     }
+}
+
+/// The trajectory that the scans' own poses and stamps are; `None` where they have no stamps, or these are none.
+fn trajectory_of(entries: &[Entry]) -> Option<Trajectory<3>> {
+    let stamped: Option<Vec<_>> = entries.iter().map(|e| Some((e.time?, e.world_from_sensor))).collect();
+    Trajectory::new(stamped?).ok().filter(|poses| poses.len() > 1)
 }
 
 fn entries(scans: &[ScanId], matches: &[Match]) -> Vec<Entry> {

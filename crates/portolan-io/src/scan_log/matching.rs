@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use portolan::geom::Pose;
+use portolan::geom::{Pose, Trajectory, TrajectoryError};
 
 use super::parts::ScanId;
 use super::stats::ScanLogStats;
@@ -18,7 +18,7 @@ pub(super) enum Match {
     LeftOut,
 }
 
-/// Finds the pose of every scan in a trajectory:
+/// Finds the pose of every scan in a trajectory, and returns that trajectory where times decided:
 ///
 /// 1. by time, where scans and poses have stamps;
 /// 2. by the number that the pose file gives each pose (Redwood), where no number is beyond the scans: the scan's place
@@ -27,16 +27,20 @@ pub(super) enum Match {
 /// 4. by the number in the scan's file name, which is its pose's place in the file, where no number is beyond the poses.
 ///
 /// # Errors
-/// [`IoError::Layout`] where no rule applies, or no time fits.
+/// [`IoError::Layout`] where no rule applies, no time fits, or poses of one time contradict each other.
 pub(super) fn match_poses(
     scans: &[ScanId],
     track: &[TrackPose],
     tolerance: f64,
     path: &Path,
     stats: &mut ScanLogStats,
-) -> Result<Vec<Match>> {
-    if let (Some(times), Some(timed)) = (times_of(scans), TimedPoses::new(track)) {
-        return by_time(&times, &timed, tolerance, path, stats);
+) -> Result<(Vec<Match>, Option<Trajectory<3>>)> {
+    let timed = TimedPoses::new(track).map_err(|error| contradiction(path, &error));
+    if let Some(times) = times_of(scans)
+        && let Some(timed) = timed?
+    {
+        let matches = by_time(&times, &timed, tolerance, path, stats)?;
+        return Ok((matches, Some(timed.trajectory().clone())));
     }
     let places = if let Some(places) = by_pose_number(scans.len(), track) {
         places
@@ -65,7 +69,13 @@ pub(super) fn match_poses(
     });
     let matches = matches.collect();
     stats.poses_without_scan += used.iter().filter(|u| !**u).count() as u64;
-    Ok(matches)
+    Ok((matches, None))
+}
+
+/// Stamped poses that are no trajectory.
+fn contradiction(path: &Path, error: &TrajectoryError) -> IoError {
+    let advice = "give the poses of one run: two trajectories in one file are not mixed";
+    IoError::layout(path, "the time of the poses", format!("not usable ({error})"), advice)
 }
 
 /// Of what is in order of time, the nearest to a time, if it is within the tolerance (seconds).
@@ -156,7 +166,7 @@ mod tests {
     /// The x of each scan's pose, and the counts.
     fn found(scans: &[ScanId], track: &[TrackPose]) -> Result<(Vec<Option<f64>>, ScanLogStats)> {
         let mut stats = ScanLogStats::default();
-        let matches = match_poses(scans, track, 0.02, "p".as_ref(), &mut stats)?;
+        let (matches, _) = match_poses(scans, track, 0.02, "p".as_ref(), &mut stats)?;
         let x = |m: &Match| match m {
             Match::Posed(pose, _) => Some(pose.translation[0]),
             Match::LeftOut => None,
@@ -187,6 +197,16 @@ mod tests {
         assert_eq!(x, [Some(0.0), Some(1.0), Some(2.0)], "zero is no time");
         let error = found(&scans(&[0, 1, 2], Some(&times)), &track(3, Some(&[7.0, 8.0, 9.0]))).unwrap_err();
         assert!(error.to_string().contains("the time of the poses is 7.000 to 9.000 s; no pose is within"));
+    }
+
+    #[test]
+    fn two_trajectories_in_one_file_are_no_trajectory() {
+        let times = [1.0, 1.1];
+        let error = found(&scans(&[0, 1], Some(&times)), &track(4, Some(&[1.0, 1.1, 1.0, 1.1]))).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("two poses of the time 1 contradict each other: they are 2.000 m"), "{text}");
+        // Where times do not decide, they may be anything.
+        assert!(found(&scans(&[0, 1, 2, 3], None), &track(4, Some(&[1.0, 1.1, 1.0, 1.1]))).is_ok());
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::{Intrinsics, ScanLogKind};
+use portolan::geom::Pose;
+
+use super::{Distortion, Intrinsics, ScanLogKind};
 use crate::BagChoice;
 use crate::poses3::PoseConvention;
 
@@ -22,10 +24,23 @@ pub struct ScanLogOptions {
     pub origin: Option<[f64; 3]>,
     /// The camera instead of what the layout has.
     pub intrinsics: Option<Intrinsics>,
+    /// Whether a camera of pictures of another size is scaled to those that are there, where its own size is known. Default: no, it
+    /// is refused.
+    pub scale_intrinsics: bool,
+    /// The distortion of the depth camera's lens instead of what the layout has.
+    pub distortion: Option<Distortion>,
+    /// The color camera, where it is not the depth camera; default: the format's, else colors are pixels of the depth image.
+    pub color_intrinsics: Option<Intrinsics>,
+    /// The distortion of the color camera's lens; default: none.
+    pub color_distortion: Option<Distortion>,
+    /// Where the color camera is: `color_from_depth`; default: where the depth camera is.
+    pub color_from_depth: Option<Pose<3>>,
     /// Units of a depth image per meter (1000: millimeters); default: the format's.
     pub depth_scale: Option<f64>,
     /// Whether colors are read where the log has them. Default: yes.
     pub color: bool,
+    /// Whether the motion of the sensor within a scan is taken out, where points have times and poses cover them. Default: yes.
+    pub deskew: bool,
     /// How far a pose's time may lie from a scan's (seconds). Default 0.02, as in TUM's tools.
     pub time_tolerance: f64,
     /// Bags: topics and frames.
@@ -40,8 +55,14 @@ impl Default for ScanLogOptions {
             pose_convention: None,
             origin: None,
             intrinsics: None,
+            scale_intrinsics: false,
+            distortion: None,
+            color_intrinsics: None,
+            color_distortion: None,
+            color_from_depth: None,
             depth_scale: None,
             color: true,
+            deskew: true,
             time_tolerance: 0.02,
             bag: BagChoice::default(),
         }

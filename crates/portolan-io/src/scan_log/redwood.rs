@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
 use super::files::{has_extension, has_name, names_in, number_in};
-use super::intrinsics::find_camera;
+use super::intrinsics::{color_camera, find_camera};
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
 use super::{ScanLogOptions, ScanLogStats};
@@ -46,15 +46,12 @@ pub(super) fn is_it(path: &Path) -> bool {
 pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let folder = path.join(DEPTH);
     let names = names_in(&folder, is_png)?;
-    let camera = find_camera(path, &CAMERA_FILES, Some(("Open3D's PrimeSense", CAMERA)), options)?;
+    let mut camera = find_camera(path, &CAMERA_FILES, Some(("Open3D's PrimeSense", CAMERA)), options)?;
+    camera.color = color_camera(&camera, None, options)?;
     let colors = colors_of(path, &names, options)?;
     let mut stats = ScanLogStats::default();
-    let frames = names.iter().zip(colors).map(|(name, color)| DepthFrame {
-        depth: folder.join(name),
-        color,
-        pinhole: camera.pinhole,
-    });
-    let frames = frames.collect();
+    let frames = names.iter().zip(colors);
+    let frames = frames.map(|(name, color)| DepthFrame::of(&camera, folder.join(name), color)).collect();
     let poses = poses_of(path, &names, options)?;
     if matches!(poses, LayoutPoses::PerScan(_)) {
         let name_of_scan = |pose: &str| Some(format!("{}.png", pose.strip_suffix(".txt")?));
@@ -64,7 +61,7 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         let (number, time) = number_and_time(name);
         ScanId { path: folder.join(name), number, time }
     };
-    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let source = DepthFrames::new(frames, &mut camera, UNITS_PER_METRE, options, &mut stats)?;
     let scans = names.iter().map(scan).collect();
     Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }

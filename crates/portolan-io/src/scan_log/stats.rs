@@ -56,6 +56,10 @@ pub struct ScanLogStats {
     pub refused_poses: Vec<RefusedPose>,
     /// Scans without a color picture, in a log where others have one.
     pub scans_without_color: u64,
+    /// What the caller should know of the poses or pictures, in sentences.
+    pub notes: Vec<String>,
+    /// Pixels of the undistorted first depth image that the lens does not show: they have no reading.
+    pub pixels_beyond_lens: u64,
     /// Why the color pictures of the log are not used; `None`: they are, or the log has no pictures.
     pub colors_left_out: Option<String>,
 }

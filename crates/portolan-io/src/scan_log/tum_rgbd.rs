@@ -5,13 +5,14 @@
 //! the two beside it; both within [`ScanLogOptions::time_tolerance`]. Depth is in units of 1/5000 m.
 //!
 //! The camera is in no file of TUM's: it is published for the three sensors, and the folder's name decides which. ETH3D puts
-//! it in `calibration.txt`. The lens distortion of TUM's sensors is not modeled.
+//! it in `calibration.txt`. What is published of the distortion of TUM's lenses is not
+//! applied unless the caller gives it.
 
 use std::path::{Path, PathBuf};
 
 use super::depth_frames::{DepthFrame, DepthFrames};
 use super::files::name_of;
-use super::intrinsics::find_camera;
+use super::intrinsics::{color_camera, find_camera};
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId};
 use super::{ScanLogOptions, ScanLogStats};
@@ -47,20 +48,18 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     }
     let colors = path.join(COLOR);
     let colors = if options.color && colors.is_file() { read_list(&colors)? } else { Vec::new() };
-    let camera = find_camera(path, &CAMERA_FILES, published_camera(&name_of(path)), options)?;
+    let mut camera = find_camera(path, &CAMERA_FILES, published_camera(&name_of(path)), options)?;
     let color = |time| nearest_in_time(&colors, time, options.time_tolerance).filter(|file| file.is_file());
-    let frames = depths.iter().map(|(time, file)| DepthFrame {
-        depth: file.clone(),
-        color: color(*time).cloned(),
-        pinhole: camera.pinhole,
-    });
+    camera.color = color_camera(&camera, None, options)?;
+    let frames =
+        depths.iter().map(|(time, file)| DepthFrame::of(&camera, file.clone(), color(*time).cloned()));
     let frames = frames.collect();
     let poses = path.join(POSES);
     let poses = match &options.poses {
         None if poses.is_file() => LayoutPoses::File(read_poses_3d(poses)?),
         _ => LayoutPoses::Missing(POSES.into()),
     };
-    let source = DepthFrames::new(frames, &camera, UNITS_PER_METRE, options, &mut stats)?;
+    let source = DepthFrames::new(frames, &mut camera, UNITS_PER_METRE, options, &mut stats)?;
     let scans = depths.into_iter().map(|(t, path)| ScanId { path, number: None, time: Some(t) }).collect();
     Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
 }

@@ -9,7 +9,7 @@ use portolan::scan::{Frame, PointScan, RangeImage, Spherical};
 /// A lidar that turns about its z axis: rings of one elevation, columns of one azimuth.
 ///
 /// The noise of the range is independent, normal and without bias. Directions and poses are exact: no mixed pixels at edges,
-/// no motion during a turn, no dependence on the angle of incidence.
+/// no dependence on the angle of incidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpinningLidar {
     /// Number of rings, at equal angles from the highest to the lowest elevation.
@@ -74,7 +74,7 @@ impl SpinningLidar {
     }
 }
 
-/// The frame of the lidar from a pose, with `directions` from [`SpinningLidar::directions`]. The noise depends on the stream
+/// The frame of the lidar at rest at a pose, with `directions` from [`SpinningLidar::directions`]. The noise depends on the stream
 /// `(seed, index)` alone.
 pub fn lidar_frame(
     world: &World3,
@@ -83,24 +83,59 @@ pub fn lidar_frame(
     directions: &[[f64; 3]],
     (seed, index): (u64, u64),
 ) -> Frame {
+    Frame::Points(turn(world, |_| *world_from_sensor, lidar, directions, (seed, index)).0)
+}
+
+/// The frame of a lidar that moves while it turns once in `duration` seconds: `world_from_sensor` is its pose so many seconds after
+/// the start of the turn. Points, free ends and the image are in the frame of the moment, as a driver delivers them, with their
+/// times since the start. Without motion it is the frame of [`lidar_frame`], with times.
+pub fn moving_lidar_frame(
+    world: &World3,
+    world_from_sensor: impl Fn(f64) -> Pose<3>,
+    lidar: &SpinningLidar,
+    directions: &[[f64; 3]],
+    duration: f64,
+    (seed, index): (u64, u64),
+) -> Frame {
+    let time = |column: &usize| (duration * *column as f64 / lidar.columns as f64) as f32;
+    let poses: Vec<Pose<3>> =
+        (0..lidar.columns).map(|column| world_from_sensor(f64::from(time(&column)))).collect();
+    let (mut scan, columns) = turn(world, |column| poses[column], lidar, directions, (seed, index));
+    scan.times = columns.iter().flatten().map(time).collect();
+    Frame::Points(scan)
+}
+
+/// A turn of the lidar, whose pose is that of the column; and the columns of its points and of its free ends.
+fn turn(
+    world: &World3,
+    world_from_sensor: impl Fn(usize) -> Pose<3>,
+    lidar: &SpinningLidar,
+    directions: &[[f64; 3]],
+    (seed, index): (u64, u64),
+) -> (PointScan, [Vec<usize>; 2]) {
     let mut random = Random::stream(seed ^ 0x11DA_2000, index);
     let mut scan = PointScan::new([], [0.0; 3]);
     let mut values = Vec::with_capacity(directions.len());
-    for &direction in directions {
+    let [mut hit_columns, mut free_columns] = [Vec::new(), Vec::new()];
+    for (i, &direction) in directions.iter().enumerate() {
         // Drawn for every ray, so that the result of one ray does not change the noise of the next.
         let (fate, noise) = (random.uniform(), lidar.noise * random.normal());
-        let hit = world.cast_ray(world_from_sensor.translation, world_from_sensor.rotate(direction));
+        let column = i % lidar.columns;
+        let pose = world_from_sensor(column);
+        let hit = world.cast_ray(pose.translation, pose.rotate(direction));
         let end = |range: f64| scale(direction, range).map(|v| v as f32);
         let value = match hit.map(|h| (h.range, h.range + noise)) {
             _ if fate < lidar.dropped_rate => 0.0,
             Some((truth, range)) if truth.max(range) <= lidar.max_range && range > 0.0 => {
                 scan.points.push(end(range));
+                hit_columns.push(column);
                 range
             }
             // A reading below zero because of its noise.
             Some((truth, _)) if truth <= lidar.max_range => 0.0,
             _ if lidar.misses_known => {
                 scan.free_ends.push(end(lidar.max_range));
+                free_columns.push(column);
                 -lidar.max_range
             }
             _ => 0.0,
@@ -110,7 +145,7 @@ pub fn lidar_frame(
     if lidar.organized {
         scan.image = Some(RangeImage::from_ranges(lidar.projection(), lidar.columns, values));
     }
-    Frame::Points(scan)
+    (scan, [hit_columns, free_columns])
 }
 
 #[cfg(test)]

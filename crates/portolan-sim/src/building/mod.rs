@@ -19,7 +19,7 @@ mod world;
 
 pub use camera::{DepthCamera, camera_frame};
 pub use floor_plan::{Building, building_world};
-pub use lidar::{SpinningLidar, lidar_frame};
+pub use lidar::{SpinningLidar, lidar_frame, moving_lidar_frame};
 pub use log::{BuildingConfig, BuildingLog, BuildingSensor, building_log, building_poses};
 pub use shape::Shape;
 pub use world::{Body, CHECKER, DEPTH_TOLERANCE, RayHit3, World3};

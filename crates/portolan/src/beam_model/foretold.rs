@@ -60,9 +60,10 @@ impl ForetoldRanges {
         scan: &Scan<D>,
         max_range: f64,
     ) {
-        let origin = world_from_sensor.translation;
-        let hits = scan.beams().filter(|b| b.is_hit());
-        let rays: Vec<_> = hits.map(|b| (origin, world_from_sensor.rotate(b.direction), b.range)).collect();
+        let hits = scan.beams().enumerate().filter(|(_, b)| b.is_hit());
+        let origin = |i: usize| world_from_sensor.transform_point(scan.origin(i));
+        let rays: Vec<_> =
+            hits.map(|(i, b)| (origin(i), world_from_sensor.rotate(b.direction), b.range)).collect();
         self.add(map, &rays, max_range);
     }
 

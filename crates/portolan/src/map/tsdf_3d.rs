@@ -3,7 +3,7 @@
 use super::{MapError, PointSweep, Tsdf};
 use crate::cell::SignedDistance;
 use crate::geom::Pose;
-use crate::scan::{Origin, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays};
+use crate::scan::{Origin, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays, strips};
 use crate::store::Store;
 use crate::sweep::PointRays;
 
@@ -42,6 +42,7 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
                 return Ok(ScanStats { refused: stats.refused + scan.refused, ..stats });
             }
             (_, _, PointSweep::Rays) => return self.integrate_rays(world_from_sensor, scan, WhyRays::Asked),
+            _ if scan.delivered.is_some() => return self.integrate_moving(world_from_sensor, scan),
             _ => return self.integrate_rays(world_from_sensor, scan, WhyRays::OwnOrigins),
         };
         let at = Pose { translation: world_from_sensor.transform_point(origin), ..*world_from_sensor };
@@ -49,7 +50,8 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
             let stats = self.integrate_image(&at, image)?;
             return Ok(ScanStats { refused: stats.refused + scan.refused, ..stats });
         }
-        let image = match self.organise(scan, origin) {
+        let colored = !scan.colors.is_empty();
+        let image = match self.organise(&scan.points, &scan.free_ends, colored, origin) {
             Ok(image) => image,
             Err(why) => return self.integrate_rays(world_from_sensor, scan, why),
         };
@@ -61,15 +63,55 @@ impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
         Ok(stats)
     }
 
+    /// A turning lidar that moved: strips of columns, each taken at one moment. Cells between two strips are seen through the one
+    /// that they lie in; only those within half a column of a border may be seen through both.
+    fn integrate_moving(
+        &mut self,
+        world_from_sensor: &Pose<3>,
+        scan: &PointScan,
+    ) -> Result<ScanStats, MapError> {
+        let Some((points, free_ends, origin)) = scan.delivered.as_deref().map(|d| d.rays()) else {
+            return self.integrate_rays(world_from_sensor, scan, WhyRays::OwnOrigins);
+        };
+        let image = match self.organise(points, free_ends, !scan.colors.is_empty(), origin) {
+            Ok(image) => image,
+            Err(why) => return self.integrate_rays(world_from_sensor, scan, why),
+        };
+        let Some(parts) = strips(scan, &image, self.config.resolution) else {
+            return self.integrate_rays(world_from_sensor, scan, WhyRays::OwnOrigins);
+        };
+        let mut total = ScanStats { scans: 1, refused: scan.refused, ..ScanStats::default() };
+        for (scan_from_image, strip) in &parts {
+            let stats = self.integrate_image(&(*world_from_sensor * *scan_from_image), strip)?;
+            if stats.scans == 0 {
+                return Ok(stats);
+            }
+            total.cells += stats.cells;
+            total.hits_outside += stats.hits_outside;
+        }
+        let count = |is: fn(&f32) -> bool| image.values.iter().filter(|v| is(v)).count() as u64;
+        total.beams.hit = count(|v| *v > 0.0);
+        total.beams.max_range = count(|v| *v < 0.0);
+        let used = total.beams.hit + total.beams.max_range;
+        total.beams.dropped = ((points.len() + free_ends.len()) as u64).saturating_sub(used);
+        Ok(total.by(Way::Found))
+    }
+
     /// The image of a scan without rows and columns, where it can be given them. Not where points have colors to be fused:
     /// pixels have lost which point they come from.
-    fn organise(&mut self, scan: &PointScan, origin: [f64; 3]) -> Result<RangeImage, WhyRays> {
-        if self.config.color && !scan.colors.is_empty() {
+    fn organise(
+        &mut self,
+        points: &[[f32; 3]],
+        free_ends: &[[f32; 3]],
+        colored: bool,
+        origin: [f64; 3],
+    ) -> Result<RangeImage, WhyRays> {
+        if self.config.color && colored {
             return Err(WhyRays::Colors);
         }
-        let mut image = self.layout.image(&scan.points, origin, self.config.resolution)?;
-        if let (Some(layout), false) = (self.layout.layout(), scan.free_ends.is_empty()) {
-            let free = layout.image(&scan.free_ends, origin);
+        let mut image = self.layout.image(points, origin, self.config.resolution)?;
+        if let (Some(layout), false) = (self.layout.layout(), free_ends.is_empty()) {
+            let free = layout.image(free_ends, origin);
             for (value, free) in image.values.iter_mut().zip(free.values) {
                 *value = if *value == 0.0 { -free } else { *value };
             }

@@ -64,8 +64,7 @@ impl FrameFilter {
     ///
     /// Refused readings are counted in the frame itself. Times and colors stay with their points; the image beside points
     /// is filtered by the same rules. Bodies are compared with points relative to a common origin, else with the points
-    /// themselves. A point beyond the largest range that has an origin of its own is dropped: there is no place for its free
-    /// end. An image that contradicts itself ([`RangeImage::check`]) stays as it is, and is not counted: maps refuse it.
+    /// themselves. A free end keeps the origin and the time of its point. An image that contradicts itself ([`RangeImage::check`]) stays as it is, and is not counted: maps refuse it.
     pub fn apply(&self, frame: Frame) -> (Frame, BeamCounts) {
         let mut counts = BeamCounts::default();
         let frame = match frame {
@@ -147,6 +146,8 @@ impl FrameFilter {
             counts.dropped += (scan.points.len() - origins) as u64;
             return scan;
         }
+        // What is left out would still be in it.
+        scan.delivered = None;
         let parallel = scan.image.as_ref().is_some_and(RangeImage::has_parallel_rays);
         scan.image = scan.image.map(|image| {
             // The same readings as the points, which are counted.
@@ -154,6 +155,13 @@ impl FrameFilter {
             RangeImage { refused, ..self.image(image, &mut BeamCounts::default()) }
         });
         let mut kept = vec![false; scan.points.len()];
+        let timed_ends = scan.times.len() == scan.points.len() + scan.free_ends.len();
+        // What is beyond the points belongs to the free ends.
+        let mut end_times = scan.times.split_off(scan.points.len().min(scan.times.len()));
+        let mut end_origins = match &mut scan.origin {
+            Origin::Common(_) => Vec::new(),
+            Origin::PerPoint(all) => all.split_off(scan.points.len().min(all.len())),
+        };
         for (i, keep) in kept.iter_mut().enumerate() {
             let p = scan.points[i].map(f64::from);
             let common = matches!(scan.origin, Origin::Common(_));
@@ -179,22 +187,24 @@ impl FrameFilter {
                     counts.dropped += 1;
                 }
                 Use::Body => counts.self_hit += 1,
-                // Only rays of the common origin can become free ends.
-                Use::Cut if common => {
+                Use::Cut => {
                     counts.max_range += 1;
                     let end = along(origin, offset, self.max_range / range);
                     scan.free_ends.push(end.map(|v| v as f32));
+                    end_origins.extend((!common).then_some(origin.map(|v| v as f32)));
+                    end_times.extend(scan.times.get(i).filter(|_| timed_ends));
                 }
-                Use::Cut => counts.dropped += 1,
             }
         }
         retain(&mut scan.points, &kept);
         retain(&mut scan.times, &kept);
         retain(&mut scan.colors, &kept);
+        scan.times.extend(end_times);
         if let Origin::PerPoint(origins) = &mut scan.origin {
             // Points without an origin were at the end, and are gone.
             let mut marks = kept.iter();
             origins.retain(|_| marks.next().copied().unwrap_or(false));
+            origins.extend(end_origins);
         }
         scan
     }
@@ -231,7 +241,8 @@ mod tests {
         let (frame, counts) = filter().apply(Frame::Points(scan.clone()));
         let Frame::Points(kept) = frame else { panic!("points stay points") };
         assert_eq!(kept.points, [[0.0, 0.0, 1.0]]);
-        assert_eq!((kept.times.clone(), kept.free_ends.clone()), (vec![0.0], vec![[0.0, 4.0, 0.0]]));
+        // The free end was measured when its point was.
+        assert_eq!((kept.times.clone(), kept.free_ends.clone()), (vec![0.0, 0.4], vec![[0.0, 4.0, 0.0]]));
         assert_eq!(kept.refused.too_near, 1);
         assert_eq!(counts, BeamCounts { hit: 1, max_range: 1, no_return: 0, dropped: 1, self_hit: 2 });
         let (all, counts) = FrameFilter::default().apply(Frame::Points(scan.clone()));
@@ -298,16 +309,20 @@ mod tests {
     }
 
     #[test]
-    fn origins_of_their_own_cut_nothing_free_and_may_be_missing() {
+    fn origins_of_their_own_stay_with_what_is_cut_and_may_be_missing() {
         let mut scan =
             PointScan::new([[0.0, 0.0, 1.0], [0.0, 9.0, 0.0], [0.5, 0.0, 1.0], [3.0, 0.0, 0.0]], [0.0; 3]);
         scan.origin = Origin::PerPoint(vec![[0.0; 3], [0.0, 1.0, 0.0], [0.5, 0.0, 3.0]]);
         let (all, counts) = FrameFilter::default().apply(Frame::Points(scan.clone()));
         assert_eq!((all, counts.hit, counts.dropped), (Frame::Points(scan.clone()), 3, 1));
         let (Frame::Points(kept), counts) = filter().apply(Frame::Points(scan)) else { panic!("points") };
-        assert_eq!((kept.points, kept.origin), (vec![[0.0, 0.0, 1.0]], Origin::PerPoint(vec![[0.0; 3]])));
-        assert_eq!((kept.refused.not_finite, kept.free_ends.len()), (1, 0));
-        assert_eq!(counts, BeamCounts { hit: 1, dropped: 2, self_hit: 1, ..Default::default() });
+        let origins = Origin::PerPoint(vec![[0.0; 3], [0.0, 1.0, 0.0]]);
+        assert_eq!((kept.points, kept.origin), (vec![[0.0, 0.0, 1.0]], origins));
+        assert_eq!((kept.refused.not_finite, kept.free_ends), (1, vec![[0.0, 5.0, 0.0]]));
+        assert_eq!(
+            counts,
+            BeamCounts { hit: 1, max_range: 1, dropped: 1, self_hit: 1, ..Default::default() }
+        );
     }
 
     #[test]

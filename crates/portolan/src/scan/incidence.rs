@@ -1,7 +1,7 @@
 //! Under which angle beams meet the surface, from their neighbors.
 
 use super::Scan;
-use crate::geom::vector::{distance, dot, scale, sub, unit};
+use crate::geom::vector::{along, distance, dot, sub, unit};
 
 /// Neighbors nearer than this say more about the noise than about the surface (meters).
 const BASELINE: f64 = 0.1;
@@ -19,9 +19,9 @@ pub fn cos_incidence<const D: usize>(scan: &Scan<D>, out: &mut Vec<f32>) {
     out.extend((0..scan.len()).map(|i| {
         let tangent = tangent(scan, i).unwrap_or([0.0; D]);
         let direction = scan.beam(i).direction;
-        let along = dot(tangent, direction);
+        let sine = dot(tangent, direction);
         // The sine of the angle to the tangent is the cosine of the angle to the normal.
-        (1.0 - along * along).max(0.0).sqrt() as f32
+        (1.0 - sine * sine).max(0.0).sqrt() as f32
     }));
 }
 
@@ -29,7 +29,7 @@ fn tangent<const D: usize>(scan: &Scan<D>, i: usize) -> Option<[f64; D]> {
     if !scan.beam(i).is_hit() {
         return None;
     }
-    let point = |i: usize| scale(scan.beam(i).direction, scan.beam(i).range);
+    let point = |i: usize| along(scan.origin(i), scan.beam(i).direction, scan.beam(i).range);
     let (mut left, mut right) = (i, i);
     for _ in 0..REACH {
         let wider_left = scan.next(left).filter(|&n| connected(scan, left, n));

@@ -88,7 +88,8 @@ impl Scan<2> {
     }
 }
 
-fn fan_order(bearings: &[f64]) -> BeamOrder {
+/// Whether beams of these bearings (radians) are neighbors.
+pub(super) fn fan_order(bearings: &[f64]) -> BeamOrder {
     let ascending = bearings.windows(2).all(|w| w[0] < w[1]);
     let [first, .., last] = bearings else { return BeamOrder::Unordered };
     let span = last - first;

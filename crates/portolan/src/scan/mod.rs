@@ -13,6 +13,7 @@
 mod angles;
 mod beam;
 mod bridges;
+mod deskew;
 mod frame_filter;
 mod incidence;
 mod laser;
@@ -25,6 +26,7 @@ mod record;
 mod rings;
 mod spherical_layout;
 mod stats;
+mod strips;
 mod ways;
 
 pub(crate) use angles::atan2;
@@ -44,4 +46,6 @@ pub use range_surface::orthographic_image;
 pub use record::{BeamOrder, Scan};
 pub use spherical_layout::SphericalLayout;
 pub use stats::{BeamCounts, RefusedBeams, ScanStats};
+pub use strips::Delivered;
+pub(crate) use strips::strips;
 pub use ways::{ScanWays, Way, WhyRays};

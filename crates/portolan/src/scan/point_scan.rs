@@ -1,14 +1,15 @@
 //! 3-D scans as end points: what a lidar's driver delivers.
 
-use super::{RangeImage, RefusedBeams};
+use super::{Delivered, RangeImage, RefusedBeams};
 
 /// Where the rays of a [`PointScan`] begin, in the frame of its points.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Origin {
     /// All in one point (meters).
     Common([f64; 3]),
-    /// Each in its own point (meters): a sensor that moved while it scanned, or parallel rays. Points beyond the end of
-    /// this list have no origin: maps refuse and count them as not finite.
+    /// Each in its own point (meters): a sensor that moved while it scanned, or parallel rays. First those of the points,
+    /// then those of the free ends. What lies beyond the end of this list has no origin: maps refuse and count it as not
+    /// finite.
     PerPoint(Vec<[f32; 3]>),
 }
 
@@ -22,14 +23,19 @@ pub struct PointScan {
     pub origin: Origin,
     /// Surfaces (meters).
     pub points: Vec<[f32; 3]>,
-    /// Ends of rays that met no surface up to there (meters); their origin is the common one.
+    /// Ends of rays that met no surface up to there (meters).
     pub free_ends: Vec<[f32; 3]>,
-    /// Seconds since the scan began, one per point, if the sensor gives them. Empty: it does not.
+    /// When each point was measured, if the sensor says so: seconds after [`PointScan::start_time`], one per point and, where
+    /// they are known, then one per free end. Empty: it does not.
     pub times: Vec<f32>,
+    /// When `times` are zero (seconds, in the sensor's own clock).
+    pub start_time: f64,
     /// Red, green, blue, one per point, if the sensor sees color. Empty: it does not.
     pub colors: Vec<[u8; 3]>,
     /// The same readings as rows and columns, where they have them.
     pub image: Option<RangeImage>,
+    /// The same readings as they were delivered, where the motion of the sensor was taken out of them.
+    pub delivered: Option<Box<Delivered>>,
     /// Readings that were refused when the scan was built, by cause.
     pub refused: RefusedBeams,
 }
@@ -54,13 +60,15 @@ impl PointScan {
             points: kept,
             free_ends: Vec::new(),
             times: Vec::new(),
+            start_time: 0.0,
             colors: Vec::new(),
             image: None,
+            delivered: None,
             refused,
         }
     }
 
-    /// The origin of point `i`; `None` where the scan gives it none.
+    /// The origin of point `i`, or of free end `i - points.len()`; `None` where the scan gives it none.
     #[inline(always)]
     pub fn origin_of(&self, i: usize) -> Option<[f64; 3]> {
         match &self.origin {

@@ -68,6 +68,8 @@ pub struct RangeImage {
     pub values: Vec<f32>,
     /// Red, green, blue of each pixel, if the sensor sees color. Empty: it does not.
     pub colors: Vec<[u8; 3]>,
+    /// Which pixels have a color: one that another camera did not see has none. Empty: all, where there are colors.
+    pub colored: Vec<bool>,
     /// Readings that were refused when the image was built, by cause.
     pub refused: RefusedBeams,
 }
@@ -78,7 +80,7 @@ impl RangeImage {
     /// [`RangeImage::from_ranges`].
     pub fn new(projection: Projection, columns: usize, rows: usize, values: impl Into<Vec<f32>>) -> Self {
         let (values, colors, refused) = (values.into(), Vec::new(), RefusedBeams::default());
-        Self { projection, columns, rows, values, colors, refused }
+        Self { projection, columns, rows, values, colors, colored: Vec::new(), refused }
     }
 
     /// The image of a depth camera: depths along its axis (meters), row by row; 0 where there is no reading.
@@ -103,7 +105,13 @@ impl RangeImage {
 
     /// The same image with a color (red, green, blue) for each pixel.
     pub fn with_colors(self, colors: impl Into<Vec<[u8; 3]>>) -> Self {
-        Self { colors: colors.into(), ..self }
+        Self { colors: colors.into(), colored: Vec::new(), ..self }
+    }
+
+    /// The same image with the colors that some of its pixels have.
+    pub fn with_some_colors(self, colors: impl IntoIterator<Item = Option<[u8; 3]>>) -> Self {
+        let (colors, colored) = colors.into_iter().map(|c| (c.unwrap_or_default(), c.is_some())).unzip();
+        Self { colors, colored, ..self }
     }
 
     /// Whether rows, columns, values and rays fit together, so that every pixel has a ray. O(rows).
@@ -124,6 +132,10 @@ impl RangeImage {
         )?;
         fits(self.values.len() == cells, "its values are not one per pixel")?;
         fits(self.colors.is_empty() || self.colors.len() == cells, "its colors are not one per pixel")?;
+        fits(
+            self.colored.is_empty() || self.colored.len() == self.colors.len(),
+            "which of its pixels have a color is not told of each",
+        )?;
         match &self.projection {
             Projection::Pinhole(c) => {
                 fits(c.fx.is_normal() && c.fy.is_normal(), "a focal length is 0 or not finite")?;

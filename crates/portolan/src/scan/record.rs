@@ -1,4 +1,4 @@
-//! A scan: beams from one common origin, the zero of the sensor's frame.
+//! A scan: beams from the zero of the sensor's frame, or from where the sensor was when it moved.
 
 use super::{Beam, BeamCounts, BeamKind, RefusedBeams};
 use crate::geom::{Pose, vector};
@@ -19,10 +19,12 @@ pub enum BeamOrder {
 /// A scan of a range sensor in the sensor's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan<const D: usize> {
-    directions: Vec<[f64; D]>,
+    pub(super) directions: Vec<[f64; D]>,
     ranges: Vec<f64>,
     kinds: Vec<BeamKind>,
-    order: BeamOrder,
+    /// Where each beam begins; empty: all in the zero.
+    pub(super) origins: Vec<[f64; D]>,
+    pub(super) order: BeamOrder,
     refused: RefusedBeams,
     time: Option<f64>,
 }
@@ -37,6 +39,7 @@ impl<const D: usize> Scan<D> {
             directions: Vec::new(),
             ranges: Vec::new(),
             kinds: Vec::new(),
+            origins: Vec::new(),
             order: BeamOrder::Unordered,
             refused: RefusedBeams::default(),
             time: None,
@@ -124,6 +127,13 @@ impl<const D: usize> Scan<D> {
         Beam { direction: self.directions[i], range: self.ranges[i], kind: self.kinds[i] }
     }
 
+    /// Where beam `i` begins in the sensor's frame (meters): its zero, unless the sensor moved while it scanned and that was taken
+    /// out ([`Scan::deskew`]). Panics where `i` is out of range and beams have origins of their own.
+    #[inline(always)]
+    pub fn origin(&self, i: usize) -> [f64; D] {
+        if self.origins.is_empty() { [0.0; D] } else { self.origins[i] }
+    }
+
     /// All beams in order.
     pub fn beams(&self) -> impl ExactSizeIterator<Item = Beam<D>> + '_ {
         (0..self.len()).map(|i| self.beam(i))
@@ -156,14 +166,18 @@ impl<const D: usize> Scan<D> {
 
     /// End points of the hits in the world frame.
     pub fn hits_world<'a>(&'a self, world_from_sensor: &'a Pose<D>) -> impl Iterator<Item = [f64; D]> + 'a {
-        self.beams()
-            .filter(Beam::is_hit)
-            .map(|b| world_from_sensor.transform_point(vector::scale(b.direction, b.range)))
+        self.beams().enumerate().filter(|(_, b)| b.is_hit()).map(|(i, b)| {
+            world_from_sensor.transform_point(vector::along(self.origin(i), b.direction, b.range))
+        })
     }
 
-    /// The largest arc length that any beam has something to say about (meters), hits included.
+    /// The distance from the zero of the sensor's frame up to which any beam has something to say (meters), hits included.
     pub fn reach(&self) -> f64 {
-        self.beams().map(|b| b.free_range()).fold(0.0, f64::max)
+        let reach = |(i, b): (usize, Beam<D>)| match b.free_range() {
+            range if range > 0.0 => vector::norm(self.origin(i)) + range,
+            _ => 0.0,
+        };
+        self.beams().enumerate().map(reach).fold(0.0, f64::max)
     }
 
     /// Beams by kind.

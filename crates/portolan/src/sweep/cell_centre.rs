@@ -14,7 +14,8 @@ use crate::scan::{BeamOrder, Scan, ScanStats, connected};
 /// surface, the range at the center's bearing is that of the chord between their end points; else the nearer
 /// beam speaks for the cells that it passes within half a cell, and between the two there is free space up to
 /// the shorter one, less the truncation. The cost is that of the cells, not of the beams: no cell is looked at
-/// twice. Scans without neighbourhood give each cell the beam that passes nearest to its center.
+/// twice. Scans without neighbourhood give each cell the beam that passes nearest to its center. A fan whose sensor moved is
+/// looked at as [`Scan::deskew`] says.
 ///
 /// Against [`super::March`] this removes a bias of about a quarter of a cell away from the sensor.
 #[derive(Clone, Debug)]
@@ -145,14 +146,15 @@ impl<const D: usize> Sweep<D> for CellCentre<D> {
         lattice: &Lattice<D>,
         limits: &PlanLimits<D>,
     ) -> Result<ScanStats, PlanError> {
-        self.model.weigh(scan, &mut self.cosines, &mut self.weights);
-        self.ordered = matches!(scan.order(), BeamOrder::Fan { .. }) && Fan::can_hold(scan.len());
+        let seen = scan.seen_from_zero();
+        self.ordered = matches!(seen.order(), BeamOrder::Fan { .. }) && Fan::can_hold(seen.len());
+        self.model.weigh(if self.ordered { &seen } else { scan }, &mut self.cosines, &mut self.weights);
         let bounds = limits.bounds_or_everywhere();
         if self.ordered {
-            self.plan_fan(scan, world_from_sensor, lattice, &bounds)?;
+            self.plan_fan(&seen, world_from_sensor, lattice, &bounds)?;
         } else {
-            let rays = scan.beams().zip(&self.weights).map(|(beam, &weight)| Ray {
-                origin: world_from_sensor.translation,
+            let rays = scan.beams().zip(&self.weights).enumerate().map(|(i, (beam, &weight))| Ray {
+                origin: world_from_sensor.transform_point(scan.origin(i)),
                 direction: world_from_sensor.rotate(beam.direction),
                 range: beam.free_range(),
                 hit: beam.is_hit(),

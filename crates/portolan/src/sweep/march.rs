@@ -73,8 +73,8 @@ impl<const D: usize> Sweep<D> for March<D> {
         let mut stats = beam_stats(scan, world_from_sensor, limits);
         let (tau, step) = (self.truncation, 0.5 * lattice.resolution);
         let carve = self.carve_weight > 0.0;
-        let origin = world_from_sensor.translation;
-        for (beam, &weight) in scan.beams().zip(&self.weights) {
+        for (i, (beam, &weight)) in scan.beams().zip(&self.weights).enumerate() {
+            let origin = world_from_sensor.transform_point(scan.origin(i));
             let z = beam.free_range();
             if z <= 0.0 || (!beam.is_hit() && !carve) {
                 continue;

@@ -98,9 +98,9 @@ impl<const D: usize> Sweep<D> for Rays<D> {
         self.touched.clear();
         let bounds = limits.bounds_or_everywhere();
         let mut stats = beam_stats(scan, world_from_sensor, limits);
-        for beam in scan.beams().filter(|b| b.free_range() > 0.0) {
+        for (i, beam) in scan.beams().enumerate().filter(|(_, b)| b.free_range() > 0.0) {
             let beam = Beam { direction: world_from_sensor.rotate(beam.direction), ..beam };
-            let origin = world_from_sensor.translation;
+            let origin = world_from_sensor.transform_point(scan.origin(i));
             if !self.walk(lattice, &bounds, origin, &beam, limits.most_blocks)? {
                 stats.refuse_far(beam.is_hit());
             }

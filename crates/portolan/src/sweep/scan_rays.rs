@@ -28,13 +28,13 @@ impl Ray<3> {
         passes: bool,
     ) -> Self {
         let to_world = |p: [f32; 3]| world_from_sensor.transform_point(p.map(f64::from));
-        if let Some(free) = i.checked_sub(scan.points.len()) {
-            return Self { origin: common, end: to_world(scan.free_ends[free]), hit: false, passes: true };
-        }
         let origin = match &scan.origin {
             Origin::Common(_) => common,
             Origin::PerPoint(all) => all.get(i).map_or([f64::NAN; 3], |o| to_world(*o)),
         };
+        if let Some(free) = i.checked_sub(scan.points.len()) {
+            return Self { origin, end: to_world(scan.free_ends[free]), hit: false, passes: true };
+        }
         Self { origin, end: to_world(scan.points[i]), hit: true, passes }
     }
 }

@@ -105,7 +105,7 @@ impl<'a> Task<'a> {
 /// Predicts 2-D scans.
 pub(super) fn in_2d(args: &Args, path: &Path, file: &MapFile<2>, tsdf: &Tsdf2) -> anyhow::Result<Part> {
     let task = Task::new(args, path, &file.header);
-    let log = log::read_2d(path, &args.source)?;
+    let log = log::read_2d(path, &args.source, task.settings.shape.deskew)?;
     let limits = LimitArgs { range: task.range(), no_return: args.limits.no_return };
     let scans = log::scans(&log, &task.indices(log.len())?, &limits.limits(&log));
     let resolution = tsdf.grid().lattice.resolution;
@@ -122,9 +122,10 @@ pub(super) fn in_2d(args: &Args, path: &Path, file: &MapFile<2>, tsdf: &Tsdf2) -
         if let Some(map) = &attenuation {
             foretold.add_scan(map, world_from_sensor, scan, settings.max_range);
         }
-        for beam in scan.beams().filter(|b| b.is_hit()) {
+        for (i, beam) in scan.beams().enumerate().filter(|(_, b)| b.is_hit()) {
             let direction = world_from_sensor.rotate(beam.direction);
-            match cast_ray(tsdf, world_from_sensor.translation, direction, &settings) {
+            let origin = world_from_sensor.transform_point(scan.origin(i));
+            match cast_ray(tsdf, origin, direction, &settings) {
                 RayCast::Hit(range) => predictions.pairs.push([range, beam.range]),
                 RayCast::Unknown(_) => predictions.unknown.push(beam.range),
                 RayCast::Outside(_) => predictions.outside.push(beam.range),
@@ -145,7 +146,7 @@ pub(super) fn in_3d(
     tsdf: &TsdfBricks<3>,
 ) -> anyhow::Result<Part> {
     let task = Task::new(args, path, &file.header);
-    let log = log::read_3d(path, &args.source, false)?;
+    let log = log::read_3d(path, &args.source, false, task.settings.shape.deskew)?;
     let filter = task.range().filter(task.settings.shape.self_filter.clone())?;
     let indices = task.indices(log.len())?;
     let resolution = tsdf.store.lattice().resolution;
@@ -162,9 +163,9 @@ pub(super) fn in_3d(
     let mut unreadable = Vec::new();
     let progress = Progress::new(indices.len(), "predicting", args.output);
     for &i in &indices {
-        match log.frame(i) {
-            Ok(frame) => {
-                let (frame, pose) = (filter.apply(frame).0, log.pose(i));
+        match log.filtered_frame(i, &filter) {
+            Ok((frame, _)) => {
+                let pose = log.pose(i);
                 predictions.add(&rays, pose, &frame, args.rays);
                 if let Some(map) = &attenuation {
                     foretold.add_frame(map, pose, &frame, args.rays, settings.max_range);

@@ -1,7 +1,7 @@
 //! `info` of a log.
 
 use portolan::geom::Aabb;
-use portolan_io::scan_log::{CameraFrom, ScanLog};
+use portolan_io::scan_log::{CameraFrom, Distortion, ScanLog};
 use portolan_io::{LaserLog, detect_no_return};
 use serde_json::{Value, json};
 
@@ -31,15 +31,36 @@ pub(super) fn of_2d(log: &LaserLog) -> Value {
     })
 }
 
+fn from_words(from: &CameraFrom) -> String {
+    match from {
+        CameraFrom::Caller => "the caller".to_owned(),
+        CameraFrom::File(path) => path.display().to_string(),
+        CameraFrom::DataSet(name) => (*name).to_owned(),
+    }
+}
+
+fn lens_words(distortion: &Distortion) -> &'static str {
+    match distortion {
+        Distortion::None => "none",
+        Distortion::Fisheye(_) => "fisheye",
+        _ => "rational",
+    }
+}
+
 pub(super) fn of_3d(log: &ScanLog) -> Value {
     let camera = log.camera().map(|camera| {
         let p = &camera.pinhole;
-        let from = match &camera.from {
-            CameraFrom::Caller => "the caller".to_owned(),
-            CameraFrom::File(path) => path.display().to_string(),
-            CameraFrom::DataSet(name) => (*name).to_owned(),
-        };
-        json!({ "fx": p.fx, "fy": p.fy, "cx": p.cx, "cy": p.cy, "from": from })
+        let color = camera.color.as_ref().map(|color| {
+            let p = &color.pinhole;
+            json!({
+                "fx": p.fx, "fy": p.fy, "cx": p.cx, "cy": p.cy, "from": from_words(&color.from),
+                "lens": lens_words(&color.distortion), "position": color.color_from_depth.inverse().translation,
+            })
+        });
+        json!({
+            "fx": p.fx, "fy": p.fy, "cx": p.cx, "cy": p.cy, "from": from_words(&camera.from),
+            "lens": lens_words(&camera.distortion), "color": color,
+        })
     });
     json!({
         "scans": log.len(),

@@ -116,7 +116,7 @@ impl Source {
             (Some(walk), _) => walk.frame(i).ok_or_else(none)?,
             (None, Source3d::Recorded { log, filter }) => {
                 // What the limits refuse is counted in the frame.
-                let (frame, _) = filter.apply(log.frame(i).map_err(Refusal::new)?);
+                let (frame, _) = log.filtered_frame(i, filter).map_err(Refusal::new)?;
                 Arc::new(frame)
             }
             (None, _) => return Err(none()),

@@ -263,8 +263,11 @@ impl SweptColors<3> for Projective {
                 if near(cell) && image.value[pixel] > 0.0 {
                     let (row, column) = (pixel / image.stride - 1, pixel % image.stride);
                     let column = (column + image.columns - 1) % image.columns;
-                    let rgb = image.colors[row * image.columns + column];
-                    colors.set(cell, ColorObservation { rgb, weight: distances.weights()[cell] });
+                    let at = row * image.columns + column;
+                    if image.colored.get(at).copied().unwrap_or(true) {
+                        let rgb = image.colors[at];
+                        colors.set(cell, ColorObservation { rgb, weight: distances.weights()[cell] });
+                    }
                 }
             }
         }

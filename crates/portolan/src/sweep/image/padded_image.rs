@@ -36,6 +36,8 @@ pub(super) struct PaddedImage {
     bridged: Vec<(usize, usize)>,
     /// Colors, without border; empty where the image has no colors.
     pub colors: Vec<[u8; 3]>,
+    /// Which pixels have a color, without border; empty: all.
+    pub colored: Vec<bool>,
 }
 
 /// Which readings are used, and how far apart one surface may be.
@@ -72,8 +74,10 @@ impl PaddedImage {
             }
         }
         self.colors.clear();
+        self.colored.clear();
         if how.colors {
             self.colors.extend_from_slice(&image.colors);
+            self.colored.extend_from_slice(&image.colored);
             self.color_bridges();
         }
         counted
@@ -144,6 +148,9 @@ impl PaddedImage {
     fn color_bridges(&mut self) {
         if self.colors.len() == self.columns * self.rows {
             self.bridged.iter().for_each(|&(to, from)| self.colors[to] = self.colors[from]);
+        }
+        if self.colored.len() == self.columns * self.rows {
+            self.bridged.iter().for_each(|&(to, from)| self.colored[to] = self.colored[from]);
         }
     }
 

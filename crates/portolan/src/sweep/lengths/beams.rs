@@ -68,8 +68,8 @@ impl<const D: usize> Sweep<D> for BeamLengths<D> {
         limits: &PlanLimits<D>,
     ) -> Result<ScanStats, PlanError> {
         let mut stats = beam_stats(scan, world_from_sensor, limits);
-        let origin = world_from_sensor.translation;
-        let rays = scan.beams().filter(|b| b.free_range() > 0.0).map(|b| {
+        let rays = scan.beams().enumerate().filter(|(_, b)| b.free_range() > 0.0).map(|(i, b)| {
+            let origin = world_from_sensor.transform_point(scan.origin(i));
             let end = along(origin, world_from_sensor.rotate(b.direction), b.range);
             Ray { origin, end, hit: b.is_hit(), passes: true }
         });
