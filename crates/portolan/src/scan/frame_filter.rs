@@ -140,7 +140,7 @@ impl FrameFilter {
         counts.dropped += scan.refused.total();
         if self.uses_all() {
             let origins = match &scan.origin {
-                Origin::Common(_) => scan.points.len(),
+                Origin::Common(_) | Origin::Unknown => scan.points.len(),
                 Origin::PerPoint(all) => all.len().min(scan.points.len()),
             };
             counts.hit += origins as u64;
@@ -157,11 +157,16 @@ impl FrameFilter {
         for (i, keep) in kept.iter_mut().enumerate() {
             let p = scan.points[i].map(f64::from);
             let common = matches!(scan.origin, Origin::Common(_));
-            let origin = scan.origin_of(i).unwrap_or([f64::NAN; 3]);
+            // Without an origin there is no range to limit.
+            let ranged = !parallel && scan.origin != Origin::Unknown;
+            let origin = match &scan.origin {
+                Origin::Unknown => [0.0; 3],
+                _ => scan.origin_of(i).unwrap_or([f64::NAN; 3]),
+            };
             let offset = sub(p, origin);
             let range = norm(offset);
             let what = if range.is_finite() {
-                self.decide((!parallel).then_some(range), if common { offset } else { p })
+                self.decide(ranged.then_some(range), if common { offset } else { p })
             } else {
                 Use::NotFinite
             };

@@ -10,6 +10,9 @@ pub enum Origin {
     /// Each in its own point (meters): a sensor that moved while it scanned, or parallel rays. Points beyond the end of
     /// this list have no origin: maps refuse and count them as not finite.
     PerPoint(Vec<[f32; 3]>),
+    /// Nobody knows where: points of a map that was fused before, or of a survey. Only occupancy maps take them, as hits
+    /// that free nothing; maps that need rays refuse and count them as not finite.
+    Unknown,
 }
 
 /// End points of rays in one frame, as `f32`, which is what sensors deliver.
@@ -66,6 +69,7 @@ impl PointScan {
         match &self.origin {
             Origin::Common(o) => Some(*o),
             Origin::PerPoint(all) => all.get(i).map(|o| o.map(f64::from)),
+            Origin::Unknown => None,
         }
     }
 }
@@ -86,6 +90,20 @@ impl Frame {
             Self::Image(image) => image.hits(),
             Self::Points(scan) => scan.points.len(),
         }
+    }
+
+    /// The surfaces alone, as points that nothing looked at: what is left where a scan is not to free any space.
+    pub fn without_rays(self) -> Self {
+        let (origin, image, free_ends) = (Origin::Unknown, None, Vec::new());
+        Self::Points(match self {
+            Self::Points(scan) => PointScan { origin, image, free_ends, ..scan },
+            Self::Image(all) => {
+                let hits = || all.readings().filter(|(.., hit)| *hit).map(|(_, end, _)| end);
+                let points = hits().map(|end| end.map(|v| v as f32)).collect();
+                let (times, colors) = Default::default();
+                PointScan { origin, points, free_ends, times, colors, image, refused: all.refused }
+            }
+        })
     }
 
     /// Readings that were refused when the scan was built, by cause.
