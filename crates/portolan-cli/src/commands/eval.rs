@@ -86,7 +86,3 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     }
     args.output.print(&document, text)
 }
-
-fn no_tsdf(args: &Args) -> anyhow::Error {
-    anyhow::anyhow!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display())
-}

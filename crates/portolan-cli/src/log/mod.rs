@@ -114,6 +114,7 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
     if let Some(first) = stats.refused_poses.first() {
         warnings.push(format!("{} poses could not be used (first: {first})", stats.refused_poses.len()));
     }
+    warnings.extend(stats.notes.iter().cloned());
     if let Some(why) = &stats.colors_left_out {
         warnings.push(format!("colors were left out: {why}"));
     }

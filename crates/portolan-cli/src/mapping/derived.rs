@@ -14,11 +14,15 @@ use portolan_io::{MapFile, TsdfBricks};
 
 use super::{MapKind, Settings};
 use crate::arguments::shown_bytes;
-use crate::esdf::{FieldHow, esdf_2d, esdf_3d};
+use crate::esdf::{FieldHow, esdf_2d, esdf_3d, esdf_of_points};
 use crate::saved::SavedMap;
 
 /// Contours nearer to each other than this and facing the same way are one wall seen twice (meters).
 const DOUBLED_REACH: f64 = 0.15;
+
+/// What is to be said of a map of points without rays.
+const NO_RAYS: &str = "no mesh, tsdf or attenuation were made: points without rays do not say which side of them is free, and all \
+     space between them is unknown";
 
 /// Surfaces, distance field and octree, as far as they are wanted and there is a map to derive them from.
 #[derive(Default)]
@@ -78,6 +82,10 @@ impl Derived {
                 derived.notes.push("the octree was not made: the map spans more than 2^28 cells".to_owned());
             }
         }
+        if settings.shape.points_only {
+            derived.of_points(file, settings, memory);
+            return derived;
+        }
         let Some(tsdf) = &file.tsdf_bricks else { return derived };
         if settings.wants(MapKind::Mesh) {
             let colors = file.color_bricks.as_ref().map(|c| &c.store).filter(|store| !store.is_empty());
@@ -91,6 +99,16 @@ impl Derived {
             derived.hold_field(made);
         }
         derived
+    }
+
+    /// What points without rays give: distances to the cells that hold them.
+    fn of_points(&mut self, file: &MapFile<3>, settings: &Settings, memory: usize) {
+        self.notes.push(NO_RAYS.to_owned());
+        let Some(map) = file.occupancy_bricks.as_ref().filter(|_| settings.wants(MapKind::Esdf)) else { return };
+        let left = memory.saturating_sub(map.store.memory_bytes());
+        // The cells, and as much again while the field is made.
+        let made = self.timed("esdf", |_| esdf_of_points(map, &FieldHow::of(settings), left / 2));
+        self.hold_field(made.map(DistanceField::Three));
     }
 
     /// The field, or a note why there is none.

@@ -215,6 +215,7 @@ fn way_words(way: Way) -> &'static str {
         Way::Rays(WhyRays::NoRows) => "ray by ray: no rows and columns were found in their points",
         Way::Rays(WhyRays::SharedPixels) => "ray by ray: rows and columns would lose points",
         Way::Rays(WhyRays::Gaps) => "ray by ray: rows and columns would have gaps",
+        Way::Points => "as points without rays: nothing is freed",
     }
 }
 
@@ -259,7 +260,12 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     }
     if let Some(esdf) = summary.derived.esdf.as_ref().filter(|_| summary.has_points()) {
         let points = esdf.points().len();
-        let _ = writeln!(text, "distances to the surface and to {points} cells that stop beams without one");
+        let _ = match summary.settings.shape.points_only {
+            true => writeln!(text, "distances to {points} cells that hold points"),
+            false => {
+                writeln!(text, "distances to the surface and to {points} cells that stop beams without one")
+            }
+        };
     }
     if let Some(mesh) = &summary.derived.mesh {
         let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area());

@@ -16,6 +16,8 @@ pub(super) enum Rays {
     From(Vec<[f64; 3]>),
     /// Above each point: a scanner that looks along -z from far away.
     Parallel,
+    /// Nobody knows where: there are no rays.
+    Unknown,
 }
 
 /// Reads clouds.
@@ -44,6 +46,16 @@ impl CloudFrames {
         Ok(Self { files, format, rays, base })
     }
 
+    /// The same frames without rays.
+    pub(super) fn without_rays(self) -> Self {
+        Self { rays: Rays::Unknown, ..self }
+    }
+
+    /// Whole meters that are taken off every point.
+    pub(super) fn base(&self) -> [f64; 3] {
+        self.base
+    }
+
     /// What leads from the frames' points to the files': the offset. `None` where they are the same.
     pub(super) fn files_from_frames(&self) -> Option<Pose<3>> {
         file_from_frames(self.base)
@@ -61,14 +73,19 @@ impl FrameSource for CloudFrames {
         Ok(Frame::Points(match &self.rays {
             Rays::From(origins) => scan_from(cloud, origins[i]),
             Rays::Parallel => range_scan(cloud, &self.files[i])?,
+            Rays::Unknown => without_rays(cloud),
         }))
     }
 
     fn origin(&self, i: usize) -> [f64; 3] {
         match &self.rays {
             Rays::From(origins) => std::array::from_fn(|k| origins[i][k] - self.base[k]),
-            Rays::Parallel => [0.0; 3],
+            Rays::Parallel | Rays::Unknown => [0.0; 3],
         }
+    }
+
+    fn knows_origins(&self) -> bool {
+        self.rays != Rays::Unknown
     }
 }
 
@@ -101,7 +118,7 @@ pub(super) fn about(mut cloud: PointCloudFile, base: [f64; 3], path: &Path) -> R
 
 /// A scan of rays from one point (in the file's frame), with an image about that point where the cloud has rows and columns
 /// that a sensor can have.
-fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
+pub(super) fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
     let image = cloud.grid.as_ref().and_then(|grid| {
         let about_origin = |i: usize| std::array::from_fn(|k| (cloud.position(i)[k] - origin[k]) as f32);
         let points: Vec<[f32; 3]> = (0..cloud.points.len()).map(about_origin).collect();
@@ -109,6 +126,12 @@ fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
         OrganisedPoints { points: &points, pixels, colors: &cloud.colors, columns, rows }.image()
     });
     PointScan { image, ..cloud.into_scan(origin) }
+}
+
+/// Points that nobody knows the origin of.
+pub(super) fn without_rays(cloud: PointCloudFile) -> PointScan {
+    // Nothing lies on this origin: it is replaced.
+    PointScan { origin: Origin::Unknown, ..cloud.into_scan([f64::INFINITY; 3]) }
 }
 
 /// A range scan of parallel rays: the points as they are, each with its own origin, and the image of them.

@@ -130,6 +130,12 @@ impl ScanLog {
         entry.world_from_sensor.transform_point(self.source.origin(entry.place))
     }
 
+    /// Whether every scan says where it was seen from, or the caller did. Where not, its frames have
+    /// [`Origin::Unknown`](portolan::scan::Origin::Unknown): they are points without rays, and free nothing.
+    pub fn knows_origins(&self) -> bool {
+        self.source.knows_origins()
+    }
+
     /// The stamp of scan `i` (seconds of some clock), if there is one. Panics for an `i` beyond the last.
     pub fn time(&self, i: usize) -> Option<f64> {
         self.entries[i].time

@@ -7,6 +7,8 @@
 //! | [`Stanford`](ScanLogKind::Stanford) | PLY files with a `range_grid` | `.conf`: conjugated quaternions |
 //! | [`ScanGraph`](ScanLogKind::ScanGraph) | a `.graph` file | in the file |
 //! | [`Clouds`](ScanLogKind::Clouds) | `*.pcd`, `*.ply`, `*.bin` or `*.xyz`; one such file | a file like `*pose*.csv`, else PCD viewpoints |
+//! | | `*.e57`, `*.ptx` with any number of scans | in the file |
+//! | | `*.las`, `*.laz` | none: points without rays |
 //! | [`TumRgbd`](ScanLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
 //! | [`Redwood`](ScanLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
 //! | [`BigBird`](ScanLogKind::BigBird) | `masked_depth/frameF_camC.png` | `pose/poses.txt` |
@@ -30,6 +32,7 @@ mod depth_frames;
 mod depth_png;
 mod files;
 mod graph;
+mod hidden;
 mod intrinsics;
 mod kind;
 mod kitti;
@@ -40,6 +43,7 @@ mod matching;
 mod options;
 mod parts;
 mod redwood;
+mod scanner;
 mod seven_scenes;
 mod stanford;
 mod stats;

@@ -21,6 +21,11 @@ pub(crate) trait FrameSource: Send + Sync {
         [0.0; 3]
     }
 
+    /// Whether all scans say where they were seen from. Else points are all that can be used.
+    fn knows_origins(&self) -> bool {
+        true
+    }
+
     /// Color pictures that could not be read so far.
     fn unread_colors(&self) -> Option<UnreadColors> {
         None

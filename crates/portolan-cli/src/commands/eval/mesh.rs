@@ -11,10 +11,11 @@ use portolan::surface::{
 use portolan_io::{MapFile, PlyMesh, PointCloudFile, TsdfBricks, open, read_ply_mesh, read_points};
 use serde_json::{Value, json};
 
-use super::{Args, Part, no_tsdf, predict};
+use super::{Args, Part, predict};
+use crate::saved::no_tsdf;
 
 pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Part>> {
-    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(&args.map, &file.header))?;
     let settings = MeshSettings { normals: false, colors: false, ..MeshSettings::of(tsdf) };
     let mesh = marching_cubes(&tsdf.store, None, &settings);
     let (triangles, area) = (mesh.triangles.len(), mesh.area());
