@@ -161,7 +161,7 @@ pub(crate) fn describe(kind: &FileKind) -> String {
     match kind {
         FileKind::CarmenLog => "a CARMEN log".into(),
         FileKind::ScanLog(kind) => kind.label().into(),
-        FileKind::Mesh(format) => format.label().into(),
+        FileKind::Mesh(format) => format!("a mesh ({})", format.label()),
         FileKind::Portolan => "a portolan map".into(),
         FileKind::PortolanFolder => "a folder with a portolan map".into(),
         FileKind::EsdfBin => "a distance field (esdf.bin)".into(),

@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::bail;
-use portolan::cell::LogOdds8;
 use portolan::field::{Esdf, EsdfGrid, PointKind};
 use portolan::map::Tsdf2;
-use portolan::store::{Store, Tree};
+use portolan::store::Store;
 use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, MeshSettings, ThinWalls};
 use portolan::surface::{doubled_length, marching_cubes, marching_squares, thin_walls};
 use portolan_io::{MapFile, TsdfBricks};
 
-use super::{MapKind, Settings};
+use super::{MapKind, Octree, Settings};
 use crate::arguments::shown_bytes;
 use crate::esdf::{FieldHow, esdf_2d, esdf_3d, esdf_of_points};
 use crate::saved::SavedMap;
@@ -29,7 +28,7 @@ const NO_RAYS: &str = "no mesh, tsdf or attenuation were made: points without ra
 pub(crate) struct Derived {
     pub(crate) contour: Option<ContourChecked>,
     pub(crate) mesh: Option<Mesh>,
-    pub(crate) octree: Option<Tree<LogOdds8, 3>>,
+    pub(crate) octree: Option<Octree>,
     pub(crate) esdf: Option<DistanceField>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
     /// What was not made, and why.
@@ -77,7 +76,7 @@ impl Derived {
     fn of_3d(file: &MapFile<3>, settings: &Settings, memory: usize) -> Self {
         let mut derived = Self::default();
         if let Some(map) = &file.occupancy_bricks {
-            derived.octree = derived.timed("octree", |_| Tree::from_bricks(&map.store));
+            derived.octree = derived.timed("octree", |_| Octree::of(&map.store));
             if derived.octree.is_none() {
                 derived.notes.push("the octree was not made: the map spans more than 2^28 cells".to_owned());
             }
@@ -130,7 +129,7 @@ impl Derived {
     pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
         let contour = self.contour.iter().map(|c| ("contour", c.contour.memory_bytes()));
         let mesh = self.mesh.iter().map(|m| ("mesh", m.memory_bytes()));
-        let octree = self.octree.iter().map(|t| ("octree", t.memory_bytes()));
+        let octree = self.octree.iter().map(|t| ("octree", t.tree.memory_bytes()));
         let esdf = self.esdf.iter().map(|e| ("esdf", e.memory_bytes()));
         contour.chain(mesh).chain(octree).chain(esdf).collect()
     }

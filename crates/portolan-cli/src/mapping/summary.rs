@@ -146,7 +146,7 @@ impl Summary<'_> {
                     self.derived
                         .octree
                         .as_ref()
-                        .map(|t| { json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }) })
+                        .map(|t| { json!({ "nodes": t.tree.nodes(), "inner": t.tree.inner_nodes(), "shift": t.shift }) })
                 );
                 document["sweeps"] = json::ways(&self.fusion.stats.ways);
                 document["points_without_pixel"] = json!(self.fusion.without_pixel);
@@ -268,7 +268,7 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         };
     }
     if let Some(mesh) = &summary.derived.mesh {
-        let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area());
+        let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area() + 0.0);
     }
     let per_scan: Vec<_> = ["tree", "grid", "tsdf"]
         .iter()

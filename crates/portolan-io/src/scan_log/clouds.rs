@@ -158,8 +158,8 @@ fn open_file(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         _ => (in_place(&files), from_zero(&files, options)),
     };
     // Neither the file nor the caller says where it was seen from.
-    let is_assumed = matches!(poses, LayoutPoses::Missing(_)) && options.origin.is_none();
-    let is_assumed = is_assumed && options.poses.is_none();
+    let has_viewpoint = format == Some(PointFormat::Pcd) && !matches!(poses, LayoutPoses::Missing(_));
+    let is_assumed = !has_viewpoint && options.origin.is_none() && options.poses.is_none();
     let poses = if matches!(poses, LayoutPoses::Missing(_)) { in_place(&files) } else { poses };
     let rays = options.origin.map_or(rays, |origin| Rays::From(vec![origin]));
     let mut source = CloudFrames::new(files, format, rays)?;
@@ -202,7 +202,8 @@ pub(super) fn assumed(
     if base != [0.0; 3] {
         let far = norm(base) / 1000.0;
         return Ok(Assumed::Nowhere(format!(
-            "{shown} does not say where its points were seen from, and they lie {far:.0} km from 0,0,0: they are taken              as points without rays, so that free space stays unknown; {ADVICE}"
+            "{shown} does not say where its points were seen from, and they lie {far:.0} km from 0,0,0: they are taken \
+             as points without rays, so that free space stays unknown; {ADVICE}"
         )));
     }
     let cloud = cloud()?;
@@ -210,7 +211,9 @@ pub(super) fn assumed(
     // Rows and columns are those of one scan.
     Ok(Assumed::Zero(share.filter(|share| *share > FUSED_FROM && cloud.grid.is_none()).map(|share| {
         format!(
-            "{shown} looks like a fused map and not like one scan: seen from 0,0,0, which is assumed, {:.0} % of its              points lie behind others, and rays from there free what nobody looked through; give --points-only to              insert its points without rays, or {}",
+            "{shown} looks like a fused map and not like one scan: seen from 0,0,0, which is assumed, {:.0} % of its \
+             points lie behind others, and rays from there free what nobody looked through; give --points-only to \
+             insert its points without rays, or {}",
             100.0 * share,
             &ADVICE["give ".len()..]
         )
