@@ -199,7 +199,9 @@ pub(crate) fn shift(text: &str) -> Result<Shift, String> {
     match text {
         "auto" => Ok(Shift::Auto),
         "0" => Ok(Shift::At([0.0; 3])),
-        _ => point3(text).map(Shift::At).map_err(|_| "must be auto, 0 or three numbers x,y,z in meters".to_owned()),
+        _ => point3(text)
+            .map(Shift::At)
+            .map_err(|_| "must be auto, 0 or three numbers x,y,z in meters".to_owned()),
     }
 }
 

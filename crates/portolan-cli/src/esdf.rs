@@ -3,7 +3,9 @@
 use anyhow::{Context, ensure};
 use portolan::Answer;
 use portolan::cell::{DistancePlanes, LogOdds8};
-use portolan::field::{Clearance, ClearanceField, Esdf, EsdfGrid, EsdfMethod, EsdfSettings, ObstacleCells, UnknownSpace};
+use portolan::field::{
+    Clearance, ClearanceField, Esdf, EsdfGrid, EsdfMethod, EsdfSettings, ObstacleCells, UnknownSpace,
+};
 use portolan::geom::{Grid, Lattice, vector};
 use portolan::map::{Tsdf2, TsdfConfig};
 use portolan::store::{Bricks, Dense, Store};

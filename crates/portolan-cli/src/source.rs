@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, MeshFormat, OctomapTree, Pgm, PlyMesh, Polyline, detect,
-    read_geojson, read_mesh,
+    CarmenLog, EsdfFile, FileKind, MapFile, MapServerMap, MeshFormat, OctomapTree, Pgm, PlyMesh, Polyline,
+    detect, read_geojson, read_mesh,
 };
 
 use crate::dimension::{Dimension, Given};

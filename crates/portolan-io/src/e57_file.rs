@@ -235,7 +235,9 @@ pub fn e57_about(path: impl AsRef<Path>) -> Result<E57About> {
 mod tests {
     use super::*;
     use crate::testing::{bad_bytes, real_data, says};
-    use e57::{E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform, Translation};
+    use e57::{
+        E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform, Translation,
+    };
 
     const DOUBLE: RecordDataType = RecordDataType::Double { min: None, max: None };
 
@@ -245,10 +247,13 @@ mod tests {
         let mut file = Cursor::new(Vec::new());
         let mut writer = E57Writer::new(&mut file, "file").unwrap();
         let names = match spherical {
-            true => [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation],
+            true => {
+                [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation]
+            }
             false => [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ],
         };
-        let state = if spherical { RecordName::SphericalInvalidState } else { RecordName::CartesianInvalidState };
+        let state =
+            if spherical { RecordName::SphericalInvalidState } else { RecordName::CartesianInvalidState };
         let mut prototype: Vec<Record> =
             names.into_iter().map(|name| Record { name, data_type: DOUBLE }).collect();
         let whole = |max| RecordDataType::Integer { min: 0, max };
@@ -355,7 +360,9 @@ mod tests {
         if let Some(scans) = scans("tiny_spherical.e57") {
             let cloud = scans.unwrap().remove(0).cloud;
             assert_eq!(cloud.points.len() as u64 + cloud.refused.no_reading, 360);
-            assert!(cloud.points.iter().all(|p| (p.iter().map(|v| v * v).sum::<f32>().sqrt() - 1.0).abs() < 1e-3));
+            assert!(
+                cloud.points.iter().all(|p| (p.iter().map(|v| v * v).sum::<f32>().sqrt() - 1.0).abs() < 1e-3)
+            );
         }
         if let Some(damaged) = scans("corrupt_crc.e57") {
             says(damaged, "the E57 data is not readable: Failed to read E57");

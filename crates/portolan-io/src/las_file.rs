@@ -211,7 +211,10 @@ mod tests {
             for k in 0..3 {
                 let along = || (0..points).map(|i| cloud.position(i)[k]);
                 let (least, most) = (along().fold(f64::INFINITY, f64::min), along().fold(f64::MIN, f64::max));
-                assert!((least - low[k]).abs() < 6e-3 && (most - high[k]).abs() < 6e-3, "{name} {least} {most}");
+                assert!(
+                    (least - low[k]).abs() < 6e-3 && (most - high[k]).abs() < 6e-3,
+                    "{name} {least} {most}"
+                );
             }
             let last = cloud.times.iter().copied().fold(0.0, f32::max);
             assert!((f64::from(last) - span).abs() < 1e-2, "{name}: {last}");

@@ -219,7 +219,8 @@ mod tests {
         assert_eq!(at, [[1.0, 3.0, 3.0], [1.0, 2.0, 5.0], [-2.0, 2.0, 3.0]]);
         // A scanner at zero that never moved says nothing.
         assert_eq!((scans[1].origin, scans[1].cloud.points.len()), (None, 2));
-        let second = parse(Input::from_reader(TWO.as_bytes(), "a".as_ref()).unwrap(), Wanted::Scan(1)).unwrap();
+        let second =
+            parse(Input::from_reader(TWO.as_bytes(), "a".as_ref()).unwrap(), Wanted::Scan(1)).unwrap();
         assert_eq!((second[0].cloud.points.len(), &second[1]), (0, &scans[1]));
     }
 
@@ -236,7 +237,10 @@ mod tests {
             (String::new(), "the header of a scan is missing"),
             (line(7), "a.ptx: line 7: the header of a scan is missing"),
             (line(12), "a.ptx: line 12: the number of points is 2 of 4; columns x rows announce more"),
-            (TWO.replacen("0 3 0 1 7 8 9", "0 3 0 1", 1), "line 14: the number of columns of a point is 4; write 7"),
+            (
+                TWO.replacen("0 3 0 1 7 8 9", "0 3 0 1", 1),
+                "line 14: the number of columns of a point is 4; write 7",
+            ),
             (TWO.replacen("0 0 2 0.25", "0 x 2 0.25", 1), "line 13: a point is"),
             (TWO.replacen("2\n2\n", "2.5\n2\n", 1), "columns x rows is 2.5 x 2"),
             (TWO.replacen("2\n2\n", "16000000\n16000000\n", 1), "at most 1073741824 pixels"),
@@ -253,7 +257,10 @@ mod tests {
             let scans = parse(crate::open(path).unwrap(), Wanted::All).unwrap();
             // PDAL: the first return in the file's frame.
             let (cloud, moved) = (&scans[0].cloud, scans[0].clone().in_file().unwrap());
-            assert_eq!((cloud.points.len(), cloud.refused.no_reading, scans[0].origin), (4, 8, Some([0.0; 3])));
+            assert_eq!(
+                (cloud.points.len(), cloud.refused.no_reading, scans[0].origin),
+                (4, 8, Some([0.0; 3]))
+            );
             let want = [-3.034407, -3.173801, -1.823_751];
             for k in 0..3 {
                 assert!((moved.position(0)[k] - want[k]).abs() < 2e-3, "{:?}", moved.position(0));

@@ -19,8 +19,8 @@ use super::convert::UnknownArg;
 use crate::arguments::{length, thin};
 use crate::error::bad_call;
 use crate::esdf::{
-    EsdfArg, FieldHow, PointsAlone, SURFACE_ALONE, check_thin, esdf_2d, esdf_3d, esdf_of_cells, esdf_of_points,
-    is_of_points, keeps_thin,
+    EsdfArg, FieldHow, PointsAlone, SURFACE_ALONE, check_thin, esdf_2d, esdf_3d, esdf_of_cells,
+    esdf_of_points, is_of_points, keeps_thin,
 };
 use crate::mapping::Settings;
 use crate::output::Output;
@@ -272,8 +272,7 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     let field = match (field, of_points) {
         (None, Some(map)) => {
             how.max_distance += HELD_BACK * map.store.lattice().resolution;
-            let (distance, certified) =
-                sparse(esdf_of_points(map, &how, usize::MAX)?, max_distance, args);
+            let (distance, certified) = sparse(esdf_of_points(map, &how, usize::MAX)?, max_distance, args);
             Some((distance, certified.map(|c| Certified { of_points: true, ..c })))
         }
         (field, _) => field.transpose()?,

@@ -103,7 +103,9 @@ impl Derived {
     /// What points without rays give: distances to the cells that hold them.
     fn of_points(&mut self, file: &MapFile<3>, settings: &Settings, memory: usize) {
         self.notes.push(NO_RAYS.to_owned());
-        let Some(map) = file.occupancy_bricks.as_ref().filter(|_| settings.wants(MapKind::Esdf)) else { return };
+        let Some(map) = file.occupancy_bricks.as_ref().filter(|_| settings.wants(MapKind::Esdf)) else {
+            return;
+        };
         let left = memory.saturating_sub(map.store.memory_bytes());
         // The cells, and as much again while the field is made.
         let made = self.timed("esdf", |_| esdf_of_points(map, &FieldHow::of(settings), left / 2));

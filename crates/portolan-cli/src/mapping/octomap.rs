@@ -95,7 +95,11 @@ mod tests {
             let want = store.lattice().corner(place);
             for k in 0..3 {
                 assert!(at[k].abs() < 0.5 * HALF, "{at:?}");
-                assert!((at[k] + octree.shift[k] - want[k]).abs() < 1e-6, "{at:?} {:?} {want:?}", octree.shift);
+                assert!(
+                    (at[k] + octree.shift[k] - want[k]).abs() < 1e-6,
+                    "{at:?} {:?} {want:?}",
+                    octree.shift
+                );
             }
             let mut occupied = 0;
             octree.tree.for_each_leaf(|leaf| occupied += usize::from(leaf.value.is_occupied()));

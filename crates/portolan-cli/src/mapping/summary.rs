@@ -142,12 +142,9 @@ impl Summary<'_> {
             Dimension::Two => document["contour"] = self.contour_json(),
             Dimension::Three => {
                 document["mesh"] = self.mesh_json();
-                document["octree"] = json!(
-                    self.derived
-                        .octree
-                        .as_ref()
-                        .map(|t| { json!({ "nodes": t.tree.nodes(), "inner": t.tree.inner_nodes(), "shift": t.shift }) })
-                );
+                document["octree"] = json!(self.derived.octree.as_ref().map(|t| {
+                    json!({ "nodes": t.tree.nodes(), "inner": t.tree.inner_nodes(), "shift": t.shift })
+                }));
                 document["sweeps"] = json::ways(&self.fusion.stats.ways);
                 document["points_without_pixel"] = json!(self.fusion.without_pixel);
             }

@@ -141,9 +141,9 @@ impl Reader<'_> {
             return Err(self.wrong("the number of vertices", "more than 2^32"));
         }
         for p in positions.chunks_exact(3) {
-            self.mesh.vertices.push(std::array::from_fn(|k| {
-                (0..3).map(|c| world[k][c] * p[c]).sum::<f64>() + world[k][3]
-            }));
+            self.mesh
+                .vertices
+                .push(std::array::from_fn(|k| (0..3).map(|c| world[k][c] * p[c]).sum::<f64>() + world[k][3]));
         }
         let indices = match &primitive["indices"] {
             Value::Null => (0..count).map(|i| i as f64).collect(),
@@ -193,7 +193,8 @@ impl Reader<'_> {
             let last = count.checked_sub(1)?.checked_mul(stride)?;
             b.checked_add(last)?.checked_add(size)
         });
-        let (Some(begins), true) = (begins, count == 0 || end.is_some_and(|end| end <= self.data.len())) else {
+        let (Some(begins), true) = (begins, count == 0 || end.is_some_and(|end| end <= self.data.len()))
+        else {
             let value = format!("{count} items in {} bytes", self.data.len());
             return Err(self.wrong("an accessor", value));
         };
@@ -212,7 +213,12 @@ impl Reader<'_> {
     }
 
     fn wrong(&self, field: &str, value: impl std::fmt::Display) -> IoError {
-        IoError::layout(self.path, field, value, "the file is damaged or of a kind that is not read: export it again")
+        IoError::layout(
+            self.path,
+            field,
+            value,
+            "the file is damaged or of a kind that is not read: export it again",
+        )
     }
 }
 
@@ -276,7 +282,11 @@ mod tests {
             assert_eq!(back.triangles, mesh.triangles);
             for i in 0..4 {
                 let want = mesh.vertex_world(i);
-                assert!((0..3).all(|k| (back.vertices[i][k] - want[k]).abs() < 1e-6), "{:?} {want:?}", back.vertices[i]);
+                assert!(
+                    (0..3).all(|k| (back.vertices[i][k] - want[k]).abs() < 1e-6),
+                    "{:?} {want:?}",
+                    back.vertices[i]
+                );
             }
         }
     }

@@ -12,8 +12,8 @@ pub(crate) use format::mesh_format;
 pub use format::{MeshCounts, MeshFormat, mesh_counts, parse_mesh_counts};
 pub use glb::{glb_to_bytes, write_glb};
 pub use obj::write_obj;
-pub use read::{mesh_area, read_mesh};
 pub use ply::{ply_mesh_to_bytes, write_ply_mesh};
+pub use read::{mesh_area, read_mesh};
 
 use std::path::Path;
 

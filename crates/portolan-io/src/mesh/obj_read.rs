@@ -99,7 +99,9 @@ mod tests {
     #[test]
     fn faces_of_every_notation() {
         let corners = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\n";
-        for face in ["f 1 2 3 4", "f 1/9 2/9 3/9 4/9", "f 1//1 2//1 3//1 4//1", "f -4 -3 -2 -1", "g a\nf 1/2/3 2 3 4"] {
+        for face in
+            ["f 1 2 3 4", "f 1/9 2/9 3/9 4/9", "f 1//1 2//1 3//1 4//1", "f -4 -3 -2 -1", "g a\nf 1/2/3 2 3 4"]
+        {
             let mesh = read(format!("{corners}{face}\n")).unwrap();
             assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]], "{face}");
             assert_eq!((mesh.vertices[2], mesh.colors[1]), ([1.0, 1.0, 0.0], [0, 255, 0]));

@@ -8,6 +8,7 @@
 //! fits at least twice as well, opening fails with that advice.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use portolan::geom::Pose;
 use portolan::geom::vector::norm;
@@ -15,13 +16,13 @@ use portolan::geom::vector::norm;
 use super::ScanLogOptions;
 use super::agreement::{Placed, disagreement};
 use super::cloud_frames::{CloudFrames, Rays};
-use super::hidden::{FUSED_FROM, hidden_share};
-use super::scanner;
 use super::files::{has_extension, has_name, names_in, number_in};
+use super::hidden::{FUSED_FROM, hidden_share};
 use super::parts::{LayoutPoses, Parts, ScanId};
+use super::scanner;
 use crate::pcd::read_viewpoint;
 use crate::points::{PointCloudFile, PointFormat, Viewpoint, has_poses, point_format, read_points_as};
-use crate::poses3::{RawPose, read_poses_3d};
+use crate::poses3::{PoseConvention, RawPose, TimedPoses, TrackPose, read_poses_3d};
 use crate::{IoError, Result};
 
 /// The endings of clouds, in the order in which they are tried where a folder has as many of one as of another.
@@ -69,9 +70,11 @@ fn is_cloud(path: &Path) -> bool {
         // Endings that many things have.
         None => {
             let head = head_of(path);
-            let is_known = head.starts_with(crate::e57_file::MAGIC) || head.starts_with(crate::las_file::MAGIC);
-            is_known || ["txt", "csv", "dat"].iter().any(|e| name.contains(&format!(".{e}")))
-                && crate::xyz::may_be_points(path)
+            let is_known =
+                head.starts_with(crate::e57_file::MAGIC) || head.starts_with(crate::las_file::MAGIC);
+            is_known
+                || ["txt", "csv", "dat"].iter().any(|e| name.contains(&format!(".{e}")))
+                    && crate::xyz::may_be_points(path)
         }
     }
 }
@@ -115,8 +118,8 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     if has_poses(format) {
         return scanner::open(path, &files, format, options);
     }
-    if format == PointFormat::Las && options.poses.is_none() && options.origin.is_none() {
-        return survey(path, files, format);
+    if format == PointFormat::Las && options.origin.is_none() {
+        return survey(path, files, options);
     }
     let pose_file = match &options.poses {
         Some(_) => None,
@@ -148,9 +151,7 @@ fn open_file(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     let files = vec![path.to_owned()];
     match format {
         Some(format) if has_poses(format) => return scanner::open(path, &files, format, options),
-        Some(format @ PointFormat::Las) if options.poses.is_none() && options.origin.is_none() => {
-            return survey(path, files, format);
-        }
+        Some(PointFormat::Las) if options.origin.is_none() => return survey(path, files, options),
         _ => {}
     }
     let (poses, rays) = match format {
@@ -220,18 +221,40 @@ pub(super) fn assumed(
     })))
 }
 
-/// Clouds of a survey, which say nothing of the scanner: points without rays.
-fn survey(path: &Path, files: Vec<PathBuf>, format: PointFormat) -> Result<Parts> {
-    let source = CloudFrames::new(files.clone(), Some(format), Rays::Unknown)?;
+/// Clouds of a survey, which say nothing of the scanner: points without rays, or seen along the caller's poses.
+fn survey(path: &Path, files: Vec<PathBuf>, options: &ScanLogOptions) -> Result<Parts> {
+    let (rays, mut notes) = (way_of_scanner(options)?, Vec::new());
+    if matches!(rays, Rays::Unknown) {
+        notes.push(format!(
+            "{}: LAS does not say where points were seen from: they are taken as points without rays, so that free space \
+             stays unknown; give --poses FILE with the scanner's poses at the points' GPS times, or --origin x,y,z",
+            path.display()
+        ));
+    }
+    let uses_named_poses = !matches!(rays, Rays::Unknown);
+    let source = CloudFrames::new(files.clone(), Some(PointFormat::Las), rays)?;
     let poses = in_place(&files);
     let scan = |file: &PathBuf| ScanId { path: file.clone(), number: None, time: None };
-    let notes = vec![format!(
-        "{}: LAS does not say where points were seen from: they are taken as points without rays, so that free space stays \
-         unknown; {ADVICE}",
-        path.display()
-    )];
     let parts = parts(path, source, files.iter().map(scan).collect(), poses);
-    Ok(Parts { stats: super::ScanLogStats { notes, ..parts.stats }, ..parts })
+    Ok(Parts { stats: super::ScanLogStats { notes, ..parts.stats }, uses_named_poses, ..parts })
+}
+
+/// Where the scanner of a survey was.
+fn way_of_scanner(options: &ScanLogOptions) -> Result<Rays> {
+    let Some(file) = &options.poses else { return Ok(Rays::Unknown) };
+    let read = read_poses_3d(file)?;
+    let mut track = Vec::new();
+    for raw in &read.poses {
+        let pose = raw.resolve(options.pose_convention.unwrap_or(PoseConvention::WorldFromSensor));
+        track.push(TrackPose { pose: pose.ok().map(|(pose, _)| pose), time: raw.time, number: raw.number });
+    }
+    match TimedPoses::new(&track).filter(|poses| poses.span().is_some()) {
+        Some(poses) => Ok(Rays::Along(Arc::new(poses), options.time_tolerance)),
+        None => {
+            let advice = "give poses with times (t tx ty tz qx qy qz qw): points of a LAS have GPS times";
+            Err(IoError::layout(&read.path, "the times of the poses", "missing", advice))
+        }
+    }
 }
 
 /// Whether a file has one of the endings and is not called like poses.

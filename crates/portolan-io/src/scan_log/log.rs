@@ -54,7 +54,17 @@ impl ScanLog {
     }
 
     fn assemble(path: &Path, kind: ScanLogKind, parts: Parts, options: &ScanLogOptions) -> Result<Self> {
-        let Parts { name, source, scans, poses, convention, posed_from_sensor, camera, mut stats } = parts;
+        let Parts {
+            name,
+            source,
+            scans,
+            poses,
+            convention,
+            posed_from_sensor,
+            camera,
+            mut stats,
+            uses_named_poses,
+        } = parts;
         if scans.is_empty() {
             return Err(IoError::layout(path, "the number of scans", "0", "give a log with scans"));
         }
@@ -63,9 +73,12 @@ impl ScanLog {
             Some(_) => PoseConvention::WorldFromSensor,
             None => convention,
         };
-        let convention = options.pose_convention.unwrap_or(convention);
+        let convention = match uses_named_poses {
+            true => PoseConvention::WorldFromSensor,
+            false => options.pose_convention.unwrap_or(convention),
+        };
         let mut resolver = Resolver { convention, posed_from_sensor, stats: &mut stats };
-        let named = options.poses.as_ref().map(read_poses_3d).transpose()?;
+        let named = options.poses.as_ref().filter(|_| !uses_named_poses).map(read_poses_3d).transpose()?;
         let matches = match (named, poses) {
             (Some(file), _) | (None, LayoutPoses::File(file)) => {
                 let track: Vec<TrackPose> =

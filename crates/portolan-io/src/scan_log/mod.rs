@@ -48,6 +48,8 @@ mod seven_scenes;
 mod stanford;
 mod stats;
 #[cfg(test)]
+mod survey_tests;
+#[cfg(test)]
 mod testing;
 mod tum_rgbd;
 

@@ -71,6 +71,8 @@ pub(crate) struct Parts {
     pub(crate) camera: Option<Camera>,
     /// What the format counted by itself.
     pub(crate) stats: ScanLogStats,
+    /// The poses that the caller named are in the source already: they are those of a scanner that moved while it scanned.
+    pub(crate) uses_named_poses: bool,
 }
 
 impl Parts {
@@ -92,6 +94,7 @@ impl Parts {
             posed_from_sensor: None,
             camera: None,
             stats,
+            uses_named_poses: false,
         }
     }
 }

@@ -67,7 +67,10 @@ impl Owned {
         if let FileKind::Mesh(_) = detect(path)? {
             let mesh = read_mesh(path)?;
             if mesh.triangles.is_empty() {
-                bail!("{}: the mesh has no triangle to compare with; give one with faces, or points", path.display());
+                bail!(
+                    "{}: the mesh has no triangle to compare with; give one with faces, or points",
+                    path.display()
+                );
             }
             return Ok(Self::Mesh(about_a_vertex(&mesh)));
         }
