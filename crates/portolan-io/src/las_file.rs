@@ -3,10 +3,12 @@
 //! Intensity, GPS times and colors are read. Points that are marked as withheld are left out, as the format asks, and
 //! counted as without a reading. No file says where its points were seen from.
 
-use std::io::Cursor;
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
-use crate::bytes::{Input, u32_at, u64_at};
+use las::crs::GeoTiffData;
+
+use crate::bytes::{Input, open_file, u32_at, u64_at};
 use crate::points::{CloudBuilder, PointCloudFile, most_bytes};
 use crate::{IoError, Result};
 
@@ -16,6 +18,8 @@ pub(crate) const MAGIC: &[u8] = b"LASF";
 const TOGETHER: u64 = 1 << 14;
 /// The shortest header.
 const SHORTEST: usize = 227;
+/// The GeoTIFF key of the unit of projected coordinates.
+const LINEAR_UNITS: u16 = 3076;
 /// The bit that packing sets in the number of the point format.
 const PACKED: u8 = 0x80;
 
@@ -89,6 +93,34 @@ fn check(bytes: &[u8], path: &Path) -> Result<()> {
         return wrong(place + 4, "the number of chunks", chunks.to_string());
     }
     Ok(())
+}
+
+/// Whether a file says that its coordinates are feet: portolan takes every length for meters. `false` where it says nothing,
+/// and where it cannot be read.
+pub(crate) fn is_in_feet(path: &Path) -> bool {
+    let unit = |reader: las::Reader| {
+        let header = reader.header();
+        let wkt = header.get_wkt_crs_bytes().map(|b| String::from_utf8_lossy(b).to_ascii_lowercase());
+        // Of the projected coordinates: international and US survey feet.
+        let keys = header.get_geotiff_crs().ok().flatten();
+        let key = keys.is_some_and(|crs| {
+            let is_feet = |data: &GeoTiffData| matches!(data, GeoTiffData::U16(9002 | 9003));
+            crs.entries.iter().any(|e| e.id == LINEAR_UNITS && is_feet(&e.data))
+        });
+        key || wkt.is_some_and(|text| text.contains("foot") || text.contains("\"ft"))
+    };
+    let found = std::panic::catch_unwind(|| {
+        let mut head = [0; SHORTEST];
+        let mut file = open_file(path).ok()?;
+        file.read_exact(&mut head).ok()?;
+        file.rewind().ok()?;
+        // Packed by gzip or damaged: the reader of the points says what is wrong.
+        if !head.starts_with(MAGIC) {
+            return None;
+        }
+        las::Reader::new(BufReader::new(file)).ok().map(unit)
+    });
+    found.ok().flatten().unwrap_or(false)
 }
 
 fn read(bytes: Vec<u8>) -> Result<PointCloudFile, String> {

@@ -231,6 +231,13 @@ fn survey(path: &Path, files: Vec<PathBuf>, options: &ScanLogOptions) -> Result<
             path.display()
         ));
     }
+    if let Some(file) = files.iter().find(|file| crate::las_file::is_in_feet(file)) {
+        notes.push(format!(
+            "{} says that its coordinates are feet: every length here counts them as meters (--resolution 1 is one foot); \
+             convert the file to meters to mix it with others",
+            file.display()
+        ));
+    }
     let uses_named_poses = !matches!(rays, Rays::Unknown);
     let source = CloudFrames::new(files.clone(), Some(PointFormat::Las), rays)?;
     let poses = in_place(&files);

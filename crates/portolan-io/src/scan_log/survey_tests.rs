@@ -80,6 +80,50 @@ fn a_scan_of_a_scanner_is_an_image_at_its_pose() {
 }
 
 #[test]
+fn an_e57_is_the_same_scan_as_a_ptx() {
+    use e57::{
+        E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform, Translation,
+    };
+    let (folder, path) = temporary("hall.ptx");
+    fs::write(&path, ptx()).unwrap();
+    let e57 = folder.path().join("hall.e57");
+    let double = RecordDataType::Double { min: None, max: None };
+    let whole = |max| RecordDataType::Integer { min: 0, max };
+    let prototype = [
+        (RecordName::CartesianX, double.clone()),
+        (RecordName::CartesianY, double.clone()),
+        (RecordName::CartesianZ, double),
+        (RecordName::CartesianInvalidState, whole(2)),
+        (RecordName::RowIndex, whole(15)),
+        (RecordName::ColumnIndex, whole(39)),
+    ];
+    let prototype = prototype.into_iter().map(|(name, data_type)| Record { name, data_type }).collect();
+    let mut writer = E57Writer::from_file(&e57, "file").unwrap();
+    let mut scanned = writer.add_pointcloud("scan", prototype).unwrap();
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    scanned.set_transform(Some(Transform {
+        rotation: Quaternion { w: half, x: 0.0, y: 0.0, z: half },
+        translation: Translation { x: 500_000.0, y: 4_000_000.0, z: 2.0 },
+    }));
+    for ([column, row], p) in rays() {
+        let invalid = if (column, row) == (3, 5) { 2 } else { 0 };
+        let mut values: Vec<_> = p.map(RecordValue::Double).into();
+        values.extend([invalid, row as i64, column as i64].map(RecordValue::Integer));
+        scanned.add_point(values).unwrap();
+    }
+    scanned.finalize().unwrap();
+    writer.finalize().unwrap();
+    drop(writer);
+    let (a, b) = (open(&e57), open(&path));
+    assert_eq!(scan(&a, 0), scan(&b, 0));
+    let apart = |p: [f64; 3]| {
+        let (p, q) = (a.pose(0).transform_point(p), b.pose(0).transform_point(p));
+        (0..3).map(|k| (p[k] - q[k]).abs()).fold(0.0, f64::max)
+    };
+    assert!(apart([3.0, -2.0, 1.0]) < 1e-9);
+}
+
+#[test]
 fn a_folder_of_scans_and_poses_that_are_named() {
     let (folder, path) = temporary("a.ptx");
     fs::write(&path, ptx()).unwrap();
@@ -113,6 +157,11 @@ fn clouds_that_are_far_or_of_a_survey_have_no_rays() {
     let Some(las) = real_data("e57_las_ptx/simple.las") else { return };
     let log = open(&las);
     assert!(!log.knows_origins() && log.stats().notes[0].contains("LAS does not say"));
+    // By its GeoTIFF keys; those of the same points in UTM are meters.
+    for (name, feet) in [("autzen_trim.laz", true), ("autzen-utm.las", false)] {
+        let Some(path) = real_data(&format!("e57_las_ptx/{name}")) else { continue };
+        assert_eq!(open(&path).stats().notes.iter().any(|note| note.contains("are feet")), feet, "{name}");
+    }
     // Poses of the scanner at the points' times: 100 m above, on the way.
     let poses = folder.path().join("way.txt");
     let line = |t: f64| format!("{t} 637000 851000 700 0 0 0 1\n");
