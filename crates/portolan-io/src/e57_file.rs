@@ -133,7 +133,7 @@ fn check_header(reader: &mut Box<dyn ReadSeek>, path: &Path) -> Result<()> {
         let value = crate::error::shown(&head[..head.len().min(8)]);
         return Err(IoError::binary(path, 0, "the start of the file", value, "give an E57 file"));
     }
-    let field = |at: usize| (head.len() >= 48).then(|| u64_at(&head, at)).unwrap_or(u64::MAX);
+    let field = |at: usize| if head.len() >= 48 { u64_at(&head, at) } else { u64::MAX };
     for (at, name, most) in [
         (16, "the length of the file by its header", length),
         (24, "the place of the description", length),
@@ -328,6 +328,35 @@ mod tests {
                 assert!(!e.to_string().contains('\n'), "{e}");
             }
         }
+    }
+
+    /// Gives every whole page the checksum that it should have.
+    fn with_checksums(mut bytes: Vec<u8>) -> Vec<u8> {
+        for page in bytes.chunks_exact_mut(1024) {
+            let sum = crc32c::crc32c(&page[..1020]);
+            page[1020..].copy_from_slice(&sum.to_be_bytes());
+        }
+        bytes
+    }
+
+    #[test]
+    fn hostile_bytes_behind_right_checksums_make_no_panic() {
+        for spherical in [false, true] {
+            let good = bytes(spherical);
+            assert_eq!(with_checksums(good.clone()), good);
+            for bytes in bad_bytes(&good, 43, 3000) {
+                if let Err(e) = read_bytes(with_checksums(bytes)) {
+                    assert!(!e.to_string().contains('\n'), "{e}");
+                }
+            }
+        }
+        // Points that take no bytes: as many as the file says would be a trap.
+        let text = String::from_utf8_lossy(&bytes(false)).into_owned();
+        assert!(text.contains("recordCount=\"12\""));
+        let at = bytes(false).windows(16).position(|w| w == b"recordCount=\"12\"").unwrap();
+        let mut many = bytes(false);
+        many[at..at + 16].copy_from_slice(b"recordCount=\"9e\"");
+        assert!(read_bytes(with_checksums(many)).is_err());
     }
 
     #[test]

@@ -50,8 +50,7 @@ pub(crate) fn parse(input: Input, wanted: Wanted) -> Result<Vec<PosedCloud>> {
     let mut lines = Lines::of(input);
     let mut scans = Vec::new();
     let mut pixels = 0;
-    loop {
-        let Some(header) = header(&mut lines, scans.is_empty())? else { break };
+    while let Some(header) = header(&mut lines, scans.is_empty())? {
         pixels += header.columns * header.rows;
         let most = match wanted {
             Wanted::First(n) => n,

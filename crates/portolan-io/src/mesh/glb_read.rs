@@ -10,8 +10,8 @@ use crate::{IoError, Result};
 
 /// Nodes below nodes; more are a circle.
 const DEEPEST: usize = 64;
-/// Nodes that are visited; more are a trap.
-const MOST_NODES: usize = 1 << 20;
+/// Vertices and triangles for each byte of data: many nodes may show one mesh, but more of them are a trap.
+const MOST_A_BYTE: usize = 64;
 /// Kinds of chunks.
 const JSON: u32 = 0x4e4f_534a;
 const BIN: u32 = 0x004e_4942;
@@ -46,7 +46,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<PlyMesh> {
     let scene = document["scene"].as_u64().unwrap_or(0) as usize;
     let roots = &document["scenes"][scene]["nodes"];
     for root in roots.as_array().into_iter().flatten() {
-        reader.node(root, &UNMOVED, [0.0; 3], 0)?;
+        reader.node(root, &UNMOVED, 0)?;
     }
     // y up to z up: x, y, z of the file are x, -z, y.
     let mut mesh = reader.mesh;
@@ -97,13 +97,16 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// A node's mesh and what hangs below it. `origin` (z up, meters) is what portolan writes beside an f32's place.
-    fn node(&mut self, index: &Value, parent: &Affine, origin: [f64; 3], depth: usize) -> Result<()> {
+    /// A node's mesh and what hangs below it. The origin that portolan writes beside an `f32`'s place (z up, meters) is
+    /// taken for that.
+    fn node(&mut self, index: &Value, parent: &Affine, depth: usize) -> Result<()> {
         self.visited += 1;
-        if depth > DEEPEST || self.visited > MOST_NODES {
+        let document = self.document;
+        // Each has one parent.
+        let nodes = document["nodes"].as_array().map_or(0, Vec::len);
+        if depth > DEEPEST || self.visited > nodes {
             return Err(self.wrong("the nodes", "in a circle, or too many"));
         }
-        let document = self.document;
         let node = at(&document["nodes"], index).ok_or_else(|| self.wrong("a node", "missing"))?;
         let mut own = affine(node);
         let given = numbers::<3>(&node["extras"]["origin"]);
@@ -123,7 +126,7 @@ impl Reader<'_> {
             }
         }
         for child in node["children"].as_array().into_iter().flatten() {
-            self.node(child, &world, origin, depth + 1)?;
+            self.node(child, &world, depth + 1)?;
         }
         Ok(())
     }
@@ -137,8 +140,9 @@ impl Reader<'_> {
         let first = self.mesh.vertices.len();
         let positions = self.accessor(&primitive["attributes"]["POSITION"], "VEC3")?;
         let count = positions.len() / 3;
-        if first + count > u32::MAX as usize {
-            return Err(self.wrong("the number of vertices", "more than 2^32"));
+        let most = (MOST_A_BYTE * self.data.len()).min(u32::MAX as usize);
+        if first + count > most || self.mesh.triangles.len() > most {
+            return Err(self.wrong("the number of vertices", format!("more than {most}")));
         }
         for p in positions.chunks_exact(3) {
             self.mesh
