@@ -199,6 +199,27 @@ pub(crate) fn pose3(text: &str) -> Result<Pose<3>, String> {
     pose.ok_or_else(|| "must be x,y,z or x,y,z,qx,qy,qz,qw with a quaternion that is not zero".to_owned())
 }
 
+/// Where the coordinates of a map's cells have their zero.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Shift {
+    /// At zero, or near the first scan where that is far.
+    Auto,
+    /// There (meters).
+    At([f64; 3]),
+}
+
+/// `auto`, `0` or `x,y,z` in meters.
+pub(crate) fn shift(text: &str) -> Result<Shift, String> {
+    match text {
+        "auto" => Ok(Shift::Auto),
+        "0" => Ok(Shift::At([0.0; 3])),
+        _ => point3(text)
+            .map(Shift::At)
+            .map_err(|_| "must be auto, 0 or three numbers x,y,z in meters".to_owned()),
+    }
+}
+
 /// `x0,y0,z0,x1,y1,z1` in meters.
 pub(crate) fn box3(text: &str) -> Result<Aabb<3>, String> {
     match bounds(text) {

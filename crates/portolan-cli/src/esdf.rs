@@ -1,13 +1,17 @@
 //! Distance fields of saved maps.
 
 use anyhow::{Context, ensure};
+use portolan::Answer;
 use portolan::cell::{DistancePlanes, LogOdds8};
-use portolan::field::{Esdf, EsdfGrid, EsdfMethod, EsdfSettings, ObstacleCells};
+use portolan::field::{
+    Clearance, ClearanceField, Esdf, EsdfGrid, EsdfMethod, EsdfSettings, ObstacleCells, UnknownSpace,
+};
 use portolan::geom::{Grid, Lattice, vector};
 use portolan::map::{Tsdf2, TsdfConfig};
 use portolan::store::{Bricks, Dense, Store};
-use portolan_io::{MapCell, MapFile, TsdfBricks};
+use portolan_io::{MapCell, MapFile, OccupancyBricks, TsdfBricks};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 use crate::error::bad_call;
 use crate::mapping::Settings;
@@ -106,6 +110,46 @@ pub(crate) fn esdf_3d(file: &MapFile<3>, tsdf: &TsdfBricks<3>, how: &FieldHow) -
     }
     follow_attenuation(&mut cells, file, tsdf.store.lattice(), how.thin)?;
     Ok(Esdf::with_obstacles(tsdf, &cells, &how.settings()))
+}
+
+/// The field of a 3-D map of points without rays: distances to the centers of the cells that hold them, in at most `memory`
+/// bytes of cells. Nothing is known to be free: [`PointsAlone`] says so.
+///
+/// # Errors
+/// Where it needs more memory.
+pub(crate) fn esdf_of_points(
+    map: &OccupancyBricks<3>,
+    how: &FieldHow,
+    memory: usize,
+) -> anyhow::Result<Esdf<3>> {
+    let cells = ObstacleCells::of_occupancy(&map.store);
+    Esdf::of_obstacles(*map.store.lattice(), &cells, &how.settings(), memory)
+        .context("it needs more memory than there is: give a smaller --max-distance")
+}
+
+/// Whether a map is one of points without rays.
+pub(crate) fn is_of_points(saved: &Map<String, Value>) -> bool {
+    Settings::of_saved(saved).shape.points_only
+}
+
+/// Distances to points in a world of which nothing is known to be free.
+pub(crate) struct PointsAlone<'a, const D: usize>(pub(crate) &'a Esdf<D>);
+
+impl<const D: usize> ClearanceField<D> for PointsAlone<'_, D> {
+    fn clearance(&self, p_world: [f64; D], unknown: UnknownSpace) -> Answer<Clearance> {
+        match unknown {
+            UnknownSpace::Optimistic => self.0.clearance(p_world, unknown),
+            UnknownSpace::Pessimistic => Answer::Unknown,
+        }
+    }
+
+    fn distance_and_gradient(&self, p_world: [f64; D]) -> Answer<(f64, [f64; D])> {
+        self.0.distance_and_gradient(p_world)
+    }
+
+    fn resolution(&self) -> f64 {
+        self.0.lattice().resolution
+    }
 }
 
 const LATTICES: &str = "the maps of the file have not the same cells";

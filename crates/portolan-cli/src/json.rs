@@ -44,6 +44,7 @@ pub(crate) fn ways(ways: &ScanWays) -> Value {
             "rows_and_columns_would_lose_points": rays(WhyRays::SharedPixels),
             "rows_and_columns_would_have_gaps": rays(WhyRays::Gaps),
         },
+        "points_without_rays": ways.count(Way::Points),
     })
 }
 
@@ -151,6 +152,7 @@ pub(crate) fn space_log_stats(stats: &ScanLogStats) -> Value {
         "colors_left_out": stats.colors_left_out,
         "notes": stats.notes,
         "pixels_beyond_lens": stats.pixels_beyond_lens,
+        "warnings": stats.warnings,
     })
 }
 

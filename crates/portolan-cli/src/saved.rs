@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use portolan::store::Store;
 use portolan_io::{Container, IoError, MapFile, MapHeader, map_dimension};
 
 use crate::dimension::Dimension;
+use crate::esdf::is_of_points;
 
 /// A saved map.
 pub(crate) enum SavedMap {
@@ -101,4 +102,15 @@ impl SavedMap {
         };
         named.into_iter().filter_map(|(name, bytes)| Some((name, bytes?))).collect()
     }
+}
+
+/// That a map has no signed distances, and what to do.
+pub(crate) fn no_tsdf(map: &Path, header: &MapHeader) -> anyhow::Error {
+    if is_of_points(&header.settings) {
+        return anyhow!(
+            "{}: the map is of points without rays, which have no surface; map scans that say where they were seen from",
+            map.display()
+        );
+    }
+    anyhow!("{}: the map has no tsdf; make it with --maps tsdf", map.display())
 }

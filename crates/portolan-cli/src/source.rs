@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    BagChoice, EsdfFile, FileKind, LaserLog, MapFile, MapServerMap, OctomapTree, Pgm, Polyline,
-    bag_dimension, detect, read_geojson,
+    BagChoice, EsdfFile, FileKind, LaserLog, MapFile, MapServerMap, MeshFormat, OctomapTree, Pgm, PlyMesh,
+    Polyline, bag_dimension, detect, read_geojson, read_mesh,
 };
 
 use crate::dimension::{Dimension, Given};
@@ -34,6 +34,14 @@ pub(crate) enum Source {
     Log2(Box<LaserLog>),
     /// A log of 3-D scans
     Log3(Box<ScanLog>),
+    /// A mesh of triangles
+    Mesh(Box<MeshSource>),
+}
+
+/// A mesh and the format of its file.
+pub(crate) struct MeshSource {
+    pub(crate) mesh: PlyMesh,
+    format: MeshFormat,
 }
 
 /// Opens a file or a folder.
@@ -56,6 +64,7 @@ pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
         FileKind::Bag | FileKind::ScanLog(_) => {
             Source::Log3(Box::new(ScanLog::open(path, &ScanLogOptions::default())?))
         }
+        FileKind::Mesh(format) => Source::Mesh(Box::new(MeshSource { mesh: read_mesh(path)?, format })),
         FileKind::Unknown(what) => bail!("{}: not recognized: {what}", path.display()),
         kind => bail!("{}: is {}, which cannot be read yet", path.display(), describe(&kind)),
     })
@@ -85,7 +94,7 @@ impl Source {
             Self::Image(_) => return Ok(()),
             Self::Map2(_) | Self::Server(_) | Self::Contour(_) | Self::Log2(_) => Dimension::Two,
             Self::Esdf(EsdfFile::Two(_)) => Dimension::Two,
-            Self::Map3(_) | Self::Octomap(_) | Self::Log3(_) => Dimension::Three,
+            Self::Map3(_) | Self::Octomap(_) | Self::Log3(_) | Self::Mesh(_) => Dimension::Three,
             Self::Esdf(EsdfFile::Three(_)) => Dimension::Three,
         };
         dimension.check::<A, _>(given, "the file")
@@ -121,6 +130,12 @@ impl Source {
             Self::Log2(log) if log.format() == "bag" => "a bag of ROS",
             Self::Log2(_) => "a CARMEN log",
             Self::Log3(log) => log.kind().label(),
+            Self::Mesh(mesh) => match mesh.format {
+                MeshFormat::Ply => "a mesh (PLY)",
+                MeshFormat::Glb => "a mesh (GLB, binary glTF)",
+                MeshFormat::Obj => "a mesh (OBJ)",
+                _ => "a mesh",
+            },
         }
     }
 }

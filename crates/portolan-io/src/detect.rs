@@ -153,7 +153,7 @@ fn unknown(head: &[u8]) -> FileKind {
         [0x89, b'P', b'N', b'G', ..] => "it is a PNG picture (convert it to PGM)".to_owned(),
         _ => format!("it starts with {}", crate::error::shown(&head[..head.len().min(16)])),
     };
-    let known = "known are CARMEN logs, logs of 3-D scans (depth images or lidar scans with poses), clouds (PCD, PLY, KITTI .bin, \
+    let known = "known are CARMEN logs, logs of 3-D scans (depth images or lidar scans with poses), clouds (PCD, PLY, E57, PTX, LAS, LAZ, KITTI .bin, \
                  xyz), map.portolan, esdf.bin, PGM, map_server yaml, GeoJSON, OctoMap (.bt, .ot, .graph), meshes (PLY, GLB, OBJ)";
     FileKind::Unknown(format!("{seen}; {known}"))
 }

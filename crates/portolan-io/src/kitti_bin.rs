@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use crate::bytes::{Endian, Input, Scalar, open};
+use crate::bytes::{Compression, Endian, Input, Scalar, open};
 use crate::points::{CloudBuilder, PointCloudFile, most_bytes};
 use crate::{IoError, Result, write_atomic};
 
@@ -40,7 +40,10 @@ pub(crate) fn parse(mut input: Input) -> Result<PointCloudFile> {
 
 /// Whether a file, which has no magic, may be a scan: by its length, and by its first numbers, which are meters.
 pub(crate) fn may_be_scan(path: &Path) -> bool {
-    let whole = std::fs::metadata(path).is_ok_and(|m| m.len() > 0 && m.len() % STRIDE as u64 == 0);
+    let packed = open(path).is_ok_and(|input| input.compression() != Compression::Plain);
+    // What is packed has another length: its reader finds out.
+    let whole =
+        std::fs::metadata(path).is_ok_and(|m| m.len() > 0 && (packed || m.len() % STRIDE as u64 == 0));
     let head = || open(path).and_then(|mut input| input.read_up_to(4096)).unwrap_or_default();
     whole && {
         let head = head();

@@ -9,6 +9,8 @@
 //! | PLY clouds (text, binary) | [`read_ply_cloud`] | [`write_ply_cloud`] |
 //! | KITTI velodyne `.bin` | [`read_kitti_bin`] | [`write_kitti_bin`] |
 //! | XYZ, CSV, PTS | [`read_xyz`] | |
+//! | LAS, LAZ, COPC | [`read_points`] | |
+//! | E57, PTX (scans with poses) | [`read_posed_clouds`], [`read_points`] | |
 //! | OctoMap scan graph | [`read_scan_graph`] | |
 //! | 3-D poses (matrices, KITTI, TUM, Redwood) | [`poses3::read_poses_3d`] | |
 //! | logs of 3-D scans with poses | [`scan_log::ScanLog`] | as KITTI, TUM RGB-D, 7-Scenes: [`LogWriter`] |
@@ -23,8 +25,8 @@
 //! | GeoJSON contours | [`read_geojson`] | [`write_geojson`] |
 //! | SVG contours | | [`write_svg`] |
 //! | PLY meshes (written binary) | [`read_ply_mesh`], [`mesh_counts`] | [`write_ply_mesh`] |
-//! | GLB meshes (glTF 2.0) | | [`write_glb`] |
-//! | OBJ meshes | | [`write_obj`] |
+//! | GLB meshes (glTF 2.0) | [`read_mesh`] | [`write_glb`] |
+//! | OBJ meshes | [`read_mesh`] | [`write_obj`] |
 //! | query points, answers (CSV) | [`QueryPoints`] | [`write_answer`] |
 //!
 //! [`detect`] finds out what a file is. Readers and writers handle plain data (slices, grids, stores); only
@@ -40,10 +42,12 @@ mod carmen;
 mod container;
 mod costmap;
 mod detect;
+mod e57_file;
 mod error;
 mod esdf_bin;
 mod geojson;
 mod kitti_bin;
+mod las_file;
 mod laser_log;
 mod log_writer;
 mod map_file;
@@ -59,6 +63,7 @@ mod points;
 mod points_csv;
 mod poses;
 pub mod poses3;
+mod ptx;
 mod ros_log;
 mod scan_graph;
 pub mod scan_log;
@@ -75,6 +80,7 @@ pub use carmen::{CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage}
 pub use container::{Chunk, Container, ContainerWriter};
 pub use costmap::write_costmap;
 pub use detect::{FileKind, detect};
+pub use e57_file::{E57About, e57_about};
 pub use error::{IoError, Result};
 pub use esdf_bin::{EsdfFile, esdf_to_bytes, write_esdf};
 pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
@@ -88,8 +94,8 @@ pub use map_file::{
 pub use map_messages::{MapMessages, write_map_mcap};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};
 pub use mesh::{
-    MeshCounts, MeshFormat, glb_to_bytes, mesh_counts, parse_mesh_counts, ply_mesh_to_bytes, write_glb,
-    write_obj, write_ply_mesh,
+    MeshCounts, MeshFormat, glb_to_bytes, mesh_area, mesh_counts, parse_mesh_counts, ply_mesh_to_bytes,
+    read_mesh, write_glb, write_obj, write_ply_mesh,
 };
 pub use numpy::{NpyArray, NpyValues, parse_npy, parse_npz, read_npy, read_npz, write_npy, write_npz};
 pub use octomap::{
@@ -99,7 +105,8 @@ pub use pcd::{read_pcd, write_pcd};
 pub use pgm::Pgm;
 pub use ply::{PlyMesh, parse_ply_mesh, read_ply_cloud, read_ply_mesh, write_ply_cloud};
 pub use points::{
-    CloudGrid, PointCloudFile, PointFormat, RefusedPoints, Viewpoint, parse_points, point_format, read_points,
+    CloudGrid, PointCloudFile, PointFormat, PosedCloud, RefusedPoints, Viewpoint, parse_points, point_format,
+    read_points, read_posed_clouds,
 };
 pub use points_csv::QueryPoints;
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};

@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn far_points_get_an_offset() {
         let cloud = read("500000.125 4000000.001 3\n500001 4000000 3").unwrap();
-        assert_eq!(cloud.offset, [500_000.0, 4_000_000.0, 3.0]);
+        assert_eq!(cloud.offset, [500_001.0, 4_000_000.0, 3.0]);
         assert!((cloud.position(0)[1] - 4_000_000.001).abs() < 1e-6);
     }
 

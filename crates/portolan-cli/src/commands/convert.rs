@@ -1,5 +1,6 @@
 //! `convert`: one format into another.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
@@ -7,7 +8,7 @@ use portolan::cell::{LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
 use portolan::field::EsdfGrid;
 use portolan::geom::Pose;
 use portolan::map::OccupancyGrid;
-use portolan::store::{Dense, Tree};
+use portolan::store::Dense;
 use portolan::surface::{Contour, ContourSettings, MeshSettings, marching_cubes, marching_squares};
 use portolan_io::{
     EsdfFile, MapCell, MapFile, MapHeader, MapServerMap, OctomapTree, Polyline, write_esdf, write_map_server,
@@ -22,7 +23,7 @@ use crate::arguments::{Bounds, bounds, length, thin};
 use crate::dimension::{Given, ONLY_3D};
 use crate::error::bad_call;
 use crate::esdf::{EsdfArg, esdf_of_cells, status_plane, tsdf_of_samples};
-use crate::mapping::{cells_for_map_server, polylines, write_contour, write_mesh};
+use crate::mapping::{Octree, cells_for_map_server, polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
 
@@ -156,6 +157,7 @@ fn not_possible(args: &Args, source: &Source) -> anyhow::Error {
             ".ply, .glb, .obj, .bt, .ot, .bin (esdf), .npz, .npy, .mcap, .yaml with --z, or .portolan, as far as its maps go"
         }
         Source::Log2(_) | Source::Log3(_) => "a map, by `portolan map`",
+        Source::Mesh(_) => "nothing: a mesh is no map",
     };
     let (input, out) = (args.input.display(), args.out.display());
     anyhow::anyhow!("{input}: {} cannot become {out}; it can become {possible}", source.describe())
@@ -202,13 +204,16 @@ fn convert_map3(file: &MapFile<3>, target: Target, args: &Args) -> anyhow::Resul
     match (target, &file.occupancy_bricks, &file.tsdf_bricks) {
         (Target::Portolan, ..) => file.write(&args.out)?,
         (Target::OctomapBt | Target::OctomapOt, Some(map), _) => {
-            let Some(tree) = Tree::from_bricks(&map.store) else {
+            let Some(octree) = Octree::of(&map.store) else {
                 bail!("{}: the map is too large for one tree", args.input.display());
             };
+            if let Some(note) = octree.note().filter(|_| !args.output.quiet) {
+                writeln!(io::stderr(), "portolan: warning: {}: {note}", args.out.display())?;
+            }
             if target == Target::OctomapBt {
-                write_octomap_bt(&args.out, &tree)?;
+                write_octomap_bt(&args.out, &octree.tree)?;
             } else {
-                write_octomap_ot(&args.out, &tree, LogOddsRule::<i8>::new(&map.model)?.quantum)?;
+                write_octomap_ot(&args.out, &octree.tree, LogOddsRule::<i8>::new(&map.model)?.quantum)?;
             }
         }
         (Target::Mesh, _, Some(map)) => {

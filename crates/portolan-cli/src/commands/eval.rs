@@ -30,7 +30,7 @@ pub(crate) struct Args {
     /// Log with scans that were not fused: the map predicts their ranges
     #[arg(long, value_name = "LOG", required_unless_present = "reference")]
     scans: Option<PathBuf>,
-    /// File to compare the surface with: a contour (GeoJSON) in 2-D; a mesh (PLY) or point cloud (PLY, PCD, XYZ, ..) in
+    /// File to compare the surface with: a contour (GeoJSON) in 2-D; a mesh (PLY, OBJ, GLB) or points (PLY, PCD, E57, ..) in
     /// 3-D
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
@@ -85,8 +85,4 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         text += &part.text;
     }
     args.output.print(&document, text)
-}
-
-fn no_tsdf(args: &Args) -> anyhow::Error {
-    anyhow::anyhow!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display())
 }

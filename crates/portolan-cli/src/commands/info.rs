@@ -6,7 +6,9 @@ use portolan::Status;
 use portolan::field::EsdfGrid;
 use portolan::geom::Aabb;
 use portolan::store::Store;
-use portolan_io::{EsdfFile, FileKind, MapCell, MapServerMap, OctomapTree, Polyline, detect};
+use portolan_io::{
+    EsdfFile, FileKind, MapCell, MapServerMap, OctomapTree, PlyMesh, Polyline, detect, mesh_area,
+};
 use serde_json::{Value, json};
 
 use crate::arguments::shown_bytes;
@@ -101,6 +103,7 @@ fn about(source: &Source) -> Value {
         Source::Octomap(file) => of_octomap(file),
         Source::Log2(log) => logs::of_2d(log),
         Source::Log3(log) => logs::of_3d(log),
+        Source::Mesh(source) => of_mesh(&source.mesh),
     }
 }
 
@@ -125,6 +128,21 @@ fn of_server(map: &MapServerMap) -> Value {
         "free": count(MapCell::Free),
         "occupied": count(MapCell::Occupied),
         "unknown": count(MapCell::Unknown),
+    })
+}
+
+fn of_mesh(mesh: &PlyMesh) -> Value {
+    let mut extent = Aabb::EMPTY;
+    let finite = |v: &&[f64; 3]| v.iter().all(|c| c.is_finite());
+    mesh.vertices.iter().filter(finite).for_each(|&v| extent.include(v));
+    json!({
+        "vertices": mesh.vertices.len(),
+        "triangles": mesh.triangles.len(),
+        "area": mesh_area(mesh) + 0.0, // the sum of nothing is -0.0
+        "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
+        "normals": !mesh.normals.is_empty(),
+        "colors": !mesh.colors.is_empty(),
+        "refused_faces": mesh.refused_faces,
     })
 }
 

@@ -181,6 +181,17 @@ impl Args {
         }
         let log = log::read_3d(&self.log, &self.source, settings.shape.color, settings.shape.deskew)?;
         self.source.check_sensor(&log)?;
+        if !log.knows_origins() && !settings.shape.points_only {
+            if self.append {
+                bail!(
+                    "{}: its points do not say where they were seen from, and the map in {} is made of rays; give --origin or \
+                     --poses, or write to another folder",
+                    self.log.display(),
+                    self.out.display()
+                );
+            }
+            *settings = settings.clone().without_rays(self.settings.has("maps"))?;
+        }
         Ok(Log::Three(Box::new(log)))
     }
 

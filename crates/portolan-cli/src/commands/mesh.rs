@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{anyhow, bail};
+use anyhow::bail;
 use portolan::surface::{Ambiguity, ContourSettings, MeshSettings, marching_cubes, marching_squares};
 use portolan_io::MapFile;
 use serde_json::json;
@@ -12,6 +12,7 @@ use crate::dimension::{Given, ONLY_2D};
 use crate::error::bad_call;
 use crate::mapping::{polylines, write_contour, write_mesh};
 use crate::output::Output;
+use crate::saved::no_tsdf;
 use crate::source::{Source, open};
 
 #[derive(clap::Args)]
@@ -52,16 +53,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-fn no_tsdf(args: &Args) -> anyhow::Error {
-    anyhow!("{}: the map has no tsdf; make it with --maps tsdf", args.map.display())
-}
-
 fn wrong_extension(args: &Args, names: &str) -> anyhow::Error {
     bad_call(format!("{}: give OUT the extension {names}", args.out.display()))
 }
 
 fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
-    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(&args.map, &file.header))?;
     let ambiguity = if args.fixed_table { Ambiguity::FixedTable } else { Ambiguity::Decide };
     let min_weight = args.min_weight.unwrap_or(tsdf.min_weight());
     let contour = marching_squares(tsdf, &ContourSettings { min_weight: Some(min_weight), ambiguity });
@@ -86,7 +83,7 @@ fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
 }
 
 fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
-    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(&args.map, &file.header))?;
     let usual = MeshSettings::of(tsdf);
     let settings = MeshSettings { min_weight: args.min_weight.or(usual.min_weight), ..usual };
     let mesh = marching_cubes(&tsdf.store, file.color_bricks.as_ref().map(|c| &c.store), &settings);

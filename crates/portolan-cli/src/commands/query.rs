@@ -19,7 +19,8 @@ use super::convert::UnknownArg;
 use crate::arguments::{length, thin};
 use crate::error::bad_call;
 use crate::esdf::{
-    EsdfArg, FieldHow, SURFACE_ALONE, check_thin, esdf_2d, esdf_3d, esdf_of_cells, keeps_thin,
+    EsdfArg, FieldHow, PointsAlone, SURFACE_ALONE, check_thin, esdf_2d, esdf_3d, esdf_of_cells,
+    esdf_of_points, is_of_points, keeps_thin,
 };
 use crate::mapping::Settings;
 use crate::output::Output;
@@ -173,6 +174,8 @@ struct Certified<const D: usize> {
     unknown: UnknownSpace,
     /// Bounds are given up to this distance (meters).
     limit: f64,
+    /// Whether it is of points without rays.
+    of_points: bool,
 }
 
 /// What a field in bricks answers. Only the accurate method certifies.
@@ -181,7 +184,12 @@ fn sparse<const D: usize>(field: Esdf<D>, limit: f64, args: &Args) -> (Distance<
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
     let reach = certified_reach(&field);
     // Bricks are shared.
-    let certified = certifies.then(|| Certified { field: field.clone(), unknown, limit: limit.min(reach) });
+    let certified = certifies.then(|| Certified {
+        field: field.clone(),
+        unknown,
+        limit: limit.min(reach),
+        of_points: false,
+    });
     (Box::new(move |p| field.distance_and_gradient(p)), certified)
 }
 
@@ -260,8 +268,17 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
         }
         anyhow::Ok(sparse(esdf_3d(&file, map, &how)?, max_distance, args))
     });
+    let of_points = file.occupancy_bricks.as_ref().filter(|_| is_of_points(&file.header.settings));
+    let field = match (field, of_points) {
+        (None, Some(map)) => {
+            how.max_distance += HELD_BACK * map.store.lattice().resolution;
+            let (distance, certified) = sparse(esdf_of_points(map, &how, usize::MAX)?, max_distance, args);
+            Some((distance, certified.map(|c| Certified { of_points: true, ..c })))
+        }
+        (field, _) => field.transpose()?,
+    };
     let (distance, clearance) =
-        field.transpose()?.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
+        field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
     let occupancy: Occupancy<3> = match (file.occupancy_bricks, file.tsdf_bricks) {
         (Some(map), _) => {
             let map = map::Occupancy::<3>::from_store(map.store, map.model)?;
@@ -323,7 +340,11 @@ impl<const D: usize> Field<D> {
         let distance = distance(p).map(|(d, gradient)| (d, self.world_from_field.rotate(gradient)));
         let mut row = AnswerRow::of(point, occupancy.known(), distance);
         if let Some(certified) = &self.clearance {
-            row.certify(&certified.field, p, certified.unknown, certified.limit);
+            let (unknown, limit) = (certified.unknown, certified.limit);
+            match certified.of_points {
+                true => row.certify(&PointsAlone(&certified.field), p, unknown, limit),
+                false => row.certify(&certified.field, p, unknown, limit),
+            }
         }
         row
     }

@@ -45,7 +45,8 @@ fn pose_convention(word: &str) -> Result<PoseConvention, String> {
 pub(crate) struct LogArgs {
     /// File with poses of the sensor, used instead of the log's own. 2-D: one per scan, as x y theta, t x y theta, or
     /// TUM. 3-D: KITTI rows, TUM lines, 4x4 matrices or a Redwood trajectory; with a KITTI log these are poses of the
-    /// lidar (the Tr of calib.txt is not applied)
+    /// lidar (the Tr of calib.txt is not applied); with a LAS these are poses of the scanner at GPS times, where the rays
+    /// of its points begin
     #[arg(long, value_name = "FILE")]
     pub(crate) poses: Option<PathBuf>,
     /// Format of LOG, where it is not recognized: carmen (2-D); bag (2-D or 3-D); seven-scenes, tum, redwood, bigbird, kitti, stanford,

@@ -212,6 +212,7 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
             stats.pixels_beyond_lens
         ));
     }
+    warnings.extend(stats.warnings.iter().cloned());
     if let Some(why) = &stats.colors_left_out {
         warnings.push(format!("colors were left out: {why}"));
     }
@@ -278,7 +279,7 @@ pub(crate) fn describe(kind: &FileKind) -> String {
         FileKind::CarmenLog => "a CARMEN log".into(),
         FileKind::Bag => "a bag of ROS".into(),
         FileKind::ScanLog(kind) => kind.label().into(),
-        FileKind::Mesh(format) => format.label().into(),
+        FileKind::Mesh(format) => format!("a mesh ({})", format.label()),
         FileKind::Portolan => "a portolan map".into(),
         FileKind::PortolanFolder => "a folder with a portolan map".into(),
         FileKind::EsdfBin => "a distance field (esdf.bin)".into(),

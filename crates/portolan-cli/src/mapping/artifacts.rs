@@ -75,10 +75,13 @@ impl Artifacts<'_> {
 
     fn write_octree(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
         let SavedMap::Three(file) = self.file else { return Ok(()) };
-        let (Some(tree), Some(map)) = (&self.derived.octree, &file.occupancy_bricks) else { return Ok(()) };
+        let (Some(octree), Some(map)) = (&self.derived.octree, &file.occupancy_bricks) else { return Ok(()) };
         let rule = LogOddsRule::<i8>::new(&map.model)?;
-        let bt = write_octomap_bt(folder.join("octree.bt"), tree);
-        let ot = write_octomap_ot(folder.join("octree.ot"), tree, rule.quantum);
+        let bt = write_octomap_bt(folder.join("octree.bt"), &octree.tree);
+        let ot = write_octomap_ot(folder.join("octree.ot"), &octree.tree, rule.quantum);
+        if bt.is_ok() || ot.is_ok() {
+            written.notes.extend(octree.note());
+        }
         for (name, result) in [("octree.bt", bt), ("octree.ot", ot)] {
             match result {
                 Ok(()) => written.files.push(name),

@@ -34,6 +34,11 @@ impl MapKind {
         word(&self)
     }
 
+    /// Whether points without rays make it.
+    pub(crate) fn is_of_points(self) -> bool {
+        matches!(self, Self::Tree | Self::Esdf)
+    }
+
     /// The only dimension that it is made in; `None`: both.
     pub(crate) fn only(self) -> Option<Dimension> {
         match self {

@@ -4,28 +4,31 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::bail;
-use portolan::cell::LogOdds8;
 use portolan::field::{Esdf, EsdfGrid, PointKind};
 use portolan::map::Tsdf2;
-use portolan::store::{Store, Tree};
+use portolan::store::Store;
 use portolan::surface::{Contour, ContourSettings, DoubledLength, Mesh, MeshSettings, ThinWalls};
 use portolan::surface::{doubled_length, marching_cubes, marching_squares, thin_walls};
 use portolan_io::{MapFile, TsdfBricks};
 
-use super::{MapKind, Settings};
+use super::{MapKind, Octree, Settings};
 use crate::arguments::shown_bytes;
-use crate::esdf::{FieldHow, esdf_2d, esdf_3d};
+use crate::esdf::{FieldHow, esdf_2d, esdf_3d, esdf_of_points};
 use crate::saved::SavedMap;
 
 /// Contours nearer to each other than this and facing the same way are one wall seen twice (meters).
 const DOUBLED_REACH: f64 = 0.15;
+
+/// What is to be said of a map of points without rays.
+const NO_RAYS: &str = "no mesh, tsdf or attenuation were made: points without rays do not say which side of them is free, and all \
+     space between them is unknown";
 
 /// Surfaces, distance field and octree, as far as they are wanted and there is a map to derive them from.
 #[derive(Default)]
 pub(crate) struct Derived {
     pub(crate) contour: Option<ContourChecked>,
     pub(crate) mesh: Option<Mesh>,
-    pub(crate) octree: Option<Tree<LogOdds8, 3>>,
+    pub(crate) octree: Option<Octree>,
     pub(crate) esdf: Option<DistanceField>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
     /// What was not made, and why.
@@ -73,10 +76,14 @@ impl Derived {
     fn of_3d(file: &MapFile<3>, settings: &Settings, memory: usize) -> Self {
         let mut derived = Self::default();
         if let Some(map) = &file.occupancy_bricks {
-            derived.octree = derived.timed("octree", |_| Tree::from_bricks(&map.store));
+            derived.octree = derived.timed("octree", |_| Octree::of(&map.store));
             if derived.octree.is_none() {
                 derived.notes.push("the octree was not made: the map spans more than 2^28 cells".to_owned());
             }
+        }
+        if settings.shape.points_only {
+            derived.of_points(file, settings, memory);
+            return derived;
         }
         let Some(tsdf) = &file.tsdf_bricks else { return derived };
         if settings.wants(MapKind::Mesh) {
@@ -91,6 +98,18 @@ impl Derived {
             derived.hold_field(made);
         }
         derived
+    }
+
+    /// What points without rays give: distances to the cells that hold them.
+    fn of_points(&mut self, file: &MapFile<3>, settings: &Settings, memory: usize) {
+        self.notes.push(NO_RAYS.to_owned());
+        let Some(map) = file.occupancy_bricks.as_ref().filter(|_| settings.wants(MapKind::Esdf)) else {
+            return;
+        };
+        let left = memory.saturating_sub(map.store.memory_bytes());
+        // The cells, and as much again while the field is made.
+        let made = self.timed("esdf", |_| esdf_of_points(map, &FieldHow::of(settings), left / 2));
+        self.hold_field(made.map(DistanceField::Three));
     }
 
     /// The field, or a note why there is none.
@@ -112,7 +131,7 @@ impl Derived {
     pub(crate) fn bytes(&self) -> BTreeMap<&'static str, usize> {
         let contour = self.contour.iter().map(|c| ("contour", c.contour.memory_bytes()));
         let mesh = self.mesh.iter().map(|m| ("mesh", m.memory_bytes()));
-        let octree = self.octree.iter().map(|t| ("octree", t.memory_bytes()));
+        let octree = self.octree.iter().map(|t| ("octree", t.tree.memory_bytes()));
         let esdf = self.esdf.iter().map(|e| ("esdf", e.memory_bytes()));
         contour.chain(mesh).chain(octree).chain(esdf).collect()
     }

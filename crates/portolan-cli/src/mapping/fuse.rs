@@ -115,6 +115,8 @@ pub(crate) struct Frames<'a> {
     pub(crate) log: &'a ScanLog,
     pub(crate) indices: &'a [usize],
     pub(crate) filter: FrameFilter,
+    /// Whether points are inserted without their rays.
+    pub(crate) points_only: bool,
 }
 
 /// A frame: its number, its pose, and what is left of its readings and what the filter counted, where they could be read.
@@ -122,7 +124,10 @@ type Read = (usize, Pose<3>, Result<(Frame, BeamCounts), IoError>);
 
 impl Frames<'_> {
     fn read(&self, &i: &usize) -> Read {
-        (i, *self.log.pose(i), self.log.filtered_frame(i, &self.filter))
+        let filtered = |(frame, counts): (Frame, BeamCounts)| {
+            (if self.points_only { frame.without_rays() } else { frame }, counts)
+        };
+        (i, *self.log.pose(i), self.log.filtered_frame(i, &self.filter).map(filtered))
     }
 }
 

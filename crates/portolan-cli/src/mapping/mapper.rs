@@ -15,6 +15,7 @@ use super::extent::{Extent, check_memory, grid_over, seen, with_outlier};
 use super::fuse::{Frames, FusionReport, fuse_2d, fuse_3d};
 use super::map_server::grid_of;
 use super::{MapKind, Settings, recipe};
+use crate::arguments::Shift;
 use crate::log::{self, Log};
 use crate::progress::Progress;
 use crate::saved::SavedMap;
@@ -91,7 +92,7 @@ impl<'a> Run<'a> {
         limits: &Limits,
     ) -> anyhow::Result<Self> {
         let filter = settings.shape.range.filter(settings.shape.self_filter.clone())?;
-        let frames = Frames { log, indices, filter };
+        let frames = Frames { log, indices, filter, points_only: settings.shape.points_only };
         let mut file = before.unwrap_or_default();
         let mapper = Box::new(mapper_3d(&mut file, settings, log.pose(0), limits)?);
         Ok(Self::Three { frames, mapper, file })
@@ -255,7 +256,11 @@ fn mapper_3d(
     limits: &Limits,
 ) -> anyhow::Result<Mapper<3>> {
     let bounds = settings.bounds.map(|bounds| bounds.in_3d("the log")).transpose()?;
-    let how = recipe::mapper_settings(settings, None, bounds, limits.memory);
+    let origin = match settings.shift {
+        Some(Shift::At(origin)) => Some(origin),
+        Some(Shift::Auto) | None => None,
+    };
+    let how = recipe::mapper_settings(settings, origin, bounds, limits.memory);
     let held = [
         (MapKind::Tree, file.occupancy_bricks.is_some()),
         (MapKind::Tsdf, file.tsdf_bricks.is_some()),

@@ -7,7 +7,7 @@
 //! | scans and empty or saved maps | `mapper.rs`, `extent.rs` |
 //! | one scan after the other | `fuse.rs` |
 //! | surface, distance field, octree | `derived.rs` |
-//! | files | `artifacts.rs`, `files.rs`, `map_server.rs`, `picture.rs`, `preview.rs` |
+//! | files | `artifacts.rs`, `files.rs`, `octomap.rs`, `map_server.rs`, `picture.rs`, `preview.rs` |
 //! | the report | `summary.rs` |
 
 mod artifacts;
@@ -19,6 +19,7 @@ mod fuse;
 mod map_server;
 mod mapper;
 mod memory;
+mod octomap;
 mod picture;
 mod preview;
 mod recipe;
@@ -34,5 +35,6 @@ pub(crate) use fuse::{FusionReport, fuse_2d};
 pub(crate) use map_server::cells_for_map_server;
 pub(crate) use mapper::{Limits, OccupancyKinds, Run, mapper_2d, store_2d};
 pub(crate) use memory::available_memory;
+pub(crate) use octomap::Octree;
 pub(crate) use settings::Settings;
 pub(crate) use summary::{Summary, report};

@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 use super::choices::{MapKind, SweepArg, WeightsArg, word};
-use crate::arguments::{Bounds, ForgettingArgs, bodies, body, bounds, length, share, thin};
+use crate::arguments::{Bounds, ForgettingArgs, Shift, bodies, body, bounds, length, share, shift, thin};
 use crate::dimension::{Dimension, ONLY_3D, option};
+use crate::error::bad_call;
 use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::log::{LimitArgs, NoReturnArgs, RangeArgs, Selection};
@@ -62,6 +63,11 @@ pub(crate) struct Shape {
     #[arg(long, value_name = "BOX|SPHERE", value_parser = body, allow_hyphen_values = true, help_heading = ONLY_3D)]
     #[serde(with = "bodies")]
     pub(crate) self_filter: Vec<Body>,
+    /// Insert points without rays: cells that hold points are occupied, everything else stays unknown. For fused maps and
+    /// surveys, which do not say where points were seen from. Makes tree and esdf (distances to the nearest point's cell)
+    #[arg(long, help_heading = ONLY_3D)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) points_only: bool,
     /// Leave every N-th scan out of the map, for `eval --scans`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..), allow_negative_numbers = true)]
     pub(crate) hold_out: Option<u64>,
@@ -88,6 +94,12 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     #[serde(skip_deserializing)]
     pub(crate) bounds: Option<Bounds>,
+    /// Where the map's own coordinates have their zero (x,y,z in meters, in the log's coordinates), for surveys at large
+    /// coordinates: what is asked and written stays in the log's coordinates, but in OctoMap's files, which cannot hold
+    /// them. auto: 0, or near the first scan where that is a million cells away [default: auto]
+    #[arg(long, value_name = "auto|POINT|0", value_parser = shift, allow_hyphen_values = true, help_heading = ONLY_3D)]
+    #[serde(skip_serializing_if = "Option::is_none", skip_deserializing)]
+    pub(crate) shift: Option<Shift>,
     /// Maps to make, separated by commas; esdf, contour and mesh are derived from the tsdf, which is then made too
     /// [default: all: grid,tree,tsdf,attenuation,esdf,contour in 2-D; tree,tsdf,attenuation,esdf,mesh in 3-D]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
@@ -119,6 +131,7 @@ impl Default for Shape {
             color: true,
             deskew: true,
             self_filter: Vec::new(),
+            points_only: false,
             hold_out: None,
         }
     }
@@ -135,6 +148,7 @@ impl Default for Settings {
             no_return: NoReturnArgs::default(),
             every: None,
             bounds: None,
+            shift: None,
             maps: Vec::new(),
             esdf: EsdfArg::default(),
             thin: THIN,
@@ -156,7 +170,7 @@ impl Settings {
 
     /// With what depends on the dimension and on other settings filled in, where it was left open.
     pub(crate) fn resolved(mut self, dimension: Dimension) -> Self {
-        use MapKind::{Contour, Esdf, Mesh, Tsdf};
+        use MapKind::{Contour, Esdf, Mesh, Tree, Tsdf};
         self.dimension = dimension;
         let shape = &mut self.shape;
         shape.truncation.get_or_insert(three_cells(shape.resolution));
@@ -164,14 +178,31 @@ impl Settings {
         shape.forgetting = ForgettingArgs::of(shape.forgetting.w_max().unwrap_or(W_MAX));
         if self.maps.is_empty() {
             let made = |kind: &&MapKind| kind.only().is_none_or(|only| only == dimension);
-            self.maps = MapKind::value_variants().iter().filter(made).copied().collect();
+            let all = MapKind::value_variants().iter().filter(made).copied();
+            self.maps = all.filter(|kind| !self.shape.points_only || kind.is_of_points()).collect();
         }
-        if self.maps.iter().any(|kind| [Esdf, Contour, Mesh].contains(kind)) {
+        if self.shape.points_only {
+            // Its distances are those to the cells that hold points.
+            self.maps.push(Tree);
+        } else if self.maps.iter().any(|kind| [Esdf, Contour, Mesh].contains(kind)) {
             self.maps.push(Tsdf);
         }
         self.maps.sort_unstable();
         self.maps.dedup();
         self
+    }
+
+    /// The same for points without rays. Maps that were asked for by name stay, for [`Settings::check`] to refuse what is
+    /// made of rays alone.
+    pub(crate) fn without_rays(mut self, are_maps_given: bool) -> anyhow::Result<Self> {
+        self.shape.points_only = true;
+        if !are_maps_given {
+            self.maps.clear();
+        }
+        let dimension = self.dimension;
+        let settings = self.resolved(dimension);
+        settings.check(dimension)?;
+        Ok(settings)
     }
 
     /// Whether a map is wanted.
@@ -186,6 +217,21 @@ impl Settings {
         }
         if let Some(kind) = self.maps.iter().find(|kind| kind.only().is_some_and(|only| only != dimension)) {
             return Err(dimension.refused(&format!("--maps {}", kind.word()), "the log"));
+        }
+        if self.shape.points_only {
+            if let Some(kind) = self.maps.iter().find(|kind| !kind.is_of_points()) {
+                return Err(bad_call(format!(
+                    "--maps {} is made of rays, and points without rays have none (--points-only, or a file that does not \
+                     say where its points were seen from): they make tree and esdf",
+                    kind.word()
+                )));
+            }
+            if self.esdf != EsdfArg::Accurate {
+                return Err(bad_call(format!(
+                    "--esdf {} is made of signed distances, which points without rays have not; leave it out",
+                    word(&self.esdf)
+                )));
+            }
         }
         match (dimension, self.bounds) {
             (Dimension::Two, Some(bounds)) => bounds.in_2d("the log").map(|_| ())?,

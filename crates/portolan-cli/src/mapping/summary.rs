@@ -142,12 +142,9 @@ impl Summary<'_> {
             Dimension::Two => document["contour"] = self.contour_json(),
             Dimension::Three => {
                 document["mesh"] = self.mesh_json();
-                document["octree"] = json!(
-                    self.derived
-                        .octree
-                        .as_ref()
-                        .map(|t| { json!({ "nodes": t.nodes(), "inner": t.inner_nodes() }) })
-                );
+                document["octree"] = json!(self.derived.octree.as_ref().map(|t| {
+                    json!({ "nodes": t.tree.nodes(), "inner": t.tree.inner_nodes(), "shift": t.shift })
+                }));
                 document["motion"] = self.log.motion_json();
                 document["sweeps"] = json::ways(&self.fusion.stats.ways);
                 document["points_without_pixel"] = json!(self.fusion.without_pixel);
@@ -216,6 +213,7 @@ fn way_words(way: Way) -> &'static str {
         Way::Rays(WhyRays::NoRows) => "ray by ray: no rows and columns were found in their points",
         Way::Rays(WhyRays::SharedPixels) => "ray by ray: rows and columns would lose points",
         Way::Rays(WhyRays::Gaps) => "ray by ray: rows and columns would have gaps",
+        Way::Points => "as points without rays: nothing is freed",
     }
 }
 
@@ -269,10 +267,15 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     }
     if let Some(esdf) = summary.derived.esdf.as_ref().filter(|_| summary.has_points()) {
         let points = esdf.points().len();
-        let _ = writeln!(text, "distances to the surface and to {points} cells that stop beams without one");
+        let _ = match summary.settings.shape.points_only {
+            true => writeln!(text, "distances to {points} cells that hold points"),
+            false => {
+                writeln!(text, "distances to the surface and to {points} cells that stop beams without one")
+            }
+        };
     }
     if let Some(mesh) = &summary.derived.mesh {
-        let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area());
+        let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area() + 0.0);
     }
     let per_scan: Vec<_> = ["tree", "grid", "tsdf"]
         .iter()

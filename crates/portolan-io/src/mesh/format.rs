@@ -14,9 +14,9 @@ const HEAD: u64 = 64 << 10;
 pub enum MeshFormat {
     /// PLY with faces.
     Ply,
-    /// Binary glTF 2.0; not read.
+    /// Binary glTF 2.0.
     Glb,
-    /// Wavefront OBJ; not read.
+    /// Wavefront OBJ.
     Obj,
 }
 

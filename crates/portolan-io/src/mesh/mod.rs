@@ -1,9 +1,12 @@
-//! Triangle meshes: writers, and the recognition of their files.
+//! Triangle meshes: writers, readers, and the recognition of their files.
 
 mod format;
 mod glb;
+mod glb_read;
 mod obj;
+mod obj_read;
 mod ply;
+mod read;
 
 pub(crate) use format::mesh_format;
 pub use format::{MeshCounts, MeshFormat, mesh_counts, parse_mesh_counts};
@@ -11,6 +14,7 @@ pub use glb::{glb_to_bytes, write_glb};
 pub use obj::write_obj;
 pub(crate) use ply::NEAR;
 pub use ply::{ply_mesh_to_bytes, write_ply_mesh};
+pub use read::{mesh_area, read_mesh};
 
 use std::path::Path;
 

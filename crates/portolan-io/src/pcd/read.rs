@@ -166,7 +166,7 @@ fn cloud(body: &[u8], header: &Header, path: &Path) -> Result<PointCloudFile> {
         ring: named(&["ring", "channel"]),
         time: header.fields.iter().find(|f| is_time(&f.name)).and_then(column),
     };
-    let mut builder = CloudBuilder::new(position[0].scalar == Scalar::F64);
+    let mut builder = CloudBuilder::new(true);
     builder.cloud.viewpoint = header.viewpoint;
     if header.height > 1 {
         builder.organize(header.width, header.height);

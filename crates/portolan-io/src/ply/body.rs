@@ -27,11 +27,6 @@ impl<'a> Body<'a> {
         Self { path, bytes, at, line, format: header.format, values: Vec::new(), list: Vec::new() }
     }
 
-    /// Whether numbers are written as text.
-    pub(super) fn is_text(&self) -> bool {
-        self.format == Format::Ascii
-    }
-
     /// Reads one row of an element into `values`, and the items of the list property `wanted` into `list`.
     pub(super) fn row(&mut self, element: &Element, wanted: Option<usize>) -> Result<()> {
         self.values.clear();

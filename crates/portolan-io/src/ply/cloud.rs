@@ -82,9 +82,7 @@ fn read_vertices(
         let (field, value) = ("the properties of vertices", "without x, y, z");
         return Err(IoError::text(path, 1, field, value, "give a file with points"));
     };
-    // Text may hold more digits than the type that the header speaks of.
-    let fine = fields.position[0].1 == Scalar::F64 || body.is_text();
-    let mut builder = CloudBuilder::new(fine);
+    let mut builder = CloudBuilder::new(true);
     for i in 0..element.count {
         body.row(element, None)?;
         let values = &body.values;

@@ -114,7 +114,7 @@ fn corners(body: &Body, vertices: usize) -> Result<Vec<u32>> {
 }
 
 impl PlyMesh {
-    fn add_polygon(&mut self, corners: &[u32]) {
+    pub(crate) fn add_polygon(&mut self, corners: &[u32]) {
         let finite = |c: &u32| self.vertices[*c as usize].iter().all(|v| v.is_finite());
         match corners {
             [first, rest @ ..] if rest.len() >= 2 && corners.iter().all(finite) => {

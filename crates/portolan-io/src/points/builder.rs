@@ -6,7 +6,9 @@ use crate::bytes::Scalar;
 /// Coordinates beyond this are refused (meters).
 const FARTHEST: f64 = 1e8;
 /// From here on points are kept about an offset (meters): an `f32` resolves 0.06 mm there.
-const FAR: f64 = 1024.0;
+pub(crate) const FAR: f64 = 1024.0;
+/// So many points are looked at before the offset is chosen: one that lies far from the others shall not choose it.
+const LOOKED_AT: usize = 1024;
 /// Times that span more than this many seconds are nanoseconds: no scan lasts eleven days or less than a millisecond.
 const LONGEST_SCAN: f64 = 1e6;
 
@@ -17,8 +19,11 @@ pub(crate) struct CloudBuilder {
     pub(crate) cloud: PointCloudFile,
     /// Times as the file has them (seconds).
     pub(crate) times: Vec<f64>,
-    /// The file holds more than `f32`.
-    fine: bool,
+    /// The first points as they came, until the offset is chosen.
+    first: Vec<[f64; 3]>,
+    is_placed: bool,
+    /// Times are seconds, however far apart they are.
+    pub(crate) in_seconds: bool,
     organized: bool,
 }
 
@@ -54,9 +59,9 @@ impl CloudBuilder {
         kept
     }
 
-    /// `fine`: coordinates come as doubles or text, so that far ones need an offset.
+    /// `fine`: coordinates may be far, so that they need an offset. Not where a format has only points about its sensor.
     pub(crate) fn new(fine: bool) -> Self {
-        Self { fine, ..Self::default() }
+        Self { is_placed: !fine, ..Self::default() }
     }
 
     /// Makes the points pixels of so many columns and rows.
@@ -72,16 +77,40 @@ impl CloudBuilder {
             self.refuse(p);
             return false;
         }
-        if self.fine && self.cloud.points.is_empty() && p.iter().any(|v| v.abs() > FAR) {
-            self.cloud.offset = p.map(f64::round);
+        if !self.is_placed {
+            self.first.push(p);
         }
         self.cloud.points.push(std::array::from_fn(|k| (p[k] - self.cloud.offset[k]) as f32));
+        if self.first.len() == LOOKED_AT {
+            self.place();
+        }
         if self.organized
             && let Some(grid) = &mut self.cloud.grid
         {
             grid.pixels.push(i as u32);
         }
         true
+    }
+
+    /// Chooses the offset: the median of the first points, where that is far.
+    #[cold]
+    fn place(&mut self) {
+        self.is_placed = true;
+        let first = std::mem::take(&mut self.first);
+        if first.is_empty() {
+            return;
+        }
+        let middle: [f64; 3] = std::array::from_fn(|k| {
+            let mut along: Vec<f64> = first.iter().map(|p| p[k]).collect();
+            let half = along.len() / 2;
+            *along.select_nth_unstable_by(half, f64::total_cmp).1
+        });
+        if middle.iter().any(|v| v.abs() > FAR) {
+            self.cloud.offset = middle.map(f64::round);
+            for (point, p) in self.cloud.points.iter_mut().zip(&first) {
+                *point = std::array::from_fn(|k| (p[k] - self.cloud.offset[k]) as f32);
+            }
+        }
     }
 
     #[cold]
@@ -96,11 +125,12 @@ impl CloudBuilder {
 
     /// The cloud. Times become seconds since the earliest.
     pub(crate) fn finish(mut self) -> PointCloudFile {
+        self.place();
         let finite = || self.times.iter().copied().filter(|t| t.is_finite());
         let (first, last) =
             (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
         if first <= last {
-            let unit = if last - first > LONGEST_SCAN { 1e-9 } else { 1.0 };
+            let unit = if last - first > LONGEST_SCAN && !self.in_seconds { 1e-9 } else { 1.0 };
             self.cloud.start_time = first * unit;
             // A NaN time is taken as the start.
             let since = |t: f64| if t.is_finite() { ((t - first) * unit) as f32 } else { 0.0 };
@@ -137,6 +167,14 @@ mod tests {
     #[test]
     fn far_points_keep_their_millimetres() {
         let far = [[500_000.123, 4_000_000.456, 12.0], [500_001.5, 3_999_999.25, f64::NAN]];
+        // A point at zero before hundreds of others does not choose the offset, nor does one that is farther.
+        let mut builder = CloudBuilder::new(true);
+        for p in [[0.0; 3], [9e7, 0.0, 0.0], far[0], far[0], far[0]] {
+            assert!(builder.push(0, p));
+        }
+        let cloud = builder.finish();
+        assert_eq!((cloud.offset, cloud.points.len()), ([500_000.0, 4_000_000.0, 12.0], 5));
+        assert!((cloud.position(4)[1] - far[0][1]).abs() < 1e-6);
         let mut builder = CloudBuilder::new(true);
         assert_eq!(far.map(|p| builder.push(0, p)), [true, false]);
         assert!(!builder.push(0, [1e9, 0.0, 0.0]));

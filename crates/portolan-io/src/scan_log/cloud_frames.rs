@@ -1,21 +1,27 @@
 //! The scans of a lidar: a cloud of points each.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use portolan::geom::Pose;
 use portolan::scan::{Frame, OrganisedPoints, Origin, PointScan, orthographic_image};
 
 use super::parts::FrameSource;
 use crate::points::{CloudGrid, PointCloudFile, PointFormat, read_points_as};
+use crate::poses3::TimedPoses;
 use crate::{IoError, Result};
 
 /// Where the rays of a log's clouds begin.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone)]
 pub(super) enum Rays {
     /// In one point a scan, in the frame of the files (meters).
     From(Vec<[f64; 3]>),
     /// Above each point: a scanner that looks along -z from far away.
     Parallel,
+    /// Nobody knows where: there are no rays.
+    Unknown,
+    /// Where a scanner was at the time of each point, within so many seconds.
+    Along(Arc<TimedPoses>, f64),
 }
 
 /// Reads clouds.
@@ -44,6 +50,16 @@ impl CloudFrames {
         Ok(Self { files, format, rays, base })
     }
 
+    /// The same frames without rays.
+    pub(super) fn without_rays(self) -> Self {
+        Self { rays: Rays::Unknown, ..self }
+    }
+
+    /// Whole meters that are taken off every point.
+    pub(super) fn base(&self) -> [f64; 3] {
+        self.base
+    }
+
     /// What leads from the frames' points to the files': the offset. `None` where they are the same.
     pub(super) fn files_from_frames(&self) -> Option<Pose<3>> {
         file_from_frames(self.base)
@@ -61,14 +77,20 @@ impl FrameSource for CloudFrames {
         Ok(Frame::Points(match &self.rays {
             Rays::From(origins) => scan_from(cloud, origins[i]),
             Rays::Parallel => range_scan(cloud, &self.files[i])?,
+            Rays::Unknown => without_rays(cloud),
+            Rays::Along(poses, tolerance) => scan_along(cloud, poses, *tolerance, &self.files[i])?,
         }))
     }
 
     fn origin(&self, i: usize) -> [f64; 3] {
         match &self.rays {
             Rays::From(origins) => std::array::from_fn(|k| origins[i][k] - self.base[k]),
-            Rays::Parallel => [0.0; 3],
+            Rays::Parallel | Rays::Unknown | Rays::Along(..) => [0.0; 3],
         }
+    }
+
+    fn knows_origins(&self) -> bool {
+        !matches!(self.rays, Rays::Unknown)
     }
 }
 
@@ -109,6 +131,43 @@ pub(crate) fn scan_from(cloud: PointCloudFile, origin: [f64; 3]) -> PointScan {
         OrganisedPoints { points: &points, pixels, colors: &cloud.colors, columns, rows }.image()
     });
     PointScan { image, ..cloud.into_scan(origin) }
+}
+
+/// Points that nobody knows the origin of.
+pub(super) fn without_rays(cloud: PointCloudFile) -> PointScan {
+    // Nothing lies on this origin: it is replaced.
+    PointScan { origin: Origin::Unknown, ..cloud.into_scan([f64::INFINITY; 3]) }
+}
+
+/// Points of a scanner on its way: rays begin where it was at the time of each. Points without a pose near in time have no
+/// origin, so that maps refuse and count them.
+///
+/// # Errors
+/// [`IoError::Layout`] for points without times, and where no pose is near any.
+fn scan_along(cloud: PointCloudFile, poses: &TimedPoses, tolerance: f64, path: &Path) -> Result<PointScan> {
+    if cloud.times.len() != cloud.points.len() {
+        let advice = "leave --poses out to take the points without rays";
+        return Err(IoError::layout(path, "the times of the points", "missing", advice));
+    }
+    let (start, base) = (cloud.start_time, cloud.offset);
+    let origin = |time: &f32| match poses.at(start + f64::from(*time), tolerance) {
+        Some(pose) => std::array::from_fn(|k| (pose.translation[k] - base[k]) as f32),
+        None => [f32::NAN; 3],
+    };
+    let origins: Vec<[f32; 3]> = cloud.times.iter().map(origin).collect();
+    if origins.iter().all(|o| o[0].is_nan()) {
+        let last = cloud.times.iter().copied().fold(0.0, f32::max);
+        let (first, end) = poses.span().unwrap_or_default();
+        let value = format!("0 of {}", cloud.points.len());
+        let advice = format!(
+            "points have times from {start} to {} s, poses from {first} to {end} s: give poses of the same clock, or a larger \
+             --time-tolerance",
+            start + f64::from(last)
+        );
+        return Err(IoError::layout(path, "the number of points with a pose near in time", value, advice));
+    }
+    // Nothing lies on this origin: it is replaced.
+    Ok(PointScan { origin: Origin::PerPoint(origins), ..cloud.into_scan([f64::INFINITY; 3]) })
 }
 
 /// A range scan of parallel rays: the points as they are, each with its own origin, and the image of them.

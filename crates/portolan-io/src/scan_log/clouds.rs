@@ -8,24 +8,33 @@
 //! fits at least twice as well, opening fails with that advice.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use portolan::geom::Pose;
+use portolan::geom::vector::norm;
 
 use super::ScanLogOptions;
 use super::agreement::{Placed, disagreement};
 use super::cloud_frames::{CloudFrames, Rays};
 use super::files::{has_extension, has_name, names_in, number_in};
+use super::hidden::{FUSED_FROM, hidden_share};
+use super::matching::contradiction;
 use super::parts::{LayoutPoses, Parts, ScanId};
+use super::scanner;
 use crate::pcd::read_viewpoint;
-use crate::points::{PointFormat, Viewpoint, read_points_as};
-use crate::poses3::{RawPose, read_poses_3d};
+use crate::points::{PointCloudFile, PointFormat, Viewpoint, has_poses, point_format, read_points_as};
+use crate::poses3::{PoseConvention, RawPose, TimedPoses, TrackPose, read_poses_3d};
 use crate::{IoError, Result};
 
 /// The endings of clouds, in the order in which they are tried where a folder has as many of one as of another.
-const ENDINGS: [(&str, PointFormat); 9] = [
+const ENDINGS: [(&str, PointFormat); 13] = [
     ("pcd", PointFormat::Pcd),
     ("ply", PointFormat::Ply),
     ("bin", PointFormat::KittiBin),
+    ("e57", PointFormat::E57),
+    ("ptx", PointFormat::Ptx),
+    ("las", PointFormat::Las),
+    ("laz", PointFormat::Las),
     ("xyz", PointFormat::Xyz),
     ("xyzi", PointFormat::Xyz),
     ("xyzrgb", PointFormat::Xyz),
@@ -56,14 +65,23 @@ fn is_cloud(path: &Path) -> bool {
     let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
     match ending_of(name) {
         Some((_, PointFormat::Ply)) => !crate::ply::has_faces(path),
+        Some((_, PointFormat::Ptx)) => !head_of(path).contains(&0),
         Some((_, PointFormat::KittiBin)) => crate::kitti_bin::may_be_scan(path),
         Some(_) => true,
         // Endings that many things have.
         None => {
-            ["txt", "csv", "dat"].iter().any(|e| name.contains(&format!(".{e}")))
-                && crate::xyz::may_be_points(path)
+            let head = head_of(path);
+            let is_known =
+                head.starts_with(crate::e57_file::MAGIC) || head.starts_with(crate::las_file::MAGIC);
+            is_known
+                || ["txt", "csv", "dat"].iter().any(|e| name.contains(&format!(".{e}")))
+                    && crate::xyz::may_be_points(path)
         }
     }
+}
+
+fn head_of(path: &Path) -> Vec<u8> {
+    crate::bytes::open(path).and_then(|mut input| input.read_up_to(4096)).unwrap_or_default()
 }
 
 /// The ending of a file of points, `.gz` and `.bz2` behind it aside.
@@ -98,6 +116,12 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     };
     let (names, format) = clouds_in(&folder, endings)?;
     let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    if has_poses(format) {
+        return scanner::open(path, &files, format, options);
+    }
+    if format == PointFormat::Las && options.origin.is_none() {
+        return survey(path, files, options);
+    }
     let pose_file = match &options.poses {
         Some(_) => None,
         None => pose_file(path, &folder)?,
@@ -123,17 +147,123 @@ fn parts(path: &Path, source: CloudFrames, scans: Vec<ScanId>, poses: LayoutPose
 
 /// A single cloud: at the pose of `--poses`, else where it is, seen from `--origin`, the viewpoint or zero.
 fn open_file(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
-    let format = path.file_name().and_then(|n| ending_of(n.to_str()?)).map(|(_, format)| format);
+    let by_name = path.file_name().and_then(|n| ending_of(n.to_str()?)).map(|(_, format)| format);
+    let format = by_name.or_else(|| point_format(path, &head_of(path)));
     let files = vec![path.to_owned()];
+    match format {
+        Some(format) if has_poses(format) => return scanner::open(path, &files, format, options),
+        Some(PointFormat::Las) if options.origin.is_none() => return survey(path, files, options),
+        _ => {}
+    }
     let (poses, rays) = match format {
         Some(PointFormat::Pcd) if options.poses.is_none() => viewpoints(&files, PointFormat::Pcd, options)?,
         _ => (in_place(&files), from_zero(&files, options)),
     };
+    // Neither the file nor the caller says where it was seen from.
+    let has_viewpoint = format == Some(PointFormat::Pcd) && !matches!(poses, LayoutPoses::Missing(_));
+    let is_assumed = !has_viewpoint && options.origin.is_none() && options.poses.is_none();
     let poses = if matches!(poses, LayoutPoses::Missing(_)) { in_place(&files) } else { poses };
     let rays = options.origin.map_or(rays, |origin| Rays::From(vec![origin]));
-    let source = CloudFrames::new(files, format, rays)?;
+    let mut source = CloudFrames::new(files, format, rays)?;
+    let mut notes = Vec::new();
+    if is_assumed {
+        match assumed(path, || read_points_as(path, format), source.base())? {
+            Assumed::Zero(note) => notes.extend(note),
+            Assumed::Nowhere(note) => {
+                notes.push(note);
+                source = source.without_rays();
+            }
+        }
+    }
     let scan = ScanId { path: path.into(), number: None, time: None };
-    Ok(parts(path, source, vec![scan], poses))
+    let parts = parts(path, source, vec![scan], poses);
+    Ok(Parts { stats: super::ScanLogStats { warnings: notes, ..parts.stats }, ..parts })
+}
+
+/// What is made of a cloud that does not say where it was seen from.
+pub(super) enum Assumed {
+    /// It was seen from zero. With what speaks against it.
+    Zero(Option<String>),
+    /// Nobody knows: there are no rays. Why.
+    Nowhere(String),
+}
+
+/// What to do about clouds without rays.
+const ADVICE: &str = "give --origin x,y,z for one scan from there, or scans with --poses";
+
+/// Whether a cloud may have been seen from zero: not where it lies kilometers away, as surveys do. `base`: its offset.
+///
+/// # Errors
+/// Those of reading it.
+pub(super) fn assumed(
+    path: &Path,
+    cloud: impl FnOnce() -> Result<PointCloudFile>,
+    base: [f64; 3],
+) -> Result<Assumed> {
+    let shown = path.display();
+    if base != [0.0; 3] {
+        let far = norm(base) / 1000.0;
+        return Ok(Assumed::Nowhere(format!(
+            "{shown} does not say where its points were seen from, and they lie {far:.0} km from 0,0,0: they are taken \
+             as points without rays, so that free space stays unknown; {ADVICE}"
+        )));
+    }
+    let cloud = cloud()?;
+    let share = hidden_share(cloud.points.len(), |i| cloud.position(i), [0.0; 3]);
+    // Rows and columns are those of one scan.
+    Ok(Assumed::Zero(share.filter(|share| *share > FUSED_FROM && cloud.grid.is_none()).map(|share| {
+        format!(
+            "{shown} looks like a fused map and not like one scan: seen from 0,0,0, which is assumed, {:.0} % of its \
+             points lie behind others, and rays from there free what nobody looked through; give --points-only to \
+             insert its points without rays, or {}",
+            100.0 * share,
+            &ADVICE["give ".len()..]
+        )
+    })))
+}
+
+/// Clouds of a survey, which say nothing of the scanner: points without rays, or seen along the caller's poses.
+fn survey(path: &Path, files: Vec<PathBuf>, options: &ScanLogOptions) -> Result<Parts> {
+    let (rays, mut notes) = (way_of_scanner(options)?, Vec::new());
+    if matches!(rays, Rays::Unknown) {
+        notes.push(format!(
+            "{}: LAS does not say where points were seen from: they are taken as points without rays, so that free space \
+             stays unknown; give --poses FILE with the scanner's poses at the points' GPS times, or --origin x,y,z",
+            path.display()
+        ));
+    }
+    if let Some(file) = files.iter().find(|file| crate::las_file::is_in_feet(file)) {
+        notes.push(format!(
+            "{} says that its coordinates are feet: every length here counts them as meters (--resolution 1 is one foot); \
+             convert the file to meters to mix it with others",
+            file.display()
+        ));
+    }
+    let uses_named_poses = !matches!(rays, Rays::Unknown);
+    let source = CloudFrames::new(files.clone(), Some(PointFormat::Las), rays)?;
+    let poses = in_place(&files);
+    let scan = |file: &PathBuf| ScanId { path: file.clone(), number: None, time: None };
+    let parts = parts(path, source, files.iter().map(scan).collect(), poses);
+    Ok(Parts { stats: super::ScanLogStats { warnings: notes, ..parts.stats }, uses_named_poses, ..parts })
+}
+
+/// Where the scanner of a survey was.
+fn way_of_scanner(options: &ScanLogOptions) -> Result<Rays> {
+    let Some(file) = &options.poses else { return Ok(Rays::Unknown) };
+    let read = read_poses_3d(file)?;
+    let mut track = Vec::new();
+    for raw in &read.poses {
+        let pose = raw.resolve(options.pose_convention.unwrap_or(PoseConvention::WorldFromSensor));
+        track.push(TrackPose { pose: pose.ok().map(|(pose, _)| pose), time: raw.time, number: raw.number });
+    }
+    let timed = TimedPoses::new(&track).map_err(|error| contradiction(&read.path, &error))?;
+    match timed.filter(|poses| poses.span().is_some()) {
+        Some(poses) => Ok(Rays::Along(Arc::new(poses), options.time_tolerance)),
+        None => {
+            let advice = "give poses with times (t tx ty tz qx qy qz qw): points of a LAS have GPS times";
+            Err(IoError::layout(&read.path, "the times of the poses", "missing", advice))
+        }
+    }
 }
 
 /// Whether a file has one of the endings and is not called like poses.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use portolan::geom::{Pose, Trajectory};
-use portolan::scan::{Frame, PointScan};
+use portolan::scan::{Frame, Origin, PointScan};
 
 /// How far beyond its poses a trajectory is followed at constant twist (seconds): the last scan of a log lasts longer than the
 /// poses do.
@@ -137,7 +137,10 @@ impl Deskew {
         ends: impl FnOnce() -> Option<[(f64, Frame); 2]>,
     ) -> Frame {
         let Frame::Points(scan) = frame else { return frame };
-        let Some((start, duration)) = span(&scan) else { return Frame::Points(scan) };
+        // Where each point has its own origin, or none, motion was taken out before or cannot be.
+        let Some((start, duration)) = span(&scan).filter(|_| matches!(scan.origin, Origin::Common(_))) else {
+            return Frame::Points(scan);
+        };
         let (fate, scan) = match (&self.trajectory, stamp) {
             _ if duration > LONGEST_SCAN => {
                 (Fate::NotCovered(format!("its points are from {duration:.1} s, which is no scan")), scan)
@@ -208,7 +211,6 @@ fn farthest(before: &PointScan, after: &PointScan) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use portolan::scan::Origin;
 
     fn at(time: f64) -> Pose<3> {
         Pose { translation: [2.0 * time, 0.0, 0.0], ..Pose::IDENTITY }

@@ -163,7 +163,7 @@ fn clouds_far_away_keep_their_millimetres() {
     assert_eq!((log.kind(), log.len()), (ScanLogKind::Clouds, 1));
     assert!(distance(world(&log, 0)[0], [500_000.001, 4_000_000.002, 12.003]) < 1e-6);
     assert!(distance(log.sensor_position(0), [500_001.0, 4_000_000.5, 14.0]) < 1e-9);
-    assert_eq!(points(&log, 0).origin, Origin::Common([1.0, 0.5, 2.0]));
+    assert_eq!(points(&log, 0).origin, Origin::Common([-3.0, -0.5, 2.0]));
     // Moved by a pose.
     let poses = folder.path().join("pose.txt");
     fs::write(&poses, "-500000 -4000000 0 0 0 0 1\n").unwrap();

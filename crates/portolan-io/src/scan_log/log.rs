@@ -58,8 +58,18 @@ impl ScanLog {
     }
 
     fn assemble(path: &Path, kind: ScanLogKind, parts: Parts, options: &ScanLogOptions) -> Result<Self> {
-        let Parts { name, source, scans, poses, convention, posed_from_sensor, camera, mut stats, bag } =
-            parts;
+        let Parts {
+            name,
+            source,
+            scans,
+            poses,
+            convention,
+            posed_from_sensor,
+            camera,
+            mut stats,
+            bag,
+            uses_named_poses,
+        } = parts;
         if scans.is_empty() {
             return Err(IoError::layout(path, "the number of scans", "0", "give a log with scans"));
         }
@@ -68,9 +78,12 @@ impl ScanLog {
             Some(_) => PoseConvention::WorldFromSensor,
             None => convention,
         };
-        let convention = options.pose_convention.unwrap_or(convention);
+        let convention = match uses_named_poses {
+            true => PoseConvention::WorldFromSensor,
+            false => options.pose_convention.unwrap_or(convention),
+        };
         let mut resolver = Resolver { convention, posed_from_sensor, stats: &mut stats };
-        let named = options.poses.as_ref().map(read_poses_3d).transpose()?;
+        let named = options.poses.as_ref().filter(|_| !uses_named_poses).map(read_poses_3d).transpose()?;
         let (matches, trajectory) = match (named, poses) {
             (Some(file), _) | (None, LayoutPoses::File(file)) => {
                 let track: Vec<TrackPose> =
@@ -134,6 +147,12 @@ impl ScanLog {
     pub fn sensor_position(&self, i: usize) -> [f64; 3] {
         let entry = &self.entries[i];
         entry.world_from_sensor.transform_point(self.source.origin(entry.place))
+    }
+
+    /// Whether every scan says where it was seen from, or the caller did. Where not, its frames have
+    /// [`Origin::Unknown`](portolan::scan::Origin::Unknown): they are points without rays, and free nothing.
+    pub fn knows_origins(&self) -> bool {
+        self.source.knows_origins()
     }
 
     /// The stamp of scan `i` (seconds of some clock), if there is one. Panics for an `i` beyond the last.

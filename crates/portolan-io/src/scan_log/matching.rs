@@ -73,7 +73,7 @@ pub(super) fn match_poses(
 }
 
 /// Stamped poses that are no trajectory.
-fn contradiction(path: &Path, error: &TrajectoryError) -> IoError {
+pub(super) fn contradiction(path: &Path, error: &TrajectoryError) -> IoError {
     let advice = "give the poses of one run: two trajectories in one file are not mixed";
     IoError::layout(path, "the time of the poses", format!("not usable ({error})"), advice)
 }

@@ -7,6 +7,8 @@
 //! | [`Stanford`](ScanLogKind::Stanford) | PLY files with a `range_grid` | `.conf`: conjugated quaternions |
 //! | [`ScanGraph`](ScanLogKind::ScanGraph) | a `.graph` file | in the file |
 //! | [`Clouds`](ScanLogKind::Clouds) | `*.pcd`, `*.ply`, `*.bin` or `*.xyz`; one such file | a file like `*pose*.csv`, else PCD viewpoints |
+//! | | `*.e57`, `*.ptx` with any number of scans | in the file |
+//! | | `*.las`, `*.laz` | none: points without rays |
 //! | [`TumRgbd`](ScanLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
 //! | [`Redwood`](ScanLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
 //! | [`Transforms`](ScanLogKind::Transforms) | `transforms.json` names pictures and depth images | in the file, of an OpenGL camera |
@@ -38,6 +40,7 @@ mod deskew;
 mod distortion;
 mod files;
 mod graph;
+mod hidden;
 mod intrinsics;
 mod kind;
 mod kitti;
@@ -49,9 +52,12 @@ mod matching;
 mod options;
 mod parts;
 mod redwood;
+mod scanner;
 mod seven_scenes;
 mod stanford;
 mod stats;
+#[cfg(test)]
+mod survey_tests;
 #[cfg(test)]
 mod testing;
 mod transforms;

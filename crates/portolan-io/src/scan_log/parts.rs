@@ -21,6 +21,11 @@ pub(crate) trait FrameSource: Send + Sync {
         [0.0; 3]
     }
 
+    /// Whether all scans say where they were seen from. Else points are all that can be used.
+    fn knows_origins(&self) -> bool {
+        true
+    }
+
     /// Color pictures that could not be read so far.
     fn unread_colors(&self) -> Option<UnreadColors> {
         None
@@ -68,6 +73,8 @@ pub(crate) struct Parts {
     pub(crate) stats: ScanLogStats,
     /// What was chosen and left out of a bag.
     pub(crate) bag: Option<Box<BagLogStats>>,
+    /// The poses that the caller named are in the source already: they are those of a scanner that moved while it scanned.
+    pub(crate) uses_named_poses: bool,
 }
 
 impl Parts {
@@ -90,6 +97,7 @@ impl Parts {
             camera: None,
             stats,
             bag: None,
+            uses_named_poses: false,
         }
     }
 }

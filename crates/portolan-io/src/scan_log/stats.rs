@@ -62,4 +62,6 @@ pub struct ScanLogStats {
     pub pixels_beyond_lens: u64,
     /// Why the color pictures of the log are not used; `None`: they are, or the log has no pictures.
     pub colors_left_out: Option<String>,
+    /// What had to be assumed about the log or was passed over, a sentence each.
+    pub warnings: Vec<String>,
 }

@@ -139,7 +139,7 @@ impl FrameFilter {
         counts.dropped += scan.refused.total();
         if self.uses_all() {
             let origins = match &scan.origin {
-                Origin::Common(_) => scan.points.len(),
+                Origin::Common(_) | Origin::Unknown => scan.points.len(),
                 Origin::PerPoint(all) => all.len().min(scan.points.len()),
             };
             counts.hit += origins as u64;
@@ -159,17 +159,22 @@ impl FrameFilter {
         // What is beyond the points belongs to the free ends.
         let mut end_times = scan.times.split_off(scan.points.len().min(scan.times.len()));
         let mut end_origins = match &mut scan.origin {
-            Origin::Common(_) => Vec::new(),
+            Origin::Common(_) | Origin::Unknown => Vec::new(),
             Origin::PerPoint(all) => all.split_off(scan.points.len().min(all.len())),
         };
         for (i, keep) in kept.iter_mut().enumerate() {
             let p = scan.points[i].map(f64::from);
             let common = matches!(scan.origin, Origin::Common(_));
-            let origin = scan.origin_of(i).unwrap_or([f64::NAN; 3]);
+            // Without an origin there is no range to limit.
+            let ranged = !parallel && scan.origin != Origin::Unknown;
+            let origin = match &scan.origin {
+                Origin::Unknown => [0.0; 3],
+                _ => scan.origin_of(i).unwrap_or([f64::NAN; 3]),
+            };
             let offset = sub(p, origin);
             let range = norm(offset);
             let what = if range.is_finite() {
-                self.decide((!parallel).then_some(range), if common { offset } else { p })
+                self.decide(ranged.then_some(range), if common { offset } else { p })
             } else {
                 Use::NotFinite
             };

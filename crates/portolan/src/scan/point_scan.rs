@@ -11,6 +11,9 @@ pub enum Origin {
     /// then those of the free ends. What lies beyond the end of this list has no origin: maps refuse and count it as not
     /// finite.
     PerPoint(Vec<[f32; 3]>),
+    /// Nobody knows where: points of a map that was fused before, or of a survey. Only occupancy maps take them, as hits
+    /// that free nothing; maps that need rays refuse and count them as not finite.
+    Unknown,
 }
 
 /// End points of rays in one frame, as `f32`, which is what sensors deliver.
@@ -74,6 +77,7 @@ impl PointScan {
         match &self.origin {
             Origin::Common(o) => Some(*o),
             Origin::PerPoint(all) => all.get(i).map(|o| o.map(f64::from)),
+            Origin::Unknown => None,
         }
     }
 }
@@ -94,6 +98,27 @@ impl Frame {
             Self::Image(image) => image.hits(),
             Self::Points(scan) => scan.points.len(),
         }
+    }
+
+    /// The surfaces alone, as points that nothing looked at: what is left where a scan is not to free any space.
+    pub fn without_rays(self) -> Self {
+        let scan = match self {
+            Self::Points(scan) => scan,
+            Self::Image(all) => {
+                let hits = all.readings().filter(|(.., hit)| *hit).map(|(_, end, _)| end.map(|v| v as f32));
+                PointScan { refused: all.refused, ..PointScan::new(hits, [f64::INFINITY; 3]) }
+            }
+        };
+        let mut times = scan.times;
+        times.truncate(scan.points.len());
+        Self::Points(PointScan {
+            origin: Origin::Unknown,
+            image: None,
+            delivered: None,
+            free_ends: Vec::new(),
+            times,
+            ..scan
+        })
     }
 
     /// Readings that were refused when the scan was built, by cause.

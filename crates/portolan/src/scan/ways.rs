@@ -9,6 +9,8 @@ pub enum Way {
     Found,
     /// Ray by ray.
     Rays(WhyRays),
+    /// As points without rays, which free nothing.
+    Points,
 }
 
 /// Why a 3-D scan was followed ray by ray.
@@ -30,7 +32,7 @@ pub enum WhyRays {
 
 impl Way {
     /// All there are.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Stated,
         Self::Found,
         Self::Rays(WhyRays::Asked),
@@ -39,6 +41,7 @@ impl Way {
         Self::Rays(WhyRays::NoRows),
         Self::Rays(WhyRays::SharedPixels),
         Self::Rays(WhyRays::Gaps),
+        Self::Points,
     ];
 }
 
@@ -74,6 +77,6 @@ mod tests {
         for (n, way) in Way::ALL.into_iter().enumerate() {
             (0..=n).for_each(|_| all += ScanWays::one(way));
         }
-        assert_eq!(Way::ALL.map(|way| all.count(way)), [1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(Way::ALL.map(|way| all.count(way)), [1, 2, 3, 4, 5, 6, 7, 8, 9]);
     }
 }

@@ -1,7 +1,7 @@
 //! The sweep for 3-D scans without rows and columns: exact rays, the nearest of which counts.
 
 use super::nearest_ray::{NearestRay, Ray};
-use super::{PlanError, PlanLimits, ProjectiveSettings, Sweep, Swept, SweptColors};
+use super::{LONGEST_RAY_CELLS, PlanError, PlanLimits, ProjectiveSettings, Sweep, Swept, SweptColors};
 use crate::cell::{ColorObservation, Colors, Distances, Evidence};
 use crate::geom::vector::{norm, scale, sub};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
@@ -53,6 +53,9 @@ impl Sweep<3> for PointRays {
             if !length.is_finite() {
                 return Err(Refusal::NotFinite);
             }
+            if length > LONGEST_RAY_CELLS * lattice.resolution && limits.bounds.is_none() {
+                return Err(Refusal::TooFar);
+            }
             if length == 0.0 || (hit && length <= how.min_range) {
                 return Err(Refusal::TooNear);
             }
@@ -75,6 +78,7 @@ impl Sweep<3> for PointRays {
                     match why {
                         Refusal::NotFinite => refused.not_finite += 1,
                         Refusal::TooNear => refused.too_near += 1,
+                        Refusal::TooFar => refused.too_far += 1,
                     }
                 }
             }
@@ -143,4 +147,6 @@ impl SweptColors<3> for PointRays {
 enum Refusal {
     NotFinite,
     TooNear,
+    /// Longer than any ray that is walked.
+    TooFar,
 }

@@ -31,6 +31,8 @@ impl Ray<3> {
         let origin = match &scan.origin {
             Origin::Common(_) => common,
             Origin::PerPoint(all) => all.get(i).map_or([f64::NAN; 3], |o| to_world(*o)),
+            // It ends where it begins.
+            Origin::Unknown => to_world(scan.points[i]),
         };
         if let Some(free) = i.checked_sub(scan.points.len()) {
             return Self { origin, end: to_world(scan.free_ends[free]), hit: false, passes: true };
@@ -51,8 +53,12 @@ pub(super) fn organised<'a>(
     layout: &mut LayoutFinder,
     cell: f64,
 ) -> Result<Organised<'a>, PlanError> {
-    let Origin::Common(origin) = scan.origin else {
-        return Ok((world_from_sensor.translation, Way::Rays(WhyRays::OwnOrigins), None));
+    let origin = match scan.origin {
+        Origin::Common(origin) => origin,
+        Origin::PerPoint(_) => {
+            return Ok((world_from_sensor.translation, Way::Rays(WhyRays::OwnOrigins), None));
+        }
+        Origin::Unknown => return Ok((world_from_sensor.translation, Way::Points, None)),
     };
     let common = world_from_sensor.transform_point(origin);
     if sweep == OccupancySweep::Exact {

@@ -6,8 +6,8 @@ use portolan::geom::{Aabb, Grid};
 use portolan_io::EsdfFile;
 use serde_json::{Map, Value};
 
-use super::Args;
-use crate::esdf::{FieldHow, check_thin, esdf_2d, esdf_3d, esdf_of_cells};
+use super::{Args, UnknownArg};
+use crate::esdf::{FieldHow, check_thin, esdf_2d, esdf_3d, esdf_of_cells, esdf_of_points, is_of_points};
 use crate::mapping::{Settings, cells_for_map_server, dense_esdf};
 use crate::source::Source;
 
@@ -51,8 +51,21 @@ impl Field {
                 })
             }
             Source::Map3(file) => {
-                let Some(map) = &file.tsdf_bricks else { return Ok(None) };
-                let field = esdf_3d(file, map, &how(args, &file.header.settings)?)?;
+                let how = how(args, &file.header.settings)?;
+                let field = match (&file.tsdf_bricks, &file.occupancy_bricks) {
+                    (Some(map), _) => esdf_3d(file, map, &how)?,
+                    (None, Some(map)) if is_of_points(&file.header.settings) => {
+                        if args.arrays.unknown == Some(UnknownArg::Pessimistic) {
+                            bail!(
+                                "{}: the map is of points without rays, and nothing is known to be free: with --unknown \
+                                 pessimistic all of it is an obstacle; give --unknown optimistic",
+                                args.input.display()
+                            );
+                        }
+                        esdf_of_points(map, &how, usize::MAX)?
+                    }
+                    _ => return Ok(None),
+                };
                 match dense_esdf(&field, bounds_3d(args)?.as_ref()) {
                     Ok(dense) => Self::Three(dense),
                     Err(why) => {

@@ -10,10 +10,11 @@ use serde_json::{Value, json};
 
 use super::nearest::SegmentIndex;
 use super::spread::Spread;
-use super::{Args, Part, no_tsdf, predict};
+use super::{Args, Part, predict};
+use crate::saved::no_tsdf;
 
 pub(super) fn evaluate(args: &Args, file: &MapFile<2>) -> anyhow::Result<Vec<Part>> {
-    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf.as_ref().ok_or_else(|| no_tsdf(&args.map, &file.header))?;
     let contour = marching_squares(tsdf, &ContourSettings::of(tsdf));
     let doubled = doubled_length(&contour, 0.15);
     let (length, share) = (doubled.total, doubled.share());

@@ -8,13 +8,14 @@ use portolan::surface::{
     CompareSettings, Mesh, MeshSettings, Reference, SurfaceComparison, SurfaceDistances, compare_surfaces,
     marching_cubes,
 };
-use portolan_io::{MapFile, PlyMesh, PointCloudFile, TsdfBricks, open, read_ply_mesh, read_points};
+use portolan_io::{FileKind, MapFile, PlyMesh, PointCloudFile, TsdfBricks, detect, read_mesh, read_points};
 use serde_json::{Value, json};
 
-use super::{Args, Part, no_tsdf, predict};
+use super::{Args, Part, predict};
+use crate::saved::no_tsdf;
 
 pub(super) fn evaluate(args: &Args, file: &MapFile<3>) -> anyhow::Result<Vec<Part>> {
-    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(args))?;
+    let tsdf = file.tsdf_bricks.as_ref().ok_or_else(|| no_tsdf(&args.map, &file.header))?;
     let settings = MeshSettings { normals: false, colors: false, ..MeshSettings::of(tsdf) };
     let mesh = marching_cubes(&tsdf.store, None, &settings);
     let (triangles, area) = (mesh.triangles.len(), mesh.area());
@@ -63,11 +64,15 @@ enum Owned {
 impl Owned {
     /// A mesh where the file has faces, else its points.
     fn read(path: &Path) -> anyhow::Result<Self> {
-        if open(path)?.read_up_to(4)?.starts_with(b"ply") {
-            let mesh = read_ply_mesh(path)?;
-            if !mesh.triangles.is_empty() {
-                return Ok(Self::Mesh(about_a_vertex(&mesh)));
+        if let FileKind::Mesh(_) = detect(path)? {
+            let mesh = read_mesh(path)?;
+            if mesh.triangles.is_empty() {
+                bail!(
+                    "{}: the mesh has no triangle to compare with; give one with faces, or points",
+                    path.display()
+                );
             }
+            return Ok(Self::Mesh(about_a_vertex(&mesh)));
         }
         Ok(Self::Points(read_points(path)?))
     }

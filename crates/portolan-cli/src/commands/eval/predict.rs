@@ -147,6 +147,13 @@ pub(super) fn in_3d(
 ) -> anyhow::Result<Part> {
     let task = Task::new(args, path, &file.header);
     let log = log::read_3d(path, &args.source, false, task.settings.shape.deskew)?;
+    if !log.knows_origins() {
+        bail!(
+            "{}: its points do not say where they were seen from, so that there are no ranges to predict; give --origin or \
+             --poses",
+            path.display()
+        );
+    }
     let filter = task.range().filter(task.settings.shape.self_filter.clone())?;
     let indices = task.indices(log.len())?;
     let resolution = tsdf.store.lattice().resolution;

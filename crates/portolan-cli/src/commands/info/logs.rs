@@ -1,8 +1,8 @@
 //! `info` of a log.
 
 use portolan::geom::Aabb;
-use portolan_io::scan_log::{CameraFrom, Distortion, ScanLog};
-use portolan_io::{LaserLog, detect_no_return};
+use portolan_io::scan_log::{CameraFrom, Distortion, ScanLog, ScanLogKind};
+use portolan_io::{LaserLog, PosedCloud, detect_no_return, read_posed_clouds};
 use serde_json::{Value, json};
 
 use crate::json;
@@ -68,6 +68,56 @@ pub(super) fn of_3d(log: &ScanLog) -> Value {
         "extent_of_poses": json::aabb(&log.extent()),
         "time_span": log.time_span().map(|(first, last)| [first, last]),
         "camera": camera,
+        "clouds": clouds(log),
         "log": json::space_log_stats(log.stats()),
+    })
+}
+
+/// Scans of a file that are described one by one.
+const MOST_DESCRIBED: usize = 32;
+
+/// What the clouds of a file hold; of a folder nothing. A file that cannot be read again is none.
+fn clouds(log: &ScanLog) -> Option<Value> {
+    if log.kind() != ScanLogKind::Clouds || !log.path().is_file() {
+        return None;
+    }
+    let scans = read_posed_clouds(log.path()).ok()?;
+    let described = scans.into_iter().take(MOST_DESCRIBED).enumerate();
+    Some(Value::Object(described.map(|(i, scan)| (format!("cloud_{i}"), cloud(scan))).collect()))
+}
+
+fn cloud(scan: PosedCloud) -> Value {
+    let (name, seen_from) = (scan.name.clone(), scan.origin);
+    let has_pose = scan.file_from_scan.is_some();
+    let held = &scan.cloud;
+    let lists = [
+        ("intensity", held.intensity.len()),
+        ("time", held.times.len()),
+        ("ring", held.rings.len()),
+        ("color", held.colors.len()),
+        ("normal", held.normals.len()),
+    ];
+    let fields: Vec<_> = lists.iter().filter(|(_, n)| *n > 0).map(|(name, _)| *name).collect();
+    let last = held.times.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let times = (!held.times.is_empty()).then(|| [held.start_time, held.start_time + f64::from(last)]);
+    let organised = held.grid.as_ref().map(|grid| [grid.columns, grid.rows]);
+    let (points, refused) = (held.points.len(), held.refused);
+    let viewpoint = held.viewpoint.map(|v| v.position);
+    let mut extent = Aabb::EMPTY;
+    if let Some(placed) = scan.in_file() {
+        (0..placed.points.len()).for_each(|i| extent.include(placed.position(i)));
+    }
+    json!({
+        "name": name,
+        "points": points,
+        "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
+        "fields": format!("position{}", fields.iter().map(|f| format!(", {f}")).collect::<String>()),
+        "time_span": times,
+        "organised": organised,
+        "viewpoint": viewpoint,
+        "pose": has_pose,
+        "seen_from": seen_from,
+        "no_reading": refused.no_reading,
+        "refused": refused.not_finite + refused.too_far,
     })
 }

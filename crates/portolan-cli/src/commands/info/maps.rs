@@ -88,6 +88,7 @@ fn of_bricks<C: Cell, const D: usize>(cell: &str, store: &Bricks<C, D>) -> Value
     json!({
         "cell": cell,
         "resolution": store.lattice().resolution,
+        "origin": store.lattice().origin.to_vec(),
         "extent": (!extent.is_empty()).then(|| json::aabb(&extent)),
         "bricks": store.len(),
         "observed": store.bricks_by_age().map(|(_, brick)| observed(brick)).sum::<usize>(),

@@ -9,6 +9,7 @@
 //! | 5 | `clearance` | at any point an interval that holds the distance |
 //! | | `follow` | steps 1 to 4 again where the map changed |
 //! | | `cells`, `unknown`, `cell_distances` | step 2 from cells instead of crossings: the textbook's seeds, a mask; unknown cells, and obstacles without surface |
+//! | | `of_cells` | a field of obstacles alone, where nothing else is known |
 //! | | `field`, `query`, `bricks`, `export` | what is held, and what is read of it |
 //!
 //! ```text
@@ -31,6 +32,7 @@ mod field;
 mod follow;
 mod measure;
 mod obstacles;
+mod of_cells;
 mod query;
 mod settings;
 mod surface;

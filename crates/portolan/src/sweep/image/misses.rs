@@ -4,6 +4,7 @@ use super::placed_image::PlacedImage;
 use super::search::{BlockBox, LONGEST_EDGE, Octants, find_blocks};
 use crate::geom::{BlockKey, Lattice, Pose};
 use crate::scan::RangeImage;
+use crate::sweep::PlanError;
 
 /// Boxes of more blocks than this are not searched: single readings from far away are cheaper as rays.
 const MOST_SEARCHED: u64 = 1 << 27;
@@ -34,21 +35,27 @@ impl ProjectiveMisses {
         self.image = Some(Box::new(PlacedImage::new(image, world_from_image, lattice, old)));
     }
 
-    /// Finds the blocks between `first` and `last` (both included) that hold cells which may be free. Returns whether they
-    /// were searched for: not in boxes that are too large.
-    pub(in crate::sweep) fn find_blocks(&mut self, first: BlockKey<3>, last: BlockKey<3>) -> bool {
+    /// Finds the blocks between `first` and `last` (both included) that hold cells which may be free, `most` at most.
+    /// Returns whether they were searched for: not in boxes that are too large.
+    pub(in crate::sweep) fn find_blocks(
+        &mut self,
+        first: BlockKey<3>,
+        last: BlockKey<3>,
+        most: usize,
+    ) -> Result<bool, PlanError> {
         self.clear();
-        let Some(image) = &self.image else { return true };
+        let Some(image) = &self.image else { return Ok(true) };
         let edges = [0, 1, 2].map(|k| (i64::from(last.0[k]) - i64::from(first.0[k]) + 1).max(0));
         let blocks = edges.iter().try_fold(1u64, |n, &edge| n.checked_mul(edge as u64));
         if blocks.is_none_or(|n| n > MOST_SEARCHED) || edges.iter().any(|&edge| edge > LONGEST_EDGE) {
-            return false;
+            return Ok(false);
         }
         if blocks == Some(0) {
-            return true;
+            return Ok(true);
         }
         let whole = BlockBox { first: first.0, last: last.0 };
-        find_blocks(image.as_ref(), whole, usize::MAX, &mut self.keys, &mut self.octants)
+        let fits = find_blocks(image.as_ref(), whole, most, &mut self.keys, &mut self.octants);
+        if fits { Ok(true) } else { Err(PlanError::TooManyBlocks) }
     }
 
     /// Forgets the blocks.

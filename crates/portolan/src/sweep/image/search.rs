@@ -2,6 +2,7 @@
 
 use crate::geom::{BLOCK_EDGE, BlockKey};
 use crate::parallel;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What an image shows of the cells of a cube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,11 +93,8 @@ pub(super) fn find_blocks<C: Classify>(
     octants.clear();
     // Aligned, so that what is found does not depend on where the box begins.
     let anchor = first.map(|v| i64::from(v).div_euclid(ALIGNED) * ALIGNED);
-    let search = Search { image, anchor, first: first.map(i64::from), last: last.map(i64::from), most };
-    let found = search.run();
-    if found.len() > most {
-        return false;
-    }
+    let (first, last, found) = (first.map(i64::from), last.map(i64::from), AtomicUsize::new(0));
+    let Some(found) = (Search { image, anchor, first, last, most, found }).run() else { return false };
     keys.extend(found.iter().map(|&(packed, _)| {
         let index = |k: usize| (packed >> (BITS * k as u32)) & ((1 << BITS) - 1);
         BlockKey(std::array::from_fn(|k| (anchor[k] + index(k) as i64) as i32))
@@ -116,6 +114,8 @@ struct Search<'a, C> {
     first: [i64; 3],
     last: [i64; 3],
     most: usize,
+    /// By all parts together: each alone would be allowed as much as all.
+    found: AtomicUsize,
 }
 
 /// A cube of `2^level` octants of blocks from `at`, counted from the anchor.
@@ -145,8 +145,8 @@ impl Node {
 type Found = (u64, Octants);
 
 impl<C: Classify> Search<'_, C> {
-    /// In the order of keys.
-    fn run(&self) -> Vec<Found> {
+    /// In the order of keys; `None` where they are too many.
+    fn run(&self) -> Option<Vec<Found>> {
         let span = (0..3).map(|k| self.last[k] - self.anchor[k] + 1).fold(ALIGNED, i64::max);
         let root = Node { at: [0; 3], level: BLOCK + (span as u64).next_power_of_two().ilog2() };
         let mut nodes = vec![(root, Class::Mixed, self.image.nothing_known())];
@@ -165,9 +165,21 @@ impl<C: Classify> Search<'_, C> {
             self.take(node, class, known, &mut found);
             found
         });
+        if self.is_full() {
+            return None;
+        }
         let mut all = parts.concat();
         all.sort_unstable_by_key(|found| found.0);
-        all
+        Some(all)
+    }
+
+    fn is_full(&self) -> bool {
+        self.found.load(Ordering::Relaxed) > self.most
+    }
+
+    fn add(&self, node: Node, octants: Octants, found: &mut Vec<Found>) {
+        self.found.fetch_add(1, Ordering::Relaxed);
+        found.push((node.packed(), octants));
     }
 
     /// The halves of a node that reach into the box, without those of [`Class::Nothing`].
@@ -183,14 +195,14 @@ impl<C: Classify> Search<'_, C> {
     }
 
     fn take(&self, node: Node, class: Class, known: C::Known, found: &mut Vec<Found>) {
-        if found.len() > self.most {
+        if self.is_full() {
         } else if class == Class::Free {
             self.take_all(node, found);
         } else if node.level == BLOCK {
             let classes = self.image.classify(self.cube(node), known, 0xff);
             let octants = Octants::of(classes.into_iter().map(|c| c.0));
             if octants != Octants::default() {
-                found.push((node.packed(), octants));
+                self.add(node, octants, found);
             }
         } else {
             self.parts(node, known).for_each(|(child, class, known)| self.take(child, class, known, found));
@@ -199,9 +211,9 @@ impl<C: Classify> Search<'_, C> {
 
     /// All blocks of a node that is free.
     fn take_all(&self, node: Node, found: &mut Vec<Found>) {
-        if !self.is_inside(node) || found.len() > self.most {
+        if !self.is_inside(node) || self.is_full() {
         } else if node.level == BLOCK {
-            found.push((node.packed(), Octants::FREE));
+            self.add(node, Octants::FREE, found);
         } else {
             node.children().for_each(|child| self.take_all(child, found));
         }

@@ -4,7 +4,7 @@ use super::blocks::{HitBlocks, KnowsHits, is_fine, shared_out};
 use super::rays::RayLengths;
 use crate::cell::{Evidence, HitLengths};
 use crate::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
-use crate::scan::{LayoutFinder, PointScan, RangeImage, ScanStats, SphericalLayout};
+use crate::scan::{LayoutFinder, PointScan, RangeImage, ScanStats, SphericalLayout, Way};
 use crate::sweep::image::ProjectiveLengths;
 use crate::sweep::occupancy::stats;
 use crate::sweep::scan_rays::{Ray, organised};
@@ -127,11 +127,15 @@ impl Sweep<3> for HitLengthSweep<PointScan> {
         limits: &PlanLimits<3>,
     ) -> Result<ScanStats, PlanError> {
         let hits = scan.points.len();
-        let (common, _, image) =
+        let (common, way, image) =
             organised(scan, world_from_sensor, self.sweep, &mut self.layout, lattice.resolution)?;
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
         let exact = image.is_none();
-        let ray = |i: usize| Ray::of_points(scan, i, common, world_from_sensor, exact);
+        let ray = |i: usize| match Ray::of_points(scan, i, common, world_from_sensor, exact) {
+            // A hit without a length says nothing of hits per meter.
+            ray if way == Way::Points => Ray { origin: [f64::NAN; 3], ..ray },
+            ray => ray,
+        };
         let view = image.as_deref().map(|image| (image, &world_from_image));
         let count = hits + scan.free_ends.len();
         let stats = self.plan_rays((hits, count), (0..count).map(ray), view, lattice, limits)?;

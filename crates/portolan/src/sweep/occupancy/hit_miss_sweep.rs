@@ -110,7 +110,7 @@ impl<S: ?Sized> HitMissSweep<S> {
         );
         let mut tally = planned?;
         let is_searched = match (rays.view, exact.reach()) {
-            (Some(_), Some((first, last))) => misses.find_blocks(first, last),
+            (Some(_), Some((first, last))) => misses.find_blocks(first, last, most)?,
             _ => true,
         };
         if !is_searched {
@@ -176,7 +176,7 @@ impl Sweep<3> for HitMissSweep<PointScan> {
             organised(scan, world_from_sensor, self.sweep, &mut self.layout, lattice.resolution)?;
         let world_from_image = Pose { translation: common, ..*world_from_sensor };
         let view = image.as_deref().map(|image| View { world_from_image: &world_from_image, image });
-        let passes = view.is_none();
+        let passes = view.is_none() && way != Way::Points;
         let ray = |i: usize| Ray::of_points(scan, i, common, world_from_sensor, passes);
         let rays = Rays { hits, count: hits + scan.free_ends.len(), ray, view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
