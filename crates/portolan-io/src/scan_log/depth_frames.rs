@@ -83,7 +83,11 @@ impl DepthFrames {
             }
             let size = depth_image_size(&first.depth)?;
             if options.scale_intrinsics {
+                let own = camera.size.filter(|own| *own != size);
                 let (path, by) = (first.depth.clone(), camera.scale_to(&first.depth, size)?);
+                stats.notes.extend(own.map(|[w, h]| {
+                    format!("the camera of {w} x {h} was scaled to {} x {}, as asked", size[0], size[1])
+                }));
                 frames.iter_mut().for_each(|f| f.lens = f.lens.scaled(by));
                 camera.check_size(&path, size)?;
             } else {
@@ -289,6 +293,7 @@ mod tests {
         let Projection::Pinhole(camera) = image(&scaled, 0).projection else { panic!("a camera") };
         assert_eq!(camera, Pinhole { fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 });
         assert_eq!(scaled.camera().unwrap().pinhole, camera);
+        assert_eq!(scaled.stats().notes, ["the camera of 640 x 480 was scaled to 320 x 240, as asked"]);
         // The caller's numbers, without a size.
         let whole = Intrinsics::Pinhole(Pinhole { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 });
         says(

@@ -250,6 +250,47 @@ mod tests {
         assert_eq!(Distortion::of_model("plumb_bob", &[0.0; 5]), Ok(Distortion::None));
     }
 
+    /// What OpenCV 5.0 gives (`projectPoints` and `fisheye.distortPoints` of three points).
+    #[test]
+    fn figures_of_another_library() {
+        let points = [[0.3, 0.4], [-0.7, 0.25], [0.05, -0.6]];
+        for (model, coefficients, theirs) in [
+            (
+                "plumb_bob",
+                &[0.1, -0.2, 0.01, -0.02, 0.4][..],
+                [
+                    [0.299425, 0.4084],
+                    [-0.7773122668749999, 0.2791900953125],
+                    [0.04350113281249999, -0.6053885937499999],
+                ],
+            ),
+            (
+                "rational",
+                &[0.12, -0.21, 0.003, -0.002, 0.05, 0.31, -0.08, 0.02],
+                [
+                    [0.28443617244392655, 0.38066489659190217],
+                    [-0.6191586968511651, 0.22239096316113038],
+                    [0.04525259136569127, -0.5506435963882952],
+                ],
+            ),
+            (
+                "fisheye",
+                &[0.02, -0.01, 0.004, -0.001],
+                [
+                    [0.2792665087547889, 0.3723553450063853],
+                    [-0.6060243995919825, 0.2164372855685652],
+                    [0.04523604960335922, -0.5428325952403106],
+                ],
+            ),
+        ] {
+            let lens = Distortion::of_model(model, coefficients).unwrap();
+            for (p, shown) in points.into_iter().zip(theirs) {
+                near(lens.distort(p), shown, 1e-14);
+                near(lens.undistort(shown), p, 1e-9);
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn what_is_undone_is_done_again(
