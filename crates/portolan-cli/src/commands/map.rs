@@ -179,7 +179,8 @@ impl Args {
             *no_return = no_return.or_else(|| detect_no_return(&log));
             return Ok(Log::Two(Box::new(log)));
         }
-        let log = log::read_3d(&self.log, &self.source, settings.shape.color)?;
+        let shape = &settings.shape;
+        let log = log::read_3d(&self.log, &self.source, shape.color, shape.points_only)?;
         self.source.check_sensor(&log)?;
         if !log.knows_origins() && !settings.shape.points_only {
             if self.append {

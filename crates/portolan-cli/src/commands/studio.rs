@@ -140,7 +140,7 @@ impl Args {
     fn log_3d(&self, path: &Path) -> anyhow::Result<Logs> {
         Dimension::Three.check::<Self, _>(&self.given, "the log")?;
         let filter = self.limits.range.filter(Vec::new())?;
-        let log = log::read_3d(path, &self.source, true)?;
+        let log = log::read_3d(path, &self.source, true, false)?;
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
         Ok(Logs {
             source_3d: Source3d::Recorded { log: Box::new(log.every(every)), filter },

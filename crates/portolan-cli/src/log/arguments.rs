@@ -103,6 +103,7 @@ impl LogArgs {
             origin: self.origin,
             intrinsics: self.intrinsics.as_deref().map(Intrinsics::from_word),
             depth_scale: self.depth_scale,
+            points_only: false,
             color,
             time_tolerance: self.time_tolerance.unwrap_or(default.time_tolerance),
         }

@@ -9,7 +9,7 @@ use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{RangeLimits, Scan};
-use portolan_io::scan_log::ScanLog;
+use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{CarmenLog, FileKind, detect, read_poses_2d};
 use serde_json::{Value, json};
 
@@ -124,9 +124,14 @@ fn warnings_3d(log: &ScanLog) -> Vec<String> {
     warnings
 }
 
-/// Opens a log of 3-D scans.
-pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool) -> anyhow::Result<ScanLog> {
-    Ok(ScanLog::open(path, &args.options(color))?)
+/// Opens a log of 3-D scans. `points_only`: their rays are not used.
+pub(crate) fn read_3d(
+    path: &Path,
+    args: &LogArgs,
+    color: bool,
+    points_only: bool,
+) -> anyhow::Result<ScanLog> {
+    Ok(ScanLog::open(path, &ScanLogOptions { points_only, ..args.options(color) })?)
 }
 
 /// Reads a 2-D log.

@@ -23,6 +23,9 @@ pub struct ScanLogOptions {
     pub intrinsics: Option<Intrinsics>,
     /// Units of a depth image per meter (1000: millimeters); default: the format's.
     pub depth_scale: Option<f64>,
+    /// Whether the caller uses points without rays ([`Frame::without_rays`](portolan::scan::Frame::without_rays)): nothing is
+    /// said then of where they may have been seen from. Default: no.
+    pub points_only: bool,
     /// Whether colors are read where the log has them. Default: yes.
     pub color: bool,
     /// How far a pose's time may lie from a scan's (seconds). Default 0.02, as in TUM's tools.
@@ -38,6 +41,7 @@ impl Default for ScanLogOptions {
             origin: None,
             intrinsics: None,
             depth_scale: None,
+            points_only: false,
             color: true,
             time_tolerance: 0.02,
         }

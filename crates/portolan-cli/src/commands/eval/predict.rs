@@ -145,7 +145,7 @@ pub(super) fn in_3d(
     tsdf: &TsdfBricks<3>,
 ) -> anyhow::Result<Part> {
     let task = Task::new(args, path, &file.header);
-    let log = log::read_3d(path, &args.source, false)?;
+    let log = log::read_3d(path, &args.source, false, false)?;
     if !log.knows_origins() {
         bail!(
             "{}: its points do not say where they were seen from, so that there are no ranges to predict; give --origin or \
