@@ -52,6 +52,7 @@ fn a_fused_map_is_told_and_mapped_without_rays() {
 
     let text = map(&log, &out, &["--points-only"]);
     assert!(text.contains("as points without rays") && text.contains("no mesh, tsdf"), "{text}");
+    assert!(!text.contains("looks like a fused map"), "{text}");
     let summary = summary(&out);
     assert_eq!(summary["mesh"], serde_json::Value::Null);
     assert_eq!(summary["sweeps"]["points_without_rays"], 1);

@@ -15,7 +15,7 @@ use crate::dimension::{Dimension, Given, ONLY_3D};
 use crate::error::bad_call;
 use crate::esdf::check_thin;
 use crate::json;
-use crate::log::{self, Log, LogArgs};
+use crate::log::{self, Log, LogArgs, Wanted};
 use crate::mapping::{Artifacts, Derived, Limits, MapKind, Run, Settings, Summary, report, title};
 use crate::output::Output;
 use crate::progress::Progress;
@@ -179,7 +179,9 @@ impl Args {
             *no_return = no_return.or_else(|| detect_no_return(&log));
             return Ok(Log::Two(Box::new(log)));
         }
-        let log = log::read_3d(&self.log, &self.source, settings.shape.color, settings.shape.deskew)?;
+        let shape = &settings.shape;
+        let wanted = Wanted { color: shape.color, deskew: shape.deskew, points_only: shape.points_only };
+        let log = log::read_3d(&self.log, &self.source, wanted)?;
         self.source.check_sensor(&log)?;
         if !log.knows_origins() && !settings.shape.points_only {
             if self.append {

@@ -15,7 +15,7 @@ use serde_json::json;
 use crate::arguments::bytes;
 use crate::dimension::{Dimension, Given};
 use crate::error::bad_call;
-use crate::log::{self, LimitArgs, LogArgs, Selection};
+use crate::log::{self, LimitArgs, LogArgs, Selection, Wanted};
 use crate::mapping::with_outlier;
 use crate::output::Output;
 use crate::saved::SavedMap;
@@ -140,7 +140,8 @@ impl Args {
     fn log_3d(&self, path: &Path) -> anyhow::Result<Logs> {
         Dimension::Three.check::<Self, _>(&self.given, "the log")?;
         let filter = self.limits.range.filter(Vec::new())?;
-        let log = log::read_3d(path, &self.source, true, true)?;
+        let wanted = Wanted { color: true, deskew: true, points_only: false };
+        let log = log::read_3d(path, &self.source, wanted)?;
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
         Ok(Logs {
             source_3d: Source3d::Recorded { log: Box::new(log.every(every)), filter },

@@ -211,6 +211,7 @@ impl LogArgs {
             color_distortion: lens(&self.color_distortion, "--color-distortion")?,
             color_from_depth: self.color_from_depth,
             depth_scale: self.depth_scale,
+            points_only: false,
             color,
             deskew,
             time_tolerance: self.time_tolerance.unwrap_or(default.time_tolerance),

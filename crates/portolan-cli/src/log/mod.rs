@@ -9,7 +9,7 @@ use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::geom::vector::distance;
 use portolan::scan::{RangeLimits, Scan};
-use portolan_io::scan_log::{MotionStats, PointClock, ScanLog};
+use portolan_io::scan_log::{MotionStats, PointClock, ScanLog, ScanLogOptions};
 use portolan_io::{BagLogStats, FileKind, LaserLog, LaserLogStats, detect, read_poses_2d};
 use serde_json::{Value, json};
 
@@ -232,9 +232,21 @@ fn left_in(motion: Option<MotionStats>) -> Option<String> {
     ))
 }
 
+/// What is wanted of a log of 3-D scans.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    /// Colors.
+    pub(crate) color: bool,
+    /// Scans without the motion of the sensor.
+    pub(crate) deskew: bool,
+    /// Their rays are not used.
+    pub(crate) points_only: bool,
+}
+
 /// Opens a log of 3-D scans.
-pub(crate) fn read_3d(path: &Path, args: &LogArgs, color: bool, deskew: bool) -> anyhow::Result<ScanLog> {
-    Ok(ScanLog::open(path, &args.options(color, deskew)?)?)
+pub(crate) fn read_3d(path: &Path, args: &LogArgs, wanted: Wanted) -> anyhow::Result<ScanLog> {
+    let Wanted { color, deskew, points_only } = wanted;
+    Ok(ScanLog::open(path, &ScanLogOptions { points_only, ..args.options(color, deskew)? })?)
 }
 
 /// Reads a 2-D log.

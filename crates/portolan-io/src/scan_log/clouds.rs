@@ -162,6 +162,8 @@ fn open_file(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     // Neither the file nor the caller says where it was seen from.
     let has_viewpoint = format == Some(PointFormat::Pcd) && !matches!(poses, LayoutPoses::Missing(_));
     let is_assumed = !has_viewpoint && options.origin.is_none() && options.poses.is_none();
+    // Who wants no rays has no use for what speaks against them.
+    let is_assumed = is_assumed && !options.points_only;
     let poses = if matches!(poses, LayoutPoses::Missing(_)) { in_place(&files) } else { poses };
     let rays = options.origin.map_or(rays, |origin| Rays::From(vec![origin]));
     let mut source = CloudFrames::new(files, format, rays)?;
@@ -225,7 +227,7 @@ pub(super) fn assumed(
 /// Clouds of a survey, which say nothing of the scanner: points without rays, or seen along the caller's poses.
 fn survey(path: &Path, files: Vec<PathBuf>, options: &ScanLogOptions) -> Result<Parts> {
     let (rays, mut notes) = (way_of_scanner(options)?, Vec::new());
-    if matches!(rays, Rays::Unknown) {
+    if matches!(rays, Rays::Unknown) && !options.points_only {
         notes.push(format!(
             "{}: LAS does not say where points were seen from: they are taken as points without rays, so that free space \
              stays unknown; give --poses FILE with the scanner's poses at the points' GPS times, or --origin x,y,z",

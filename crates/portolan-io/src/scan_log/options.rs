@@ -37,6 +37,9 @@ pub struct ScanLogOptions {
     pub color_from_depth: Option<Pose<3>>,
     /// Units of a depth image per meter (1000: millimeters); default: the format's.
     pub depth_scale: Option<f64>,
+    /// Whether the caller uses points without rays ([`Frame::without_rays`](portolan::scan::Frame::without_rays)): nothing is
+    /// said then of where they may have been seen from. Default: no.
+    pub points_only: bool,
     /// Whether colors are read where the log has them. Default: yes.
     pub color: bool,
     /// Whether the motion of the sensor within a scan is taken out, where points have times and poses cover them. Default: yes.
@@ -61,6 +64,7 @@ impl Default for ScanLogOptions {
             color_distortion: None,
             color_from_depth: None,
             depth_scale: None,
+            points_only: false,
             color: true,
             deskew: true,
             time_tolerance: 0.02,

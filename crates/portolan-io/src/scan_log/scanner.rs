@@ -49,7 +49,7 @@ pub(super) fn open(
             // A name for a message: of several scans the first is enough.
             let origin = match options.origin.or(stated) {
                 Some(origin) => Some(origin),
-                None if options.poses.is_some() => Some([0.0; 3]),
+                None if options.poses.is_some() || options.points_only => Some([0.0; 3]),
                 None => match assumed(file, || whole(file, format, number), base)? {
                     Assumed::Zero(note) => {
                         notes.extend(note);

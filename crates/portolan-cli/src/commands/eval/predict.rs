@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use super::spread::Spread;
 use super::{Args, Part};
 use crate::error::bad_call;
-use crate::log::{self, LimitArgs, RangeArgs, Selection};
+use crate::log::{self, LimitArgs, RangeArgs, Selection, Wanted};
 use crate::mapping::Settings;
 use crate::progress::Progress;
 
@@ -146,7 +146,8 @@ pub(super) fn in_3d(
     tsdf: &TsdfBricks<3>,
 ) -> anyhow::Result<Part> {
     let task = Task::new(args, path, &file.header);
-    let log = log::read_3d(path, &args.source, false, task.settings.shape.deskew)?;
+    let wanted = Wanted { color: false, deskew: task.settings.shape.deskew, points_only: false };
+    let log = log::read_3d(path, &args.source, wanted)?;
     if !log.knows_origins() {
         bail!(
             "{}: its points do not say where they were seen from, so that there are no ranges to predict; give --origin or \

@@ -64,7 +64,7 @@ pub(super) fn of_3d(log: &ScanLog) -> Value {
     });
     json!({
         "scans": log.len(),
-        "path_length": log.path_length(),
+        "path_length": log.path_length() + 0.0, // the sum of nothing is -0.0
         "extent_of_poses": json::aabb(&log.extent()),
         "time_span": log.time_span().map(|(first, last)| [first, last]),
         "camera": camera,
