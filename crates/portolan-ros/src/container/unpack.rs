@@ -23,6 +23,15 @@ pub(crate) enum Packing {
 }
 
 impl Packing {
+    /// Its name in containers.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Zstd => "zstd",
+            Self::Lz4 => "lz4",
+            Self::Bz2 => "bz2",
+        }
+    }
+
     /// Unpacks `packed`, which must give exactly `size` bytes; the reason where it does not. Memory grows as bytes
     /// arrive, so that a size in a file costs nothing.
     pub(crate) fn unpack(self, packed: &[u8], size: u64) -> Result<Vec<u8>, String> {
@@ -47,7 +56,7 @@ impl Packing {
             Self::Bz2 => read(&mut bzip2::bufread::MultiBzDecoder::new(packed)),
         };
         match result {
-            Err(e) => Err(format!("damaged {self:?} data ({e})").to_lowercase()),
+            Err(e) => Err(format!("damaged {} data ({e})", self.name())),
             Ok(_) if unpacked.len() as u64 > limit => Err(format!("unpacked to more than {limit} bytes")),
             Ok(_) => Ok(unpacked),
         }
