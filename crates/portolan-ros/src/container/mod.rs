@@ -31,6 +31,7 @@ mod topic;
 mod unpack;
 
 pub use bag::{Bag, TopicCount};
+pub use folder::holds_bags;
 pub use kind::ContainerKind;
 pub use open::BagOptions;
 pub use source::{BytesSource, FileSource, ReadSeek, Source};

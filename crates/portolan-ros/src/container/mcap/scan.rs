@@ -2,7 +2,7 @@
 
 use mcap::records::op;
 
-use super::super::index::{Entry, FileIndex, NO_CHUNK, told};
+use super::super::index::{Entry, FileIndex, NO_CHUNK, told, too_many};
 use super::super::reader::FileReader;
 use super::channels::{Channels, known};
 use super::chunk::load_chunk;
@@ -76,7 +76,7 @@ fn scan_record(
         }
         op::CHUNK => {
             let walked = load_chunk(reader, place).and_then(|chunk| {
-                walk_chunk(&chunk, place, channels, entries).map_err(|(at, field, value)| {
+                walk_chunk(&chunk, (place, reader.size()), channels, entries).map_err(|(at, field, value)| {
                     reader.damaged(place, format!("{field} at byte {at} of the chunk"), value)
                 })
             });
@@ -93,7 +93,7 @@ fn scan_record(
 
 fn walk_chunk(
     chunk: &[u8],
-    place: u64,
+    (place, file_size): (u64, u64),
     channels: &mut Channels,
     entries: &mut Vec<Entry>,
 ) -> Result<(), (usize, &'static str, String)> {
@@ -103,6 +103,9 @@ fn walk_chunk(
             return Err((at, "a record", "longer than the chunk".into()));
         };
         let next = body.end;
+        if too_many(entries.len(), file_size) {
+            return Err((at, "the number of messages", entries.len().to_string()));
+        }
         let result: Result<(), Wrong> = match code {
             op::SCHEMA | op::CHANNEL => mcap::parse_record(code, &chunk[body])
                 .map_err(|e| ("a schema or channel", e.to_string()))

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use mcap::records::{self, Record, op};
 
-use super::super::index::{Entry, FileIndex, NO_CHUNK};
+use super::super::index::{Entry, FileIndex, NO_CHUNK, too_many};
 use super::super::reader::FileReader;
 use super::channels::Channels;
 use super::record::{RECORD_HEAD, record_at, u32_at, u64_at};
@@ -107,6 +107,9 @@ fn entries(
         }
         reader.bytes_at(place, chunk.message_index_length, &mut bytes, "the message index")?;
         let (first, mut at) = (entries.len(), 0);
+        if too_many(first, reader.size()) {
+            return damaged();
+        }
         while at < bytes.len() {
             let Some((op::MESSAGE_INDEX, body)) = record_at(&bytes, at) else { return damaged() };
             at = body.end;

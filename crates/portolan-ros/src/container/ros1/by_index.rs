@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::super::index::{Entry, FileIndex, NO_CHUNK};
+use super::super::index::{Entry, FileIndex, NO_CHUNK, too_many};
 use super::super::reader::FileReader;
 use super::connections::Connections;
 use super::record::{RecordHead, op, time, word};
@@ -52,6 +52,9 @@ pub(super) fn by_index(
     let mut entries = Vec::new();
     for (at, counts) in chunks {
         let first = entries.len();
+        if too_many(first, reader.size()) {
+            return Ok(Err("its index has more messages than can be".into()));
+        }
         match chunk_entries(reader, at, &counts, &mut entries) {
             Ok(true) => {}
             Ok(false) | Err(BagError::Damaged { .. }) => {

@@ -1,6 +1,6 @@
 //! Reading the whole file.
 
-use super::super::index::{Entry, FileIndex, NO_CHUNK, told};
+use super::super::index::{Entry, FileIndex, NO_CHUNK, told, too_many};
 use super::super::reader::FileReader;
 use super::chunk::load_chunk;
 use super::connections::Connections;
@@ -56,6 +56,9 @@ fn scan_record(
             let chunk = load_chunk(reader, place)?;
             let mut at = 0;
             while at < chunk.len() {
+                if too_many(entries.len(), reader.size()) {
+                    return Err(reader.damaged(place, "the number of messages to here", entries.len()));
+                }
                 let walked = record_in(&chunk, at).ok_or("longer than the chunk".to_owned());
                 let walked = walked.and_then(|(fields, data)| {
                     match fields.op() {

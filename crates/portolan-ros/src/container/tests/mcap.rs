@@ -235,3 +235,37 @@ fn other_encodings_are_left_out_and_told() {
     let rest: Vec<_> = run.iter().filter(|m| m.0 == "/scan").cloned().collect();
     holds(&bag, &rest);
 }
+
+#[test]
+fn threads_read_one_bag() {
+    let run = run(200);
+    for file in [built(&run, 7, Some(Packing::Zstd)).0, super::sqlite::built(&run)] {
+        let bag = open(&[&file], false).unwrap();
+        let (messages, expected) = (bag.messages(&[0, 1]), in_order(&run));
+        std::thread::scope(|scope| {
+            for start in 0..4 {
+                let (bag, messages, expected) = (&bag, &messages, &expected);
+                scope.spawn(move || {
+                    let mut data = Vec::new();
+                    for i in (0..messages.len()).map(|i| (i * 37 + start * 50) % messages.len()) {
+                        bag.read(&messages[i], &mut data).unwrap();
+                        assert!(data == expected[i].2);
+                    }
+                });
+            }
+        });
+    }
+}
+
+#[test]
+fn bombs_are_refused() {
+    // Nothing but zeros, as a file that is compressed as a whole: 80 MB of 8 kB.
+    let bomb = pack(Some(Packing::Zstd), &vec![0; 80 << 20]);
+    assert!(bomb.len() < 20_000);
+    says(open(&[&bomb], true), "unpacks to more than 67108864 bytes, 1000 times its size");
+    // Two million empty messages in a chunk of few bytes.
+    let run = vec![("/scan".to_owned(), 7, Vec::new()); 2_000_000];
+    let (file, _) = built(&run, run.len(), Some(Packing::Zstd));
+    assert!(file.len() < 100_000);
+    says(open(&[&file], false), "the number of messages at byte");
+}
