@@ -254,7 +254,7 @@ import binascii, random, sqlite3, sys
 rng = random.Random(int(sys.argv[2])); path = sys.argv[1]
 db = sqlite3.connect(path, isolation_level=None)
 size = rng.choice([512, 1024, 4096, 65536])
-db.execute('pragma page_size=%d' % size); db.execute('pragma auto_vacuum=%d' % rng.choice([0, 1, 2]))
+db.execute('pragma synchronous=off'); db.execute('pragma page_size=%d' % size); db.execute('pragma auto_vacuum=%d' % rng.choice([0, 1, 2]))
 db.execute("pragma encoding='%s'" % rng.choice(['UTF-8', 'UTF-16le', 'UTF-16be']))
 cols = ['id INTEGER PRIMARY KEY', 'topic_id INTEGER NOT NULL', 'timestamp INTEGER NOT NULL', 'data BLOB NOT NULL']
 if rng.random() < .5: rng.shuffle(cols)
