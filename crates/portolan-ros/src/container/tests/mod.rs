@@ -4,5 +4,6 @@ mod damage;
 mod mcap;
 mod real;
 mod ros1;
+mod rosbags;
 mod sqlite;
 mod support;
