@@ -152,6 +152,15 @@ fn saturated_cells_answer_at_least_so_far() {
     assert_eq!(rows, ["1,1,known,,1,,,0,0,", "3,1,saturated,,-2,,-2,,,"]);
 }
 
+/// The only message of a topic of a bag.
+fn message(path: &std::path::Path, topic: &str) -> Vec<u8> {
+    let bag = portolan_ros::container::Bag::open(path, &Default::default()).unwrap();
+    let number = bag.topics().iter().position(|t| t.name == topic).unwrap();
+    let mut bytes = Vec::new();
+    bag.read(&bag.messages(&[number as u32])[0], &mut bytes).unwrap();
+    bytes
+}
+
 #[test]
 fn conversions_agree_with_what_map_wrote() {
     let (folder, log) = room();
@@ -170,6 +179,23 @@ fn conversions_agree_with_what_map_wrote() {
     }
     succeed(["convert", arg(&out.join("map.portolan")), arg(&to("b.yaml"))]);
     assert_eq!(read(&to("b.pgm")), read(&out.join("map.pgm")));
+    // The grid of the messages is the image, rows from below.
+    for (input, name) in [(out.clone(), "a.mcap"), (out.join("map.yaml"), "b.mcap")] {
+        succeed(["convert", arg(&input), arg(&to(name))]);
+        let pgm = portolan_io::Pgm::read(out.join("map.pgm")).unwrap();
+        let value = |v: &u16| {
+            if *v == 254 {
+                0
+            } else if *v == 0 {
+                100
+            } else {
+                255
+            }
+        };
+        let cells: Vec<u8> = pgm.pixels.chunks(pgm.width).rev().flatten().map(value).collect();
+        assert!(message(&to(name), "/map").ends_with(&cells), "{name}");
+        assert!(message(&to(name), "/occupied").len() > 1000 && message(&to(name), "/contour").len() > 1000);
+    }
     succeed(["mesh", arg(&out), arg(&to("m.geojson"))]);
     assert_eq!(read(&to("m.geojson")), read(&out.join("contour.geojson")));
     succeed(["convert", arg(&out.join("contour.geojson")), arg(&to("c.svg"))]);

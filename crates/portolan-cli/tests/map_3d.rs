@@ -243,7 +243,7 @@ fn held_out_scans_are_predicted_and_meshes_compared() {
     let compared = json(["eval", arg(&out), "--reference", arg(&same), "--json"]);
     assert!(compared["reference"]["accuracy"]["p95"].as_f64().unwrap() < 1e-4, "{compared}");
     assert!(compared["reference"]["f_scores"][0].as_f64().unwrap() > 0.999, "{compared}");
-    for name in ["a.bt", "a.ot", "a.bin", "a.ply", "a.portolan"] {
+    for name in ["a.bt", "a.ot", "a.bin", "a.ply", "a.mcap", "a.portolan"] {
         let to = folder.path().join(name);
         succeed(["convert", arg(&out), arg(&to)]);
         assert!(to.metadata().unwrap().len() > 100, "{name}");

@@ -69,6 +69,11 @@ pub(super) fn files(path: &Path) -> Result<Files> {
     Ok(files)
 }
 
+/// Whether a folder holds files with the names of bags, at least one; what they are is seen when they are opened.
+pub fn holds_bags(folder: &Path) -> bool {
+    bag_files(folder).is_ok_and(|files| !files.is_empty())
+}
+
 /// All bags of the folder, as one that was split.
 fn without_description(name: String, paths: Vec<PathBuf>) -> Result<Files> {
     let mut kinds: Vec<String> = paths.iter().filter_map(|p| bag_ending(&file_name(p))).collect();
@@ -206,6 +211,8 @@ mod tests {
         let both = folder(&["b_0.db3", "b_1.db3"], Some(inline));
         assert_eq!(found(&both), (vec!["b_1.db3".into(), "b_0.db3".into()], 0));
         assert!(files(&both.path().join(METADATA)).unwrap().described);
+        assert!(holds_bags(both.path()) && !holds_bags(folder(&["a.txt"], Some(inline)).path()));
+        assert!(!holds_bags(&both.path().join("b_0.db3")));
     }
 
     #[test]

@@ -35,6 +35,12 @@ pub(crate) struct Entry {
 /// `within` of a message that lies in no chunk.
 pub(crate) const NO_CHUNK: u32 = u32::MAX;
 
+/// Whether a file of `size` bytes says that it has more messages than can be true: one for every two of its bytes, and a
+/// million, as those of a compressed chunk may be many. Bytes made for it could ask for any memory otherwise.
+pub(crate) fn too_many(messages: usize, size: u64) -> bool {
+    messages as u64 > size / 2 + (1 << 20)
+}
+
 /// What is told where damage is allowed.
 pub(crate) fn told(error: &BagError, consequence: &str) -> String {
     match error {

@@ -2,7 +2,8 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `bag` | [`Bag`]: opening, the index, reading by place and in one pass |
+//! | `bag`, `open` | [`Bag`]: the index, reading by place and in one pass; opening |
+//! | `summary` | what a bag holds, for people: rates, gaps, clocks, compression |
 //! | `topic` | [`Topic`] and [`MessageRef`] |
 //! | `source`, `reader` | where bytes come from; bounded reads at a place |
 //! | `kind`, `folder` | what a file is by its first bytes; the files of a folder |
@@ -18,16 +19,21 @@ mod folder;
 mod index;
 mod kind;
 mod mcap;
+mod open;
 mod reader;
 mod ros1;
 mod source;
 mod sqlite;
+mod summary;
 #[cfg(test)]
 mod tests;
 mod topic;
 mod unpack;
 
-pub use bag::{Bag, BagOptions, TopicCount};
+pub use bag::{Bag, TopicCount};
+pub use folder::holds_bags;
 pub use kind::ContainerKind;
+pub use open::BagOptions;
 pub use source::{BytesSource, FileSource, ReadSeek, Source};
+pub use summary::{BagSummary, TopicSummary};
 pub use topic::{DefinitionFormat, Encoding, MessageRef, Topic};

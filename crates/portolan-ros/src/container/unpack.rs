@@ -14,6 +14,12 @@ pub(crate) const ZSTD_MAGIC: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
 /// size.
 pub(crate) const UNPACKED_LIMIT: u64 = 1 << 30;
 
+/// A file that is compressed as a whole may become so many times as large: noise-free depth images reach a hundred, and
+/// bytes made for it could fill any disk.
+const MOST_TIMES: u64 = 1000;
+/// And so many bytes in any case.
+const LEAST: u64 = 64 << 20;
+
 /// How a chunk is compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Packing {
@@ -23,6 +29,15 @@ pub(crate) enum Packing {
 }
 
 impl Packing {
+    /// Its name in containers.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Zstd => "zstd",
+            Self::Lz4 => "lz4",
+            Self::Bz2 => "bz2",
+        }
+    }
+
     /// Unpacks `packed`, which must give exactly `size` bytes; the reason where it does not. Memory grows as bytes
     /// arrive, so that a size in a file costs nothing.
     pub(crate) fn unpack(self, packed: &[u8], size: u64) -> Result<Vec<u8>, String> {
@@ -47,7 +62,7 @@ impl Packing {
             Self::Bz2 => read(&mut bzip2::bufread::MultiBzDecoder::new(packed)),
         };
         match result {
-            Err(e) => Err(format!("damaged {self:?} data ({e})").to_lowercase()),
+            Err(e) => Err(format!("damaged {} data ({e})", self.name())),
             Ok(_) if unpacked.len() as u64 > limit => Err(format!("unpacked to more than {limit} bytes")),
             Ok(_) => Ok(unpacked),
         }
@@ -70,7 +85,10 @@ impl Unpacked {
             let name = name.clone();
             move |cause| BagError::Os { name, action, cause }
         };
-        let packed = source.open().map_err(failed("open it"))?;
+        let mut packed = source.open().map_err(failed("open it"))?;
+        let size = packed.seek(SeekFrom::End(0)).map_err(failed("find its size"))?;
+        packed.seek(SeekFrom::Start(0)).map_err(failed("read it"))?;
+        let limit = size.saturating_mul(MOST_TIMES).max(LEAST);
         let mut decoder = zstd::stream::read::Decoder::new(packed).map_err(failed("unpack it"))?;
         let mut file = tempfile::tempfile().map_err(failed("make a temporary file to unpack it into"))?;
         let mut buffer = vec![0; 1 << 17];
@@ -81,6 +99,15 @@ impl Unpacked {
                 Ok(0) => break,
                 Ok(n) => {
                     total += n as u64;
+                    if total > limit {
+                        let reason =
+                            format!("unpacks to more than {limit} bytes, {MOST_TIMES} times its size");
+                        return Err(BagError::Refused {
+                            name,
+                            reason,
+                            advice: "unpack it by `zstd -d`".into(),
+                        });
+                    }
                     file.write_all(&buffer[..n]).map_err(failed("unpack it to a temporary file"))?;
                 }
                 Err(e) if keep_part => {

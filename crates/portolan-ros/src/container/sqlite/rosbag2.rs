@@ -244,7 +244,7 @@ fn read_topics(
                 ));
             }
         };
-        let topic = topic.and_then(|encoding| {
+        let topic = topic.map(|encoding| {
             let none = (String::new(), String::new());
             let (language, definition) = definitions.get(&type_name).unwrap_or(&none);
             let definition_format = match language.as_str() {
@@ -255,7 +255,7 @@ fn read_topics(
                 _ => DefinitionFormat::Missing,
             };
             let missing = definition_format == DefinitionFormat::Missing;
-            Ok(Topic {
+            Topic {
                 name,
                 type_name,
                 encoding,
@@ -263,7 +263,7 @@ fn read_topics(
                 definition: if missing { String::new() } else { definition.clone() },
                 publisher: None,
                 latched: matches!(profiles, Value::Text(p) if is_transient_local(&p)),
-            })
+            }
         });
         channels.push(Channel { id, topic });
         Ok(())

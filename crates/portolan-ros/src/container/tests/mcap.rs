@@ -41,12 +41,12 @@ pub(super) fn built(run: &[Written], per_chunk: usize, packing: Option<Packing>)
             chunk.extend(record(5, &[&head, &bytes[..]].concat()));
         }
         let packed = pack(packing, &chunk);
-        let name = packing.map(|p| format!("{p:?}").to_lowercase()).unwrap_or_default();
+        let name = packing.map_or("", Packing::name);
         let size = (chunk.len() as u64).to_le_bytes();
         let crc = crc32fast::hash(&chunk).to_le_bytes();
         let packed_size = (packed.len() as u64).to_le_bytes();
         places.push(file.len());
-        let body = [&[0; 16], &size[..], &crc, &string(&name), &packed_size, &packed].concat();
+        let body = [&[0; 16], &size[..], &crc, &string(name), &packed_size, &packed].concat();
         file.extend(record(6, &body));
     }
     file.extend(record(15, &[0; 4]));
@@ -116,13 +116,18 @@ fn chunks_of_every_compression_are_unpacked() {
     let run = run(90);
     for packing in [None, Some(Packing::Zstd), Some(Packing::Lz4)] {
         let (file, _) = built(&run, 7, packing);
-        holds(&open(&[&file], false).unwrap(), &run);
+        let bag = open(&[&file], false).unwrap();
+        holds(&bag, &run);
+        let chunks = [(packing.map_or("none", Packing::name), 90u64.div_ceil(7))].into();
+        assert_eq!(bag.summary().unwrap().chunks, chunks);
         // Split, and packed as a whole.
         let (a, b) = run.split_at(41);
         let files = [built(a, 9, packing).0, pack(Some(Packing::Zstd), &built(b, 9, packing).0)];
         let bag = open(&[&files[0], &files[1]], false).unwrap();
         assert_eq!(bag.topics().len(), 2);
-        assert_eq!(bag.files().count(), 2);
+        let summary = bag.summary().unwrap();
+        assert_eq!((summary.files, summary.packed_files, summary.messages), (2, 1, 90));
+        assert_eq!(summary.bytes, bag.files().map(|f| f.1).sum());
         holds(&bag, &run);
     }
 }
@@ -229,4 +234,38 @@ fn other_encodings_are_left_out_and_told() {
     assert!(bag.notes().iter().any(|n| n.ends_with(note)), "{:?}", bag.notes());
     let rest: Vec<_> = run.iter().filter(|m| m.0 == "/scan").cloned().collect();
     holds(&bag, &rest);
+}
+
+#[test]
+fn threads_read_one_bag() {
+    let run = run(200);
+    for file in [built(&run, 7, Some(Packing::Zstd)).0, super::sqlite::built(&run)] {
+        let bag = open(&[&file], false).unwrap();
+        let (messages, expected) = (bag.messages(&[0, 1]), in_order(&run));
+        std::thread::scope(|scope| {
+            for start in 0..4 {
+                let (bag, messages, expected) = (&bag, &messages, &expected);
+                scope.spawn(move || {
+                    let mut data = Vec::new();
+                    for i in (0..messages.len()).map(|i| (i * 37 + start * 50) % messages.len()) {
+                        bag.read(&messages[i], &mut data).unwrap();
+                        assert!(data == expected[i].2);
+                    }
+                });
+            }
+        });
+    }
+}
+
+#[test]
+fn bombs_are_refused() {
+    // Nothing but zeros, as a file that is compressed as a whole: 80 MB of 8 kB.
+    let bomb = pack(Some(Packing::Zstd), &vec![0; 80 << 20]);
+    assert!(bomb.len() < 20_000);
+    says(open(&[&bomb], true), "unpacks to more than 67108864 bytes, 1000 times its size");
+    // Two million empty messages in a chunk of few bytes.
+    let run = vec![("/scan".to_owned(), 7, Vec::new()); 2_000_000];
+    let (file, _) = built(&run, run.len(), Some(Packing::Zstd));
+    assert!(file.len() < 100_000);
+    says(open(&[&file], false), "the number of messages at byte");
 }

@@ -109,3 +109,21 @@ fn the_file_that_is_there_is_taken_and_told() {
     let latched: Vec<_> = bag.topics().iter().filter(|t| t.latched).map(|t| t.name.as_str()).collect();
     assert!(latched.contains(&"/tf_static") && !latched.contains(&"/tf"), "{latched:?}");
 }
+
+#[test]
+fn rates_are_those_of_the_sensors() {
+    let Some(path) = real_data("ros_bags/jackal/run_ros2") else { return };
+    let bag = Bag::open(path, &BagOptions::default()).unwrap();
+    let summary = bag.summary().unwrap();
+    let topic = |name: &str| {
+        let topic = bag.topics().iter().position(|t| t.name == name).unwrap();
+        summary.topics[topic]
+    };
+    let (scan, pose) = (topic("/scan"), topic("/vrpn_client_node/jackal/pose"));
+    let rates = [scan, pose].map(|t| (t.rate.unwrap() * 1000.0).round() / 1000.0);
+    // By Python's sqlite3 from the same rows.
+    assert_eq!(rates, [9.915, 100.108]);
+    assert_eq!([scan, pose].map(|t| t.largest_gap.unwrap().1), [104_811_610, 520_031_218]);
+    assert!(summary.chunks.is_empty() && summary.messages == 414 + 4734);
+    assert_eq!(summary.log_times, Some((1_771_361_671_784_279_464, 1_771_361_713_544_203_437)));
+}

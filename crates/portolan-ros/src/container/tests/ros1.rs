@@ -64,7 +64,7 @@ pub(super) fn built(
             chunk.extend(record(&[("op", &[2]), ("conn", &id_bytes), ("time", &stamp(*time))], bytes));
         }
         let packed = pack(packing, &chunk);
-        let name = packing.map_or("none".into(), |p| format!("{p:?}").to_lowercase());
+        let name = packing.map_or("none", Packing::name);
         let size = (chunk.len() as u32).to_le_bytes();
         places.push(file.len());
         file.extend(record(&[("op", &[5]), ("compression", name.as_bytes()), ("size", &size)], &packed));
@@ -109,6 +109,8 @@ fn chunks_of_every_compression_with_and_without_index() {
             );
             assert!(topic.latched && !bag.topics()[1].latched);
             holds(&open(&[&file], true).unwrap(), &run);
+            let chunks = [(packing.map_or("none", Packing::name), 100u64.div_ceil(8))].into();
+            assert_eq!(bag.summary().unwrap().chunks, chunks);
         }
     }
     let (a, b) = run.split_at(30);

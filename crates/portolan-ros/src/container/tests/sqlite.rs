@@ -254,7 +254,7 @@ import binascii, random, sqlite3, sys
 rng = random.Random(int(sys.argv[2])); path = sys.argv[1]
 db = sqlite3.connect(path, isolation_level=None)
 size = rng.choice([512, 1024, 4096, 65536])
-db.execute('pragma page_size=%d' % size); db.execute('pragma auto_vacuum=%d' % rng.choice([0, 1, 2]))
+db.execute('pragma synchronous=off'); db.execute('pragma page_size=%d' % size); db.execute('pragma auto_vacuum=%d' % rng.choice([0, 1, 2]))
 db.execute("pragma encoding='%s'" % rng.choice(['UTF-8', 'UTF-16le', 'UTF-16be']))
 cols = ['id INTEGER PRIMARY KEY', 'topic_id INTEGER NOT NULL', 'timestamp INTEGER NOT NULL', 'data BLOB NOT NULL']
 if rng.random() < .5: rng.shuffle(cols)
@@ -264,7 +264,7 @@ for i in range(1, 40): db.execute('insert into topics values(?,?,?,?)', (i, '/t\
 db.execute('begin')
 for i in range(400):
     length = rng.choice([0, rng.randint(0, size), rng.randint(size - 60, size), rng.randint(0, 4 * size)])
-    db.execute('insert into messages(topic_id,timestamp,data) values(?,?,?)', (rng.randint(1, 39), rng.choice([0, 1, -5, 127, 2**40, rng.randint(0, 2**62)]), b'\0' + bytes(rng.getrandbits(8) for _ in range(length))))
+    db.execute('insert into messages(topic_id,timestamp,data) values(?,?,?)', (rng.randint(1, 39), rng.choice([0, 1, -5, 127, 2**40, rng.randint(0, 2**62)]), b'\0' + rng.randbytes(length)))
 db.execute('commit')
 if rng.random() < .5: db.execute('delete from messages where rowid % 3 = 0')
 if rng.random() < .3: db.execute('insert into messages(id,topic_id,timestamp,data) values(-7,1,9,zeroblob(3000))')

@@ -13,7 +13,7 @@ pub(super) type Written = (String, i64, Vec<u8>);
 /// Messages of two topics, times not in order and some equal.
 pub(super) fn run(count: usize) -> Vec<Written> {
     let message = |i: usize| {
-        let name = if i % 3 == 0 { "/tf" } else { "/scan" };
+        let name = if i.is_multiple_of(3) { "/tf" } else { "/scan" };
         let mut bytes = vec![0, 1, 0, 0];
         bytes.extend((0..(i * 37) % 700).map(|k| (i * 7 + k / 3) as u8));
         (name.to_owned(), 1_700_000_000_000_000_000 + ((i * 5) % count / 2) as i64, bytes)
