@@ -20,17 +20,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for message in bag.messages(&topics) {
             bag.read(&message, &mut data)?;
             let hash = &mut hashes[message.topic as usize];
-<<<<<<< HEAD
-            for byte in
-                message.log_time.to_le_bytes().iter().chain(&(data.len() as u64).to_le_bytes()).chain(&data)
-            {
-                *hash = (*hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
-            }
-=======
             hash.update(&message.log_time.to_le_bytes());
             hash.update(&(data.len() as u64).to_le_bytes());
             hash.update(&data);
->>>>>>> bags
         }
         let start = Instant::now();
         let mut bytes = 0;
@@ -42,15 +34,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut lines: Vec<String> = Vec::new();
         for ((topic, count), hash) in bag.topics().iter().zip(bag.counts()).zip(hashes) {
             let (first, last) = count.log_times.unwrap_or_default();
-<<<<<<< HEAD
-            lines.push(format!(
-                "{} {} {} {first} {last} {hash:016x}",
-=======
             let publisher = topic.publisher.as_deref().unwrap_or("-");
             let (hash, latched) = (hash.finalize(), u8::from(topic.latched));
             lines.push(format!(
                 "{} {} {publisher} {latched} {} {first} {last} {hash:08x}",
->>>>>>> bags
                 topic.name, topic.type_name, count.messages
             ));
         }
