@@ -56,6 +56,7 @@ fn info_lists_a_bag_and_its_line_maps_it() {
 fn options_of_bags_are_for_bags() {
     let (_folder, log) = support::room();
     let out = tempfile::tempdir().unwrap();
-    let error = fail(2, ["map", arg(&log), "--out", arg(out.path()), "--topic", "/scan"]);
+    let error =
+        fail(2, ["map", arg(&log), "--resolution", "0.05", "--out", arg(out.path()), "--topic", "/scan"]);
     assert!(error.contains("--topic is only for bags"), "{error}");
 }

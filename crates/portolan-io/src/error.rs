@@ -101,7 +101,7 @@ pub enum IoError {
         /// The bag.
         path: PathBuf,
         /// What is wrong.
-        cause: portolan_ros::BagError,
+        cause: Box<portolan_ros::BagError>,
     },
     /// The format cannot hold what the caller wants to write or to combine.
     #[error("{}: {field} is {value}; {advice}", shown_path(path))]
@@ -177,7 +177,7 @@ impl IoError {
     }
 
     pub(crate) fn bag(path: &Path) -> impl Fn(portolan_ros::BagError) -> Self + Copy + '_ {
-        move |cause| Self::Bag { path: path.into(), cause }
+        move |cause| Self::Bag { path: path.into(), cause: Box::new(cause) }
     }
 
     pub(crate) fn os(path: &Path, action: &'static str, cause: std::io::Error) -> Self {

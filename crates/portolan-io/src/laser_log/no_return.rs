@@ -272,6 +272,30 @@ mod tests {
         assert_eq!(detect_no_return(&robot(0.0, "1 2 3 4 7")), None);
     }
 
+    /// A declared maximum is believed and a pile is no surface, whatever the share of beams without echo.
+    #[test]
+    fn the_share_of_beams_without_echo_does_not_matter() {
+        for share in [0.3, 0.45, 0.55, 0.7, 0.97] {
+            for code in [5.6, 81.91] {
+                between(0.99 * code, code, &log(2.5, 50, |r, _, _| sometimes(r, share, &[code])));
+            }
+            // Readings without echo lie beyond the declared maximum.
+            let mut random = Random(7);
+            let mut text = String::new();
+            for _ in 0..50 {
+                text.push_str("ROBOTLASER1 0 -1.57 3.12 0.0174 5.6 0.01 0 180");
+                for _ in 0..180 {
+                    let reading = sometimes(&mut random, share, &[6.6]).unwrap_or(2.0 + 0.05 * random.unit());
+                    write!(text, " {reading:.2}").unwrap();
+                }
+                text.push_str(" 0 0 0 0 0 0 0 0 0 0 0 0 0 h 0\n");
+            }
+            between(5.5, 5.6, &parse(text));
+        }
+        // What all beams read may be a surface: a round room.
+        assert_eq!(detect_no_return(&log(2.5, 50, |_, _, _| Some(3.0))), None);
+    }
+
     #[test]
     fn real_logs_are_understood() {
         for (name, real, code) in [

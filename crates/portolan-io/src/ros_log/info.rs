@@ -2,19 +2,19 @@
 
 use std::path::Path;
 
-use portolan_ros::container::MessageRef;
+use portolan_ros::container::TopicSummary;
 use portolan_ros::message::Header;
 use portolan_ros::transforms::FrameTree;
 
 use super::pose_source::PoseSource;
 use super::{BagLogStats, Contents};
-use crate::Result;
 use crate::scan_log::ScanLogOptions;
+use crate::{IoError, Result};
 
 /// How many messages of a topic are looked at for frames and delays.
 const LOOKED_AT: usize = 24;
 
-/// A topic of a bag.
+/// A topic of a bag; one of several publishers is listed for each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TopicOfBag {
     /// Its name.
@@ -24,13 +24,15 @@ pub struct TopicOfBag {
     /// Messages.
     pub messages: u64,
     /// Who publishes it, where the bag says so.
-    pub publishers: Vec<String>,
+    pub publisher: Option<String>,
     /// The first and the last log time (seconds); `None` without messages.
     pub log_times: Option<[f64; 2]>,
     /// Messages a second: by the median time between two; `None` for fewer than two.
     pub rate: Option<f64>,
     /// The longest time between two messages (seconds).
     pub longest_gap: f64,
+    /// How often the recorder's clock steps back, and by how much at most (seconds).
+    pub steps_back: (u64, f64),
     /// The frames of its headers, of the messages that were looked at.
     pub frames: Vec<String>,
     /// Log time less stamp of the messages that were looked at: the least and the largest (seconds); `None`: no header.
@@ -65,6 +67,8 @@ pub struct BagInfo {
     pub container: String,
     /// Files and their bytes.
     pub files: Vec<(String, u64)>,
+    /// How many chunks are compressed how; empty for containers without chunks.
+    pub chunks: Vec<(&'static str, u64)>,
     /// The first and the last log time (seconds); `None` without messages.
     pub log_times: Option<[f64; 2]>,
     /// All topics, by name.
@@ -92,22 +96,18 @@ impl BagInfo {
     pub fn read(path: impl AsRef<Path>, options: &ScanLogOptions) -> Result<Self> {
         let contents = Contents::open(path.as_ref(), &options.bag)?;
         let bag = &contents.bag;
-        let all: Vec<u32> = (0..bag.topics().len() as u32).collect();
-        let messages = bag.messages(&all);
+        let summary = bag.summary().map_err(IoError::bag(path.as_ref()))?;
         let mut info = Self {
             container: bag.kind().map_or("no file".into(), |kind| kind.to_string()),
             files: bag.files().map(|(name, bytes)| (name.to_owned(), bytes)).collect(),
-            log_times: messages
-                .first()
-                .zip(messages.last())
-                .map(|(a, b)| [a, b].map(|m| seconds(m.log_time))),
+            log_times: summary.log_times.map(|(a, b)| [a, b].map(seconds)),
+            chunks: summary.chunks.into_iter().collect(),
             notes: bag.notes().to_vec(),
             ..Self::default()
         };
-        let mut names: Vec<String> = bag.topics().iter().map(|t| t.name.clone()).collect();
-        names.sort();
-        names.dedup();
-        info.topics = names.iter().map(|name| topic(&contents, name, &messages)).collect();
+        info.topics =
+            (0u32..).zip(&summary.topics).map(|(number, about)| topic(&contents, number, about)).collect();
+        info.topics.sort_by(|a, b| (&a.name, &a.publisher).cmp(&(&b.name, &b.publisher)));
         let tree = info.choose(&contents, options)?;
         info.roots = tree.roots().into_iter().map(str::to_owned).collect();
         info.edges = tree
@@ -135,9 +135,12 @@ impl BagInfo {
             }
         };
         self.dimension = Some(sensors.dimension);
-        let of = |name: &String| self.topics.iter().find(|t| t.name == *name);
-        let mut frames: Vec<String> =
-            sensors.names.iter().filter_map(of).flat_map(|t| t.frames.clone()).collect();
+        let mut frames: Vec<String> = sensors
+            .names
+            .iter()
+            .flat_map(|name| self.topics.iter().filter(move |t| t.name == *name))
+            .flat_map(|t| t.frames.clone())
+            .collect();
         frames.dedup();
         let mut stats = BagLogStats { guesses: sensors.guesses, ..BagLogStats::default() };
         match PoseSource::choose(contents, &options.bag, options.time_tolerance, &frames, &mut stats) {
@@ -169,23 +172,23 @@ fn seconds(nanoseconds: i64) -> f64 {
     nanoseconds as f64 * 1e-9
 }
 
-fn topic(contents: &Contents, name: &str, messages: &[MessageRef]) -> TopicOfBag {
-    let numbers = contents.numbers(name);
-    let own: Vec<MessageRef> = messages.iter().filter(|m| numbers.contains(&m.topic)).copied().collect();
-    let mut topic = TopicOfBag { name: name.to_owned(), messages: own.len() as u64, ..TopicOfBag::default() };
-    for number in &numbers {
-        let about = &contents.bag.topics()[*number as usize];
-        topic.type_name.clone_from(&about.type_name);
-        topic.publishers.extend(about.publisher.clone());
-        topic.is_read |= contents.kind(*number).is_some();
-    }
-    topic.log_times = own.first().zip(own.last()).map(|(a, b)| [a, b].map(|m| seconds(m.log_time)));
-    let mut gaps: Vec<f64> = own.windows(2).map(|w| seconds(w[1].log_time - w[0].log_time)).collect();
-    topic.longest_gap = gaps.iter().copied().fold(0.0, f64::max);
-    gaps.sort_by(f64::total_cmp);
-    topic.rate = gaps.get(gaps.len() / 2).filter(|g| **g > 0.0).map(|g| 1.0 / g);
+fn topic(contents: &Contents, number: u32, summary: &TopicSummary) -> TopicOfBag {
+    let about = &contents.bag.topics()[number as usize];
+    let mut topic = TopicOfBag {
+        name: about.name.clone(),
+        type_name: about.type_name.clone(),
+        messages: summary.messages,
+        publisher: about.publisher.clone(),
+        log_times: summary.log_times.map(|(a, b)| [a, b].map(seconds)),
+        rate: summary.rate,
+        longest_gap: summary.largest_gap.map_or(0.0, |(_, gap)| gap as f64 * 1e-9),
+        steps_back: (summary.steps_back, summary.largest_step_back as f64 * 1e-9),
+        is_read: contents.kind(number).is_some(),
+        ..TopicOfBag::default()
+    };
     // Topics of other types may have headers, too; those without, or whose definition is not there, have nothing to show.
-    if let Ok(decoders) = contents.decoders(&numbers) {
+    if let Ok(decoders) = contents.decoders(&[number]) {
+        let own = contents.bag.messages(&[number]);
         for message in own.iter().step_by(own.len().div_ceil(LOOKED_AT).max(1)) {
             let Ok(header) = contents.read(message, &decoders, Header::of) else { break };
             if !topic.frames.contains(&header.frame) {

@@ -391,7 +391,7 @@ fn a_turn_that_ends_at_the_stamp_is_told() {
             run.pose("/mocap", "world", start + t, at(t, 0.0, 0.0, LEVEL));
             if k > 2 && k < 38 {
                 let readings = [1.0; 90];
-                run.scan_at("/scan", "laser", start + t + delay, start + t, [-3.14, 0.0698], &readings);
+                run.scan_at("/scan", "laser", start + t + delay, start + t, [-3.1, 0.0698], &readings);
             }
         }
         run.save()

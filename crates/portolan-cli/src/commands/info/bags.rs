@@ -30,7 +30,8 @@ fn quoted(word: &str) -> String {
 fn document(info: &BagInfo, command: Option<&str>) -> Value {
     let topic = |t: &TopicOfBag| {
         json!({
-            "name": t.name, "type": t.type_name, "messages": t.messages, "publishers": t.publishers,
+            "name": t.name, "type": t.type_name, "messages": t.messages, "publisher": t.publisher,
+            "steps_back": { "count": t.steps_back.0, "largest": t.steps_back.1 },
             "log_times": t.log_times, "rate": t.rate, "longest_gap": t.longest_gap, "frames": t.frames,
             "delay": t.delay, "read": t.is_read,
         })
@@ -45,6 +46,7 @@ fn document(info: &BagInfo, command: Option<&str>) -> Value {
     json!({
         "container": info.container,
         "files": files.collect::<Vec<_>>(),
+        "chunks": info.chunks.iter().map(|(packing, n)| json!({ "packing": packing, "count": n })).collect::<Vec<_>>(),
         "log_times": info.log_times,
         "topics": info.topics.iter().map(topic).collect::<Vec<_>>(),
         "frames": { "edges": info.edges.iter().map(edge).collect::<Vec<_>>(), "roots": info.roots },
@@ -63,8 +65,14 @@ fn text(info: &BagInfo, command: Option<&str>) -> String {
     let _ = writeln!(text, "  topics:");
     for t in &info.topics {
         let _ = write!(text, "    {} ({}): {} messages", t.name, t.type_name, t.messages);
+        if let Some(publisher) = &t.publisher {
+            let _ = write!(text, " by {publisher}");
+        }
         if let Some(rate) = t.rate {
             let _ = write!(text, ", {rate:.1} Hz, longest gap {:.3} s", t.longest_gap);
+        }
+        if let (steps @ 1.., most) = t.steps_back {
+            let _ = write!(text, ", the clock steps back {steps} times by up to {most:.3} s");
         }
         if !t.frames.is_empty() {
             let _ = write!(text, ", frame {}", t.frames.join(", "));
