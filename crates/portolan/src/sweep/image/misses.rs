@@ -13,7 +13,7 @@ const MOST_SEARCHED: u64 = 1 << 27;
 /// its center) that had a reading saw beyond it, and the pixel that it is in, or one within its width, had one. That is
 /// the smallest of several ranges against one distance: cells on grazing surfaces between two beams are kept, which exact
 /// rays carve. It is missed, too, where its center is half a cell or more before the surface through the four readings around
-/// it, across that surface; or, where those are not of one, where a beam through it saw six cells farther. Blocks, and in them octants, that are wholly free or wholly unseen are found by one look at the nearest and
+/// it, across that surface. Blocks, and in them octants, that are wholly free or wholly unseen are found by one look at the nearest and
 /// the farthest reading in their window.
 #[derive(Clone, Debug, Default)]
 pub(in crate::sweep) struct ProjectiveMisses {

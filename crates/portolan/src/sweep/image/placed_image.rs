@@ -4,7 +4,7 @@ use super::balls::BallWindows;
 use super::lanes::LANES;
 use super::pixels::{PixelProjector, Pixels};
 use super::search::{Class, Classify, Cube};
-use super::sheet::{Before, Sheet};
+use super::sheet::Sheet;
 use super::steps::{STEP_BITS, STEPS};
 use super::window_minima::{RangeTables, WindowMinima, WindowSizes};
 use crate::geom::{BLOCK_EDGE, Lattice, Pose};
@@ -15,9 +15,6 @@ use crate::scan::{Bridges, Projection, RangeImage};
 const MARGIN: f32 = 0.5;
 /// How far before the surface through the readings around it a cell's center must be, across that surface, in cells.
 const BEFORE: f32 = 0.5;
-/// How far beyond a cell a beam through it must have seen where neighboring beams are not of one surface, in cells: so far past
-/// an edge, and less would free cells of surfaces that are met at a slant.
-const PAST: f32 = 6.0;
 /// Half of the width that a cell has for beams, in cells.
 const HALF_WIDTH: f32 = 0.5;
 /// Bits of pixels' readings.
@@ -148,11 +145,7 @@ impl PlacedImage {
             rows: self.rows as i32,
             margin: MARGIN * self.resolution,
             sheet: &self.sheet,
-            before: Before {
-                across: BEFORE * self.resolution,
-                past: PAST * self.resolution,
-                half: [c.max(0.5), r.max(0.5)],
-            },
+            before: if c >= 0.5 && r >= 0.5 { BEFORE * self.resolution } else { f32::INFINITY },
             nearest_of_all,
         };
         let mut bits = free_lanes(&self.projector, center, &self.offsets, &test, &mut pixels);
@@ -243,7 +236,8 @@ struct FreeTest<'a> {
     /// Cells must be nearer than this.
     nearest_of_all: f32,
     sheet: &'a Sheet,
-    before: Before,
+    /// How far before the surface through the readings around it a cell's center must be (meters).
+    before: f32,
 }
 
 /// Which of the points `center + offsets` are nearer than all that the readings in their windows, a bit each.
@@ -283,7 +277,7 @@ fn free_lanes(
     for i in 0..LANES {
         let (column, row, depth) = (pixels.column[i], pixels.row[i], pixels.depth[i]);
         if free[i] == 0 && index[i] != u32::MAX && depth > 0.0 {
-            free[i] = u8::from(test.sheet.is_behind(column, row, depth, &test.before));
+            free[i] = u8::from(test.sheet.is_behind(column, row, depth, test.before));
         }
     }
     let mut bits = 0;

@@ -52,11 +52,10 @@ impl Sheet {
         }
     }
 
-    /// Whether a point is before what the four readings around it saw: by so many meters across their surface, or, where they
-    /// are not of one, by `past` meters along one of their rays that is no further aside than `half` pixels. `column` and
-    /// `row` in steps of a pixel, inside of the image.
+    /// Whether a point is so many meters before the surface through the four readings around it, across that surface. `column` and
+    /// `row` in steps of a pixel.
     #[inline(always)]
-    pub(super) fn is_behind(&self, column: i32, row: i32, depth: f32, how: &Before) -> bool {
+    pub(super) fn is_behind(&self, column: i32, row: i32, depth: f32, across: f32) -> bool {
         if column < 0 || row < 0 {
             return false;
         }
@@ -67,32 +66,14 @@ impl Sheet {
             return false;
         }
         let [u, v] = [column, row].map(|at| (at & (STEPS - 1)) as f32 / STEPS as f32);
-        let value = |linear: f32| if self.is_parallel { linear } else { 1.0 / linear };
         let [a, b] = [self.linear[k], self.linear[k + 1]];
         let [c, d] = [self.linear[k + self.stride], self.linear[k + self.stride + 1]];
-        if self.across[k] > 0.0 {
-            let (above, below) = (a + u * (b - a), c + u * (d - c));
-            let linear = above + v * (below - above);
-            let share = if self.is_parallel { linear - depth } else { 1.0 - depth * linear };
-            return share * self.across[k] > how.across;
-        }
-        let [left, right] = [u <= how.half[0], 1.0 - u <= how.half[0]];
-        let [above, below] = [v <= how.half[1], 1.0 - v <= how.half[1]];
-        let passes = |linear: f32| value(linear) > depth + how.past && linear > 0.0;
-        (above && (left && passes(a) || right && passes(b)))
-            || (below && (left && passes(c) || right && passes(d)))
+        let (above, below) = (a + u * (b - a), c + u * (d - c));
+        let linear = above + v * (below - above);
+        let share = if self.is_parallel { linear - depth } else { 1.0 - depth * linear };
+        // Where the four are not of one surface this is zero.
+        share * self.across[k] > across
     }
-}
-
-/// How far before what beams saw a cell's center must be.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Before {
-    /// Across a surface (meters).
-    pub across: f32,
-    /// Along a ray (meters).
-    pub past: f32,
-    /// Half of a cell's width, in columns and rows, at least half a pixel.
-    pub half: [f32; 2],
 }
 
 /// How far the plane through four readings (left, right; above, below) is from the sensor (meters); where rays are parallel the
@@ -158,13 +139,13 @@ mod tests {
         RangeImage::new(projection.clone(), 32, 20, (0..640).map(value).collect::<Vec<_>>())
     }
 
-    fn sees_past(image: &RangeImage, point: [f64; 3], how: &Before) -> bool {
+    fn sees_past(image: &RangeImage, point: [f64; 3], across: f64) -> bool {
         let projector = PixelProjector::of(image);
         let mut sheet = Sheet::default();
         sheet.fill(&image.values, &projector.projector);
         let mut at = Pixels { column: [0; LANES], row: [0; LANES], depth: [0.0; LANES] };
         projector.pixels(point.map(|v| v as f32), &[[0.0; LANES]; 3], &mut at);
-        sheet.is_behind(at.column[0], at.row[0], at.depth[0], how)
+        sheet.is_behind(at.column[0], at.row[0], at.depth[0], across as f32)
     }
 
     proptest! {
@@ -186,37 +167,28 @@ mod tests {
             let around = [0, 1, 32, 33].map(|k| image.values[pixel.1 * 32 + pixel.0 + k]);
             let steep = around.iter().any(|w| *w <= 0.0 || (w - v).abs() > 0.15 * v);
             prop_assume!(across > 0.02 && !steep);
-            let of = |least: f64| Before { across: least as f32, past: 1e9, half: [0.5; 2] };
             // Directions in steps of a sphere are linear in a small square only, and the steepest of two slopes counts.
             let slack = if kind == 1 { 0.02 } else { 1e-3 };
-            prop_assert!(sees_past(&image, point, &of((1.0 - slack) * across - 0.003)), "{across} {v}");
-            prop_assert!(!sees_past(&image, point, &of((1.0 + slack) * across + 0.003)), "{across} {v}");
+            prop_assert!(sees_past(&image, point, (1.0 - slack) * across - 0.003), "{across} {v}");
+            prop_assert!(!sees_past(&image, point, (1.0 + slack) * across + 0.003), "{across} {v}");
         }
     }
 
     #[test]
-    fn past_an_edge_a_beam_through_the_cell_counts() {
-        // A post at 1 m in columns 0 to 15, a wall at 4 m.
-        let values: Vec<f32> = (0..640).map(|i| if i % 32 < 16 { 1.0 } else { 4.0 }).collect();
+    fn across_an_edge_there_is_no_surface() {
+        // A post at 1 m in columns 0 to 15, a wall at 4 m, and no reading from column 24 on.
+        let values: Vec<f32> =
+            (0..640).map(|i| if i % 32 < 16 { 1.0 } else { 4.0 * f32::from(i % 32 < 24) }).collect();
         let image = RangeImage::new(projection(0), 32, 20, values);
-        let behind = |column: f64, depth: f64| {
+        let at = |column: f64, depth: f64| {
             let on = image.point(0, 9, depth);
-            let x = (column - 15.5) / 30.0 * depth;
-            [x, on[1], depth]
+            [(column - 15.5) / 30.0 * depth, on[1], depth]
         };
-        let how = Before { across: 0.05, past: 0.6, half: [0.5; 2] };
-        assert!(!sees_past(&image, behind(14.0, 2.0), &how), "behind the post");
-        assert!(!sees_past(&image, behind(15.3, 2.0), &how), "the nearest beam ended at the post");
-        assert!(sees_past(&image, behind(15.7, 2.0), &how), "beside the post");
-        assert!(
-            !sees_past(&image, behind(15.7, 3.5), &how),
-            "too near to the wall to tell it from one at a slant"
-        );
-        let wide = Before { half: [0.8, 0.5], ..how };
-        assert!(sees_past(&image, behind(15.3, 2.0), &wide), "the cell is wider than a pixel");
-        // Without a reading nothing is known.
-        let mut open = image.clone();
-        open.values.iter_mut().filter(|v| **v == 4.0).for_each(|v| *v = 0.0);
-        assert!(!sees_past(&open, behind(15.7, 2.0), &how));
+        assert!(sees_past(&image, at(14.5, 0.9), 0.05), "before the post");
+        assert!(!sees_past(&image, at(14.5, 2.0), 0.05), "behind it");
+        assert!(!sees_past(&image, at(15.5, 0.9), 0.05), "between post and wall");
+        assert!(sees_past(&image, at(17.5, 3.9), 0.05), "before the wall");
+        assert!(!sees_past(&image, at(17.5, 3.97), 0.05), "too near to it");
+        assert!(!sees_past(&image, at(23.5, 2.0), 0.05), "beside what is not known");
     }
 }
