@@ -107,7 +107,7 @@ fn the_default_sweep_sees_what_is_before_surfaces() {
         );
         [open, inside]
     });
-    // Measured 0.6 points less, and 0.31 % against 1.16 %.
+    // Measured 0.7 points less, and 0.25 % against 1.16 %.
     assert!(default[0] >= exact[0] - 0.012, "{default:?} {exact:?}");
     assert!(default[1] <= 0.005 && default[1] <= 0.4 * exact[1], "{default:?} {exact:?}");
 }
