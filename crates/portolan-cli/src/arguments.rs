@@ -26,6 +26,11 @@ pub(crate) fn length_or_zero(text: &str) -> Result<f64, String> {
     number_that(text, |v| v >= 0.0 && v.is_finite(), "a finite length in meters, not negative")
 }
 
+/// A length, or infinitely far for `off`.
+pub(crate) fn length_or_off(text: &str) -> Result<f64, String> {
+    if text == "off" { Ok(f64::INFINITY) } else { length(text) }
+}
+
 /// Seconds within a day, of either sign.
 pub(crate) fn seconds(text: &str) -> Result<f64, String> {
     number_that(text, |v| v.abs() <= 86_400.0, "seconds, at most a day")

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use portolan_io::{
-    BagChoice, EsdfFile, FileKind, LaserLog, MapFile, MapServerMap, MeshFormat, OctomapTree, Pgm, PlyMesh,
-    Polyline, bag_dimension, detect, read_geojson, read_mesh,
+    BagChoice, EsdfFile, FileKind, LaserLog, MapFile, MapServerInfo, MapServerMap, MeshFormat, OctomapTree,
+    Pgm, PlyMesh, Polyline, bag_dimension, detect, read_geojson, read_mesh,
 };
 
 use crate::dimension::{Dimension, Given};
@@ -82,9 +82,11 @@ fn readable() -> u64 {
     available_memory().unwrap_or(0).max(4 << 30)
 }
 
-/// The yaml file that belongs to an image.
+/// The yaml file beside an image, if it names that image and no other.
 fn yaml_beside(path: &Path) -> Option<PathBuf> {
-    Some(path.with_extension("yaml")).filter(|p| p.is_file())
+    let yaml = Some(path.with_extension("yaml")).filter(|p| p.is_file())?;
+    let info = MapServerInfo::parse(portolan_io::open(&yaml).ok()?).ok()?;
+    (info.image.file_name() == path.file_name()).then_some(yaml)
 }
 
 impl Source {
@@ -107,13 +109,15 @@ impl Source {
             return file.colors_left_out().then(|| colors.into());
         }
         let Self::Server(map) = self else { return None };
+        let mut all = map.notes.clone();
         let cells = map.unknown_gray_taken_for_free;
-        (cells > 0).then(|| {
-            format!(
+        if cells > 0 {
+            all.push(format!(
                 "{cells} cells have the gray of unknown (205 or 206) but count as free, because free_thresh is above \
                  0.196; lower it to keep them unknown"
-            )
-        })
+            ));
+        }
+        (!all.is_empty()).then(|| all.join("; "))
     }
 
     /// What it is.

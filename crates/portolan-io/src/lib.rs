@@ -52,6 +52,7 @@ mod laser_log;
 mod log_writer;
 mod map_file;
 mod map_messages;
+mod map_picture;
 mod map_server;
 mod mesh;
 mod numpy;

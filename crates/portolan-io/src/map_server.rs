@@ -1,4 +1,4 @@
-//! ROS map_server maps: a yaml file that names an image, and the image (`P5`/`P2` gray map).
+//! ROS map_server maps: a yaml file that names an image, and the image (`P5`/`P2` gray map, or PNG).
 //!
 //! A pixel `v` of a map with white `w` has the occupancy `p = (w - v) / w`, or `v / w` with `negate`. Modes:
 //!
@@ -10,6 +10,7 @@
 //!
 //! The first row of the image is the top of the map; the grids here have y up.
 
+use std::borrow::Cow;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,7 @@ use portolan::geom::{Grid, Pose};
 
 use crate::bytes::{Input, Lines, open, parse_f64};
 use crate::error::shown;
+use crate::map_picture::read_map_picture;
 use crate::{IoError, Pgm, Result, write_atomic};
 
 /// The state of a cell.
@@ -48,7 +50,8 @@ pub struct MapServerInfo {
     pub image: PathBuf,
     /// Edge of a pixel (meters).
     pub resolution: f64,
-    /// Pose of the lower left corner of the lower left pixel: x, y (meters), yaw (radians).
+    /// Pose of the lower left corner of the lower left pixel: x, y (meters), yaw (radians). A yaw that is no number, as some
+    /// savers write it, is NaN.
     pub origin: [f64; 3],
     /// Whether white means occupied.
     pub negate: bool,
@@ -99,6 +102,8 @@ pub struct MapServerMap {
     /// because the file's `free_thresh` is above 0.196 (Nav2's own `depot.yaml` is such a file). They are
     /// free here as they are for ROS; a careful caller warns.
     pub unknown_gray_taken_for_free: usize,
+    /// What was taken for granted, a sentence each.
+    pub notes: Vec<String>,
 }
 
 impl MapServerMap {
@@ -109,13 +114,25 @@ impl MapServerMap {
     pub fn read(yaml: impl AsRef<Path>) -> Result<Self> {
         let yaml = yaml.as_ref();
         let info = MapServerInfo::parse(open(yaml)?)?;
-        let image = Pgm::read(yaml.with_file_name(&info.image))?;
-        Ok(Self::from_image(&image, &info))
+        let (image, moved) = place_of_image(yaml, &info.image);
+        let mut map = Self::from_image(&read_map_picture(&image)?, &info);
+        if moved {
+            let named = info.image.display();
+            map.notes
+                .push(format!("{named} is not there: {} beside the yaml file is taken", image.display()));
+        }
+        Ok(map)
     }
 
     /// The map of an image with these settings (an image alone: [`MapServerInfo::of_image`]).
     pub fn from_image(image: &Pgm, info: &MapServerInfo) -> Self {
         let [x, y, yaw] = info.origin;
+        let (yaw, notes) = match yaw.is_nan() {
+            true => {
+                (0.0, vec!["the yaw of the origin is no number: the map is taken as not turned".to_owned()])
+            }
+            false => (yaw, Vec::new()),
+        };
         let grid = Grid::new([x, y], info.resolution, [image.width, image.height]);
         let table: Vec<_> = (0..=image.max_value).map(|v| cell(v, image.max_value, info)).collect();
         let rows = image.pixels.chunks(image.width.max(1)).rev();
@@ -123,7 +140,7 @@ impl MapServerMap {
         let gray = image.pixels.iter().filter(|v| image.max_value == 255 && matches!(v, 205 | 206));
         let as_free = |v: &&u16| table[usize::from(**v)].0 == MapCell::Free && info.mode == MapMode::Trinary;
         let unknown_gray_taken_for_free = gray.filter(as_free).count();
-        Self { grid, yaw, cells, occupancy, unknown_gray_taken_for_free }
+        Self { grid, yaw, cells, occupancy, unknown_gray_taken_for_free, notes }
     }
 
     /// The pose that turns the grid's frame into the world: the identity without yaw.
@@ -131,6 +148,20 @@ impl MapServerMap {
         let [x, y] = self.grid.lattice.origin;
         let turned = Pose::<2>::new(0.0, 0.0, self.yaw).rotate([x, y]);
         Pose::<2>::new(x - turned[0], y - turned[1], self.yaw)
+    }
+}
+
+/// Where the image of a yaml file is, and whether that is not where the file says: an absolute path of another machine, whose picture
+/// lies beside the yaml file.
+fn place_of_image(yaml: &Path, image: &Path) -> (PathBuf, bool) {
+    let named = yaml.with_file_name(image);
+    let text = image.to_string_lossy();
+    // A path of the other kind of system is not absolute here.
+    let is_elsewhere = image.is_absolute() || text.contains('\\');
+    let last = text.rsplit(['/', '\\']).next().filter(|name| !name.is_empty());
+    match last.map(|name| yaml.with_file_name(name)) {
+        Some(beside) if is_elsewhere && !named.exists() && beside.is_file() => (beside, true),
+        _ => (named, false),
     }
 }
 
@@ -226,8 +257,8 @@ fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {
         };
         // `origin:` may be followed by a list of `- value` lines.
         if let (Some(list), Some(item)) = (&mut list, line.trim_start().strip_prefix("- ")) {
-            match parse_f64(item.trim().as_bytes()).filter(|v| v.is_finite()) {
-                Some(value) if list.len() < 3 => list.push(value),
+            match parse_f64(item.trim().as_bytes()).filter(|v| !v.is_infinite()) {
+                Some(value) if list.len() < 2 && value.is_finite() || list.len() == 2 => list.push(value),
                 _ => return bad("origin", item, "write three finite numbers: x, y, yaw"),
             }
             if let [x, y, yaw] = list[..] {
@@ -237,15 +268,14 @@ fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {
         }
         let Some((key, raw)) = line.split_once(':').map(|(key, raw)| (key, raw.trim())) else { continue };
         let value = unquoted(raw);
+        let value = value.as_ref();
         let number_in = |low: f64, high: f64, field: &str, advice: &str| {
             let number = parse_f64(value.as_bytes()).filter(|v| (low..=high).contains(v));
             number.ok_or_else(|| IoError::text(&path, number_of_line, field, shown(value), advice))
         };
         const SHARE: &str = "write a number from 0 to 1";
-        match unquoted(key.trim()) {
+        match unquoted(key.trim()).as_ref() {
             "image" if value.is_empty() => return bad("image", value, "name the image file"),
-            // In single quotes a quote is written twice.
-            "image" if raw.starts_with('\'') => info.image = PathBuf::from(value.replace("''", "'")),
             "image" => info.image = PathBuf::from(value),
             "resolution" => {
                 let advice = "write metres per pixel, above zero, like 0.05";
@@ -290,23 +320,48 @@ fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {
     Ok(info)
 }
 
-/// A `#` at the start of a word starts a comment.
+/// A `#` at the start of a word, outside of quotes, starts a comment.
 fn without_comment(line: &[u8]) -> &[u8] {
-    let starts = |i: usize| line[i] == b'#' && (i == 0 || line[i - 1].is_ascii_whitespace());
-    let end = (0..line.len()).find(|&i| starts(i)).unwrap_or(line.len());
-    &line[..end]
+    let mut quote: Option<u8> = None;
+    let mut i = 0;
+    while i < line.len() {
+        let starts_word = i == 0 || line[i - 1].is_ascii_whitespace();
+        match (quote, line[i]) {
+            (Some(b'"'), b'\\') => i += 1,
+            (Some(b'\''), b'\'') if line.get(i + 1) == Some(&b'\'') => i += 1,
+            (Some(open), b) if b == open => quote = None,
+            (Some(_), _) => {}
+            (None, b @ (b'"' | b'\'')) if starts_word => quote = Some(b),
+            (None, b'#') if starts_word => return &line[..i],
+            (None, _) => {}
+        }
+        i += 1;
+    }
+    line
 }
 
-fn unquoted(value: &str) -> &str {
+/// The text of a value: within single quotes a quote is written twice, within double quotes a backslash escapes.
+fn unquoted(value: &str) -> Cow<'_, str> {
     let inner = |q| value.strip_prefix(q).and_then(|v: &str| v.strip_suffix(q));
-    inner('"').or_else(|| inner('\'')).unwrap_or(value)
+    if let Some(text) = inner('\'') {
+        return Cow::Owned(text.replace("''", "'"));
+    }
+    let Some(text) = inner('"') else { return Cow::Borrowed(value) };
+    let mut escaped = false;
+    // `\\` and `\"`: other escapes do not occur in names.
+    let kept = |c: &char| {
+        let was = escaped;
+        escaped = *c == '\\' && !was;
+        !escaped
+    };
+    Cow::Owned(text.chars().filter(kept).collect())
 }
 
 fn origin(value: &str) -> Option<[f64; 3]> {
     let inner = value.strip_prefix('[')?.strip_suffix(']')?;
-    let mut numbers = inner.split(',').map(|w| parse_f64(w.trim().as_bytes()).filter(|v| v.is_finite()));
-    let origin = [numbers.next()??, numbers.next()??, numbers.next()??];
-    numbers.next().is_none().then_some(origin)
+    let mut numbers = inner.split(',').map(|w| parse_f64(w.trim().as_bytes()).filter(|v| !v.is_infinite()));
+    let [x, y, yaw] = [numbers.next()??, numbers.next()??, numbers.next()??];
+    (numbers.next().is_none() && x.is_finite() && y.is_finite()).then_some([x, y, yaw])
 }
 
 #[cfg(test)]
@@ -339,6 +394,40 @@ mod tests {
             (listed.origin, listed.mode, listed.free_thresh),
             ([1.0, 2.5, -3.0], MapMode::Trinary, 0.196)
         );
+    }
+
+    #[test]
+    fn quotes_hold_anything_and_a_yaw_may_be_no_number() {
+        let image = |line: &str| parse(format!("image: {line}\nresolution: 1\n")).unwrap().image;
+        for (line, expected) in [
+            ("'map #2.pgm' # here", "map #2.pgm"),
+            ("\"a # \\\"b\\\" \\\\.pgm\"", "a # \"b\" \\.pgm"),
+            ("'it''s # one.pgm'", "it's # one.pgm"),
+            ("a#b.pgm # c", "a#b.pgm"),
+        ] {
+            assert_eq!(image(line), PathBuf::from(expected), "{line}");
+        }
+        assert_eq!(parse("\u{feff}image: a\nresolution: 1\n").unwrap().image, PathBuf::from("a"));
+        let turned = parse("image: a\nresolution: 1\norigin: [1, 2, -nan]\n").unwrap();
+        let map =
+            MapServerMap::from_image(&Pgm { width: 1, height: 1, max_value: 1, pixels: vec![0] }, &turned);
+        assert!(map.yaw == 0.0 && map.notes[0].contains("yaw"), "{:?}", map.notes);
+        says(parse("image: a\norigin: [nan, 2, 0]\n"), "origin is");
+    }
+
+    #[test]
+    fn a_picture_of_another_machine_is_looked_for_beside_the_yaml() {
+        let (folder, yaml) = temporary("m.yaml");
+        let pgm = Pgm { width: 1, height: 1, max_value: 1, pixels: vec![0] };
+        pgm.write(folder.path().join("a.pgm")).unwrap();
+        for (image, notes) in [("/home/none/a.pgm", 1), ("C:\\\\maps\\\\a.pgm", 1), ("a.pgm", 0)] {
+            std::fs::write(&yaml, format!("image: \"{image}\"\nresolution: 1\n")).unwrap();
+            let map = MapServerMap::read(&yaml).unwrap();
+            assert_eq!(map.notes.len(), notes, "{image}: {:?}", map.notes);
+        }
+        // A name that is relative is meant: nothing else is taken for it.
+        std::fs::write(&yaml, "image: maps/a.pgm\nresolution: 1\n").unwrap();
+        assert!(MapServerMap::read(&yaml).is_err());
     }
 
     #[test]

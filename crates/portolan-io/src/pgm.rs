@@ -3,12 +3,14 @@
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use crate::bytes::{Input, open, parse_f64, read_failed};
+use crate::bytes::{Input, check_padding, open, parse_f64, read_failed};
 use crate::error::shown;
 use crate::{IoError, Result, write_atomic};
 
 /// The most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 27;
+/// So many bytes behind the pixels are looked at.
+const MOST_BEHIND: u64 = 1 << 16;
 
 /// A gray image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,13 +34,12 @@ impl Pgm {
         Self::parse(open(path)?)
     }
 
-    /// Reads an image; bytes after its pixels are ignored. Memory grows with the bytes that are there,
-    /// not with what the header claims.
+    /// Reads an image. Memory grows with the bytes that are there, not with what the header claims.
     ///
     /// # Errors
-    /// [`IoError::Binary`] for a wrong header and for too few pixels.
+    /// [`IoError::Binary`] for a wrong header, for too few pixels, and for bytes behind them that are no padding.
     pub fn parse(mut input: Input) -> Result<Self> {
-        let mut header = Header { input: &mut input, offset: 0 };
+        let mut header = Header { input: &mut input, offset: 0, last: 0 };
         let magic = [header.byte()?, header.byte()?].map(|b| b.unwrap_or(b' '));
         let text = match &magic {
             b"P5" => false,
@@ -62,10 +63,13 @@ impl Pgm {
             for _ in 0..count {
                 pixels.push(header.number("a pixel", 0..=max_value)? as u16);
             }
+            let at = header.offset;
+            let rest = input.read_up_to(MOST_BEHIND)?;
+            check_padding(&rest, at, &format!("{count} pixels"), input.path())?;
             pixels
         } else {
-            let offset = header.offset;
-            binary_pixels(&mut input, offset, count, max_value)?
+            let (offset, after_return) = (header.offset, header.last == b'\r');
+            binary_pixels(&mut input, (offset, after_return), count, max_value)?
         };
         Ok(Self { width: width as usize, height: height as usize, max_value: max_value as u16, pixels })
     }
@@ -97,9 +101,26 @@ impl Pgm {
     }
 }
 
-fn binary_pixels(input: &mut Input, offset: u64, count: u64, max_value: u64) -> Result<Vec<u16>> {
+/// The pixels from `offset` on. `after_return`: the header ended in a carriage return. One byte is all that separates header and
+/// pixels, so a line feed behind it is a pixel, unless the file is longer than announced by just that byte.
+fn binary_pixels(
+    input: &mut Input,
+    (mut offset, after_return): (u64, bool),
+    count: u64,
+    max_value: u64,
+) -> Result<Vec<u16>> {
     let width = if max_value < 256 { 1 } else { 2 };
-    let bytes = input.read_up_to(count * width)?;
+    let mut bytes = input.read_up_to(count * width)?;
+    if bytes.len() as u64 == count * width {
+        let rest = input.read_up_to(MOST_BEHIND)?;
+        if let (true, Some(b'\n'), [last]) = (after_return, bytes.first(), &rest[..]) {
+            bytes.push(*last);
+            bytes.remove(0);
+            offset += 1;
+        } else {
+            check_padding(&rest, offset + count * width, &format!("{count} pixels"), input.path())?;
+        }
+    }
     if bytes.len() as u64 != count * width {
         let value = format!("{} bytes", bytes.len());
         let advice = format!("the header announces {}: the file is cut off", count * width);
@@ -120,6 +141,8 @@ fn binary_pixels(input: &mut Input, offset: u64, count: u64, max_value: u64) -> 
 struct Header<'a> {
     input: &'a mut Input,
     offset: u64,
+    /// The byte that was read last.
+    last: u8,
 }
 
 impl Header<'_> {
@@ -129,6 +152,7 @@ impl Header<'_> {
             Ok(0) => Ok(None),
             Ok(_) => {
                 self.offset += 1;
+                self.last = byte[0];
                 Ok(Some(byte[0]))
             }
             Err(e) => Err(read_failed(self.input.path(), self.input.compression(), self.offset, e)),
@@ -177,6 +201,10 @@ mod tests {
         let p5 = parse(*b"P5\n# made by hand\n2 2\n255\n\n#\x00\xff").unwrap();
         assert_eq!(p5.pixels, [10, 35, 0, 255]);
         assert_eq!(parse(*b"P5 1 1 1000 \x01\x02").unwrap().pixels, [258]);
+        // Headers of two bytes at the end of a line, and files that end in one.
+        assert_eq!(parse(*b"P5\r\n2 1\r\n255\r\nab").unwrap().pixels, [97, 98]);
+        assert_eq!(parse(*b"P5\r2 1\r255\r\nb").unwrap().pixels, [10, 98]);
+        assert_eq!(parse(*b"P5 2 1 255\nab\n").unwrap().pixels, [97, 98]);
     }
 
     #[test]
@@ -206,6 +234,9 @@ mod tests {
             (b"P6 1 1 255\nabc", "the magic is \"P6\""),
             (b"P5 1 1 7\n\x08", "a pixel is 8; the header announces at most 7"),
             (b"P2 1 1 7\n8", "a pixel is \"8\""),
+            (b"P5 2 1 255\nabc", "byte 13: the rest of the file is 1 bytes; the header announces 2 pixels"),
+            (b"P5\r\n2 1\r\n255\r\nabc", "byte 15: the rest of the file is 2 bytes"),
+            (b"P2 2 1 9\n1 2 3", "the rest of the file"),
             (b"", "the magic is"),
         ] {
             says(parse(bytes), part);

@@ -6,7 +6,7 @@
 //! | 4 | `t x y theta` |
 //! | 8 | `t tx ty tz qx qy qz qw` (TUM); must turn about z only, `tz` is ignored |
 //!
-//! Separated by spaces, tabs or commas; `#` starts a comment; a comma at the end of a line is tolerated.
+//! Separated by spaces, tabs, semicolons or commas (decimal commas are refused); `#` starts a comment; a comma at the end of a line is tolerated.
 
 use std::path::Path;
 
@@ -51,8 +51,8 @@ pub fn parse_poses_2d(input: Input) -> Result<Vec<TimedPose<2>>> {
     let mut width = None;
     let finite = |word: &[u8]| parse_f64(word).filter(|v| v.is_finite());
     while let Some((number, line)) = lines.next_numbered()? {
-        let (values, count) = columns::<9>(line, |b| b == b',', finite).map_err(|(word, column)| {
-            IoError::text(&path, number, column, shown(word), "write a finite number")
+        let (values, count) = columns::<9>(line, finite).map_err(|(word, column)| {
+            IoError::text(&path, number, column, shown(word), "write a finite number, with a decimal point")
         })?;
         let values = &values[..count];
         if values.is_empty() {
@@ -125,6 +125,8 @@ mod tests {
             ("1 2 3 4 5 6 7 8 9 10\n", "line 1: the number of columns is 9"),
             ("0 0 0 0 0 0 0 0\n", "line 1: the quaternion is 0 0 0 0; write"),
             ("0 0 0 0 0.5 0.5 0.5 0.5\n", "turn about z only"),
+            ("1,5 2,0 0,5\n", "line 1: column 1 is \"1,5\"; write a finite number, with a decimal point"),
+            ("1,5;2,0;0,5\n", "line 1: column 1 is \"1,5\""),
             ("# nothing\n", "the number of poses is 0"),
         ] {
             says(parse(text), part);

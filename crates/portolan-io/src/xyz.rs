@@ -12,7 +12,7 @@
 
 use std::path::Path;
 
-use crate::bytes::{Input, Lines, Scalar, open, parse_f64};
+use crate::bytes::{Input, Lines, Scalar, number_words, open, parse_f64};
 use crate::error::shown;
 use crate::points::{CloudBuilder, PointCloudFile, PointFields, is_time};
 use crate::{IoError, Result};
@@ -43,7 +43,7 @@ pub(crate) fn parse(input: Input) -> Result<PointCloudFile> {
         let content = if first && content.is_empty() { comment } else { content };
         let mut values = [0.0; MOST_COLUMNS];
         let (mut count, mut failed) = (0, None);
-        for word in words(content) {
+        for word in number_words(content) {
             if count == MOST_COLUMNS {
                 let advice = format!("give at most {MOST_COLUMNS} columns");
                 return Err(IoError::text(&path, number, "the number of columns", "too large", advice));
@@ -70,7 +70,7 @@ pub(crate) fn parse(input: Input) -> Result<PointCloudFile> {
         }
         first = false;
         if let Some((k, word)) = failed {
-            let advice = "write numbers, or a first line of names: x,y,z";
+            let advice = "write numbers with a decimal point, or a first line of names: x,y,z";
             return Err(IoError::text(&path, number, format!("column {}", k + 1), shown(word), advice));
         }
         let values = &values[..count];
@@ -111,22 +111,12 @@ pub(crate) fn may_be_points(path: &Path) -> bool {
 
 /// What stands before a comment, and the comment without its mark.
 fn split_comment(line: &[u8]) -> (&[u8], &[u8]) {
-    // A byte order mark, as spreadsheets write it.
-    let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
     let hash = line.iter().position(|b| *b == b'#').map(|at| (at, at + 1));
     let slashes = line.windows(2).position(|w| w == b"//").map(|at| (at, at + 2));
     match hash.into_iter().chain(slashes).min() {
         Some((end, start)) => (line[..end].trim_ascii(), line[start..].trim_ascii()),
         None => (line.trim_ascii(), &[]),
     }
-}
-
-/// The words of a line. Where it has semicolons, commas are part of words, so that decimal commas are refused and not
-/// taken for separators.
-fn words(content: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let semicolons = content.contains(&b';');
-    let separates = move |b: &u8| b.is_ascii_whitespace() || *b == if semicolons { b';' } else { b',' };
-    content.split(separates).filter(|w| !w.is_empty())
 }
 
 /// Which column holds what.
@@ -138,7 +128,7 @@ struct Columns {
 impl Columns {
     /// From a line of names; `None` where it does not name x, y and z.
     fn named(content: &[u8]) -> Option<Self> {
-        let names: Vec<String> = words(content)
+        let names: Vec<String> = number_words(content)
             .map(|w| String::from_utf8_lossy(w).trim_matches('"').to_ascii_lowercase())
             .collect();
         let find = |wanted: &[&str]| names.iter().position(|n| wanted.contains(&n.as_str()));
@@ -192,6 +182,14 @@ mod tests {
             "\"z\",other,\"y\",\"x\"\n.5,9,-2,1\n6,9,5,4\n",
         ] {
             assert_eq!(read(text).unwrap().points, points, "{text}");
+        }
+    }
+
+    #[test]
+    fn decimal_commas_are_no_separators() {
+        for text in ["2,010 -1,000 0,250\n", "2,010\t-1,000\t0,250\n", "1 2 3\n2,0 1,0 3\n", "2,5;1,0;3,5\n"]
+        {
+            says(read(text), "write numbers with a decimal point");
         }
     }
 

@@ -9,7 +9,7 @@ use portolan_io::scan_log::{Distortion, Intrinsics, ScanLog, ScanLogKind, ScanLo
 use portolan_io::{BagChoice, FileKind, LaserLog, bag_dimension, detect, detect_no_return};
 use serde::{Deserialize, Serialize};
 
-use crate::arguments::{finite, length, length_or_zero, or_zero, point3, pose3, seconds};
+use crate::arguments::{finite, length, length_or_off, length_or_zero, or_zero, point3, pose3, seconds};
 use crate::dimension::{Dimension, ONLY_2D, ONLY_3D};
 use crate::error::bad_call;
 
@@ -238,8 +238,9 @@ pub(crate) struct RangeArgs {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default)]
 pub(crate) struct NoReturnArgs {
-    /// Readings of this range or more mean "no echo" (meters) [default: detected from the readings of the log]
-    #[arg(long, value_name = "M", value_parser = length, allow_negative_numbers = true, help_heading = ONLY_2D)]
+    /// Readings of this range or more mean "no echo" (meters); off: none but those that the log declares [default: detected from
+    /// the readings of the log]
+    #[arg(long, value_name = "M|off", value_parser = length_or_off, allow_negative_numbers = true, help_heading = ONLY_2D)]
     #[serde(serialize_with = "finite", skip_deserializing)]
     pub(crate) no_return: Option<f64>,
     /// Range up to which a beam without echo counts as free (meters) [default: 0, nothing]

@@ -7,6 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::{IoError, Result};
 
+/// So many characters of a file's name (at most four bytes each) are in its temporary one.
+const MOST_OF_NAME: usize = 50;
+/// Temporary names that are tried where others are in the way.
+const MOST_TRIED: u64 = 1 << 20;
+
 /// Removes the temporary file unless it was renamed.
 struct Temporary(Option<PathBuf>);
 
@@ -53,12 +58,18 @@ fn replace(path: &Path, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Resul
         return Err(IoError::unwritable(path, "the file name", "missing", advice));
     };
     static COUNT: AtomicU64 = AtomicU64::new(0);
-    let unique = format!(".{}.{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(unique);
-    let temporary = target.with_file_name(hidden);
-    let file = OpenOptions::new().write(true).create_new(true).open(&temporary).map_err(failed)?;
+    // Names may have 255 bytes: of a long one the beginning is enough.
+    let name: String = name.to_string_lossy().chars().take(MOST_OF_NAME).collect();
+    let (file, temporary) = loop {
+        let unique = COUNT.fetch_add(1, Ordering::Relaxed);
+        let hidden = format!(".{name}.{}.{unique}.tmp", std::process::id());
+        let temporary = target.with_file_name(hidden);
+        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
+            // Left by a run of the same number that was killed: in a container all are number 1.
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && unique < MOST_TRIED => {}
+            file => break (file.map_err(failed)?, temporary),
+        }
+    };
     let mut guard = Temporary(Some(temporary.clone()));
     finish(file, write).map_err(failed)?;
     fs::rename(&temporary, &target).map_err(failed)?;
@@ -97,6 +108,20 @@ mod tests {
         );
         write_atomic(&path, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn what_a_killed_run_left_and_long_names_are_not_in_the_way() {
+        let (folder, path) = temporary("map.bin");
+        for i in 0..200 {
+            let left = folder.path().join(format!(".map.bin.{}.{i}.tmp", std::process::id()));
+            fs::write(left, b"").unwrap();
+        }
+        write_atomic(&path, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        let long = folder.path().join("é".repeat(127));
+        write_atomic(&long, |w| w.write_all(b"long")).unwrap();
+        assert_eq!(fs::read(&long).unwrap(), b"long");
     }
 
     #[test]

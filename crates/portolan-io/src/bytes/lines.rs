@@ -61,6 +61,10 @@ impl<R: BufRead> Lines<R> {
             return Ok(None);
         }
         self.number += 1;
+        // A byte order mark, as spreadsheets and editors write it.
+        if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
+            self.line.drain(..3);
+        }
         for end in [b'\n', b'\r'] {
             self.line.pop_if(|last| *last == end);
         }
@@ -80,7 +84,7 @@ mod tests {
 
     #[test]
     fn ends_of_lines_are_dropped_and_long_lines_refused() {
-        let mut lines = Lines::plain(&b"a\r\n\nb"[..], Path::new("x"));
+        let mut lines = Lines::plain(&b"\xef\xbb\xbfa\r\n\nb"[..], Path::new("x"));
         assert_eq!(lines.next_line().unwrap(), Some(&b"a"[..]));
         assert_eq!(lines.next_line().unwrap(), Some(&b""[..]));
         assert_eq!(lines.next_line().unwrap(), Some(&b"b"[..]));

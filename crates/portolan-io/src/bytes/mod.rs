@@ -10,6 +10,6 @@ pub use atomic::write_atomic;
 pub use open::{Compression, Input, open};
 
 pub(crate) use lines::Lines;
-pub(crate) use number::{columns, fields, header_line, parse_f64, whole};
+pub(crate) use number::{check_padding, columns, fields, header_line, number_words, parse_f64, whole};
 pub(crate) use open::{open_file, read_failed};
 pub(crate) use scalar::{Endian, Scalar, u32_at, u64_at};

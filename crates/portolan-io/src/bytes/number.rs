@@ -1,8 +1,37 @@
-//! Words and numbers of a line.
+//! Words and numbers of a line, and what may follow the data.
+
+use std::path::Path;
+
+use crate::{IoError, Result};
 
 /// The words of a line between spaces and tabs.
 pub(crate) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     line.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty())
+}
+
+/// The words of a line of numbers. Where it has semicolons, these separate; else commas do, unless white space does already: then
+/// commas are part of words, so that decimal commas (`2,010 -1,000`) are refused and not taken for separators.
+pub(crate) fn number_words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+    let mark = if line.contains(&b';') { b';' } else { b',' };
+    let spaced = mark == b',' && separates_by_space(line);
+    line.split(move |b| b.is_ascii_whitespace() || *b == mark && !spaced).filter(|w| !w.is_empty())
+}
+
+/// Whether white space stands between two words without a comma beside it.
+fn separates_by_space(line: &[u8]) -> bool {
+    let mut before = None;
+    let mut space = false;
+    for &b in line.trim_ascii() {
+        if b.is_ascii_whitespace() {
+            space = true;
+            continue;
+        }
+        if space && before.is_some_and(|last| last != b',') && b != b',' {
+            return true;
+        }
+        (before, space) = (Some(b), false);
+    }
+    false
 }
 
 /// A word that is not a number, and its column.
@@ -14,13 +43,11 @@ pub(crate) type BadWord<'a> = (&'a [u8], String);
 /// The first word that is not a number.
 pub(crate) fn columns<const N: usize>(
     line: &[u8],
-    separates: impl Fn(u8) -> bool,
     number: impl Fn(&[u8]) -> Option<f64>,
 ) -> Result<([f64; N], usize), BadWord<'_>> {
     let content = line.split(|b| *b == b'#').next().unwrap_or(&[]);
-    let words = content.split(|b| b.is_ascii_whitespace() || separates(*b));
     let (mut values, mut count) = ([0.0; N], 0);
-    for word in words.filter(|w| !w.is_empty()).take(N) {
+    for word in number_words(content).take(N) {
         values[count] = number(word).ok_or_else(|| (word, format!("column {}", count + 1)))?;
         count += 1;
     }
@@ -38,6 +65,20 @@ pub(crate) fn header_line<'a>(bytes: &'a [u8], at: &mut usize) -> Option<&'a [u8
     let line = &bytes[*at..*at + length];
     *at += length + 1;
     Some(line)
+}
+
+/// Refuses bytes behind what the header announced (`what`), at this place: then header and data do not fit together, and what was read
+/// may be moved or cut. Padding (zeros, the ends of lines) is none.
+///
+/// # Errors
+/// [`IoError::Binary`].
+pub(crate) fn check_padding(rest: &[u8], at: u64, what: &str, path: &Path) -> Result<()> {
+    let is_padding = |b: &u8| *b == 0 || b.is_ascii_whitespace();
+    if rest.iter().all(is_padding) {
+        return Ok(());
+    }
+    let advice = format!("the header announces {what} and no more: check its sizes, or copy the file again");
+    Err(IoError::binary(path, at, "the rest of the file", format!("{} bytes", rest.len()), advice))
 }
 
 const POWERS_OF_TEN: [f64; 19] =
@@ -84,6 +125,23 @@ fn slow(word: &[u8]) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::testing::Random;
+
+    #[test]
+    fn a_comma_separates_only_where_nothing_else_does() {
+        for (line, expected) in [
+            ("1 2\t3", &["1", "2", "3"][..]),
+            ("1,2,3,", &["1", "2", "3"]),
+            ("7.5, 1 , -2,0.5", &["7.5", "1", "-2", "0.5"]),
+            (" 1;2,5; 3", &["1", "2,5", "3"]),
+            ("2,010 -1,000 0,250", &["2,010", "-1,000", "0,250"]),
+            ("1,2 3", &["1,2", "3"]),
+            ("1 2 3,", &["1", "2", "3,"]),
+            ("", &[]),
+        ] {
+            let words: Vec<_> = number_words(line.as_bytes()).map(|w| str::from_utf8(w).unwrap()).collect();
+            assert_eq!(words, expected, "{line}");
+        }
+    }
 
     #[test]
     fn equals_the_standard_library() {

@@ -22,7 +22,8 @@ impl<'a> Column<'a> {
             Data::Compressed => (field.offset * header.points(), field.count * field.scalar.size()),
             _ => (field.offset, header.stride),
         };
-        Some(Self { bytes: body.get(start..)?, stride, scalar: field.scalar })
+        // A cloud without points has columns, too: there is nothing to read in them.
+        Some(Self { bytes: body.get(start..).unwrap_or(&[]), stride, scalar: field.scalar })
     }
 
     /// The value of point `i`.

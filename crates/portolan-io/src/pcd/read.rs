@@ -5,7 +5,7 @@ use std::path::Path;
 use super::columns::{Column, rgb};
 use super::header::{self, Data, Field, Header};
 use super::lzf;
-use crate::bytes::{Input, Scalar, fields, open, parse_f64};
+use crate::bytes::{Input, Scalar, check_padding, fields, open, parse_f64};
 use crate::error::shown;
 use crate::points::{CloudBuilder, PointCloudFile, PointFields, Viewpoint, is_time, most_bytes};
 use crate::{IoError, Result};
@@ -50,6 +50,8 @@ fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile> {
                 let value = format!("{} bytes", body.len());
                 return Err(IoError::binary(path, header.body as u64, "the data", value, advice));
             }
+            let behind = header.body as u64 + size as u64;
+            check_padding(&body[size..], behind, &format!("{} points", header.points()), path)?;
             cloud(&body[..size], &header, path)
         }
         Data::Compressed => cloud(&unpack(body, &header, path)?, &header, path),
@@ -83,9 +85,14 @@ fn unpack(body: &[u8], header: &Header, path: &Path) -> Result<Vec<u8>> {
         let advice = format!("the header announces {packed_size}: the file is cut off");
         return Err(IoError::binary(path, at, "the packed data", value, advice));
     };
-    lzf::unpack(packed, size).map_err(|k| {
+    check_padding(&body[8 + packed_size..], at + 8 + packed_size as u64, "the packed data", path)?;
+    lzf::unpack(packed, size).or_else(|k| {
+        // Where packing does not pay some writers leave the data as it is.
+        if packed_size == size {
+            return Ok(packed.to_vec());
+        }
         let advice = "copy or download the file again";
-        IoError::binary(path, at + 8 + k as u64, "the packed data", "damaged", advice)
+        Err(IoError::binary(path, at + 8 + k as u64, "the packed data", "damaged", advice))
     })
 }
 

@@ -71,8 +71,36 @@ fn mixed_packed() -> Vec<u8> {
 }
 
 #[test]
+fn a_cloud_without_points_is_a_cloud() {
+    let head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 0\nHEIGHT 1\nPOINTS 0\n";
+    let none = [0u8; 8];
+    for (data, body) in [("ascii", &[][..]), ("binary", &[]), ("binary_compressed", &none)] {
+        let cloud = read([format!("{head}DATA {data}\n").as_bytes(), body].concat()).unwrap();
+        assert!(cloud.points.is_empty(), "{data}");
+    }
+    says(read("FIELDS x y i\nSIZE 4 4 4\nTYPE F F F\nWIDTH 0\nHEIGHT 1\nDATA ascii\n"), "FIELDS is");
+}
+
+/// Where packing does not pay some writers leave the columns as they are, under equal sizes.
+#[test]
+fn packed_data_may_be_stored_as_it_is() {
+    let head =
+        "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nDATA binary_compressed\n";
+    let columns: Vec<u8> = [1.5f32, 2.5, -3.5, 4.5, 5.5, 6.5].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let size = (columns.len() as u32).to_le_bytes();
+    let cloud = read([head.as_bytes(), &size, &size, &columns].concat()).unwrap();
+    assert_eq!(cloud.points, [[1.5, -3.5, 5.5], [2.5, 4.5, 6.5]]);
+    let longer = (columns.len() as u32 + 1).to_le_bytes();
+    says(read([head.as_bytes(), &longer, &size, &columns, &[9]].concat()), "the packed data is damaged");
+}
+
+#[test]
 fn all_layouts_hold_the_same_cloud() {
-    let binary = [MIXED.as_bytes(), b"DATA binary\n", &mixed_points(), b"padding"].concat();
+    let binary = [MIXED.as_bytes(), b"DATA binary\n", &mixed_points()].concat();
+    assert_eq!(read([&binary[..], b"\0\0\0\n"].concat()).unwrap(), mixed_cloud(), "padding");
+    // More than the header announces: then they do not fit together.
+    says(read([&binary[..], &mixed_points()].concat()), "the rest of the file is");
+    says(read([&mixed_packed()[..], b"more"].concat()), "the rest of the file is 4 bytes");
     assert_eq!(read(binary).unwrap(), mixed_cloud());
     assert_eq!(read(mixed_packed()).unwrap(), mixed_cloud());
     let text = "7 3.5 0 0 0 4278848268 1 -2 1000000000 0 0 1 200\r\n\r\n9 0.25 0 0 0 66051 -1.5 4 1250000000 0 0 1 3";

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::path::Path;
 
 use super::header::{Element, Format, Header, Kind};
-use crate::bytes::{Endian, Scalar, parse_f64};
+use crate::bytes::{Endian, Scalar, check_padding, parse_f64};
 use crate::error::shown;
 use crate::{IoError, Result};
 
@@ -47,6 +47,14 @@ impl<'a> Body<'a> {
             self.values.push(value);
         }
         Ok(())
+    }
+
+    /// Refuses data behind the last row.
+    ///
+    /// # Errors
+    /// [`IoError::Binary`] for bytes that are no padding.
+    pub(super) fn check_end(&self) -> Result<()> {
+        check_padding(self.bytes.get(self.at..).unwrap_or(&[]), self.at as u64, "its elements", self.path)
     }
 
     fn items(&mut self, count: u64, item: Scalar, name: &str, keep: bool) -> Result<()> {

@@ -46,6 +46,7 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PointCloudFile> {
             }
         }
     }
+    body.check_end()?;
     cloud.ok_or_else(|| {
         let names: Vec<_> = header.elements.iter().map(|e| e.name.as_str()).collect();
         let value = crate::error::shown(names.join(" "));

@@ -44,11 +44,22 @@ pub fn parse_ply_mesh(mut input: Input) -> Result<PlyMesh> {
 
 pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PlyMesh> {
     let header = header::parse(bytes, path)?;
-    let mut body = Body::of(&header, bytes, path);
     let mut mesh = PlyMesh::default();
-    for element in &header.elements {
+    // Faces may come before the vertices that they name: then the file is gone through twice.
+    let place = |names: &[&str]| header.elements.iter().position(|e| names.contains(&e.name.as_str()));
+    let vertices = place(&["vertex"]);
+    let is_twice = place(&["face", "tristrips"]) < vertices && place(&["face", "tristrips"]).is_some();
+    if let (true, Some(last)) = (is_twice, vertices) {
+        let mut body = Body::of(&header, bytes, path);
+        for element in &header.elements[..last] {
+            skip(&mut body, element)?;
+        }
+        read_vertices(&mut body, &header.elements[last], &mut mesh)?;
+    }
+    let mut body = Body::of(&header, bytes, path);
+    for (i, element) in header.elements.iter().enumerate() {
         match element.name.as_str() {
-            "vertex" if mesh.vertices.is_empty() => read_vertices(&mut body, element, &mut mesh)?,
+            "vertex" if Some(i) == vertices && !is_twice => read_vertices(&mut body, element, &mut mesh)?,
             "face" => {
                 for _ in 0..element.count {
                     body.row(element, element.indices())?;
@@ -67,18 +78,22 @@ pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<PlyMesh> {
                     }
                 }
             }
-            _ => {
-                for _ in 0..element.count {
-                    body.row(element, None)?;
-                }
-            }
+            _ => skip(&mut body, element)?,
         }
     }
+    body.check_end()?;
     if mesh.vertices.is_empty() {
         let advice = "give a file with vertices x, y, z";
         return Err(IoError::text(path, 1, "the number of vertices", "0", advice));
     }
     Ok(mesh)
+}
+
+fn skip(body: &mut Body, element: &Element) -> Result<()> {
+    for _ in 0..element.count {
+        body.row(element, None)?;
+    }
+    Ok(())
 }
 
 fn read_vertices(body: &mut Body, element: &Element, mesh: &mut PlyMesh) -> Result<()> {

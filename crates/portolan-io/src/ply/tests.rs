@@ -14,6 +14,24 @@ fn mesh(bytes: &[u8]) -> Result<super::PlyMesh> {
     super::mesh::parse_bytes(bytes, "a.ply".as_ref())
 }
 
+#[test]
+fn faces_may_come_before_the_vertices_that_they_name() {
+    let (vertices, faces) = ("0 0 0\n1 0 0\n0 1 0\n1 1 2\n", "3 0 1 2\n3 1 3 2\n");
+    let vertex = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+    let face = "element face 2\nproperty list uchar int vertex_indices\n";
+    let text = |head: [&str; 2], body: [&str; 2]| {
+        format!("ply\nformat ascii 1.0\n{}end_header\n{}", head.concat(), body.concat())
+    };
+    let first = mesh(text([face, vertex], [faces, vertices]).as_bytes()).unwrap();
+    let last = mesh(text([vertex, face], [vertices, faces]).as_bytes()).unwrap();
+    assert_eq!(first, last);
+    assert_eq!(first.triangles, [[0, 1, 2], [1, 3, 2]]);
+    says(mesh(text([face, vertex], ["3 0 1 4\n3 1 3 2\n", vertices]).as_bytes()), "the file has 4 vertices");
+    let more = text([vertex, face], [vertices, faces]) + "3 0 1 3\n";
+    says(mesh(more.as_bytes()), "the rest of the file");
+    says(cloud(more), "the rest of the file");
+}
+
 /// A square and a triangle on five vertices, one of which is NaN, after an element of an unknown name.
 fn header(format: &str) -> String {
     format!(

@@ -85,9 +85,9 @@ pub fn parse_poses_3d(input: Input) -> Result<PoseFile> {
     let mut reading: Option<Reading> = None;
     while let Some((number, line)) = lines.next_numbered()? {
         // NaN and infinity are numbers here.
-        let row = columns::<MOST_COLUMNS>(line, |b| matches!(b, b',' | b';'), parse_f64);
+        let row = columns::<MOST_COLUMNS>(line, parse_f64);
         let (row, count) = row.map_err(|(word, column)| {
-            let advice = "write a number, or begin a comment with #";
+            let advice = "write a number with a decimal point, or begin a comment with #";
             IoError::text(&path, number, column, shown(word), advice)
         })?;
         if count == 0 {

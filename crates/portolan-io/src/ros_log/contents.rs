@@ -7,7 +7,7 @@ use portolan_ros::container::{Bag, BagOptions, ContainerKind, MessageRef};
 use portolan_ros::message::{Decoder, MessageKind, Record, transforms};
 use portolan_ros::transforms::{FrameTree, FrameTreeBuilder};
 
-use super::BagChoice;
+use super::{BagChoice, BagLogStats};
 use crate::{IoError, Result};
 
 /// A bag with what its topics are.
@@ -52,6 +52,31 @@ pub(crate) fn is_bag(path: &Path) -> bool {
 }
 
 impl Contents {
+    /// Opens a bag as a log of scans of this dimension: which topics they are, and what is to be said so far. `advice`: what to do
+    /// where they are of the other dimension.
+    ///
+    /// # Errors
+    /// Those of opening it and of choosing topics; [`IoError::Layout`] where these are of the other dimension.
+    pub(super) fn of_scans(
+        path: &Path,
+        choice: &BagChoice,
+        dimension: usize,
+        advice: &str,
+    ) -> Result<(Self, Vec<String>, BagLogStats)> {
+        let contents = Self::open(path, choice)?;
+        let sensors = contents.sensors(choice)?;
+        if sensors.dimension != dimension {
+            return Err(IoError::layout(path, "the topics of scans", sensors.names.join(", "), advice));
+        }
+        let stats = BagLogStats {
+            topics: sensors.names.clone(),
+            guesses: sensors.guesses,
+            notes: contents.bag.notes().to_vec(),
+            ..BagLogStats::default()
+        };
+        Ok((contents, sensors.names, stats))
+    }
+
     /// Opens a bag. Messages are not read.
     pub(crate) fn open(path: &Path, choice: &BagChoice) -> Result<Self> {
         let bag_error = IoError::bag(path);

@@ -35,19 +35,9 @@ pub(super) struct ScanMessage {
 /// [`IoError::Bag`] for a bag that cannot be read; [`IoError::Layout`] where it has no 3-D scans, no poses, no camera for
 /// depth images, or no scan that can be used: with the first reason.
 pub(crate) fn open_bag(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
-    let contents = Contents::open(path, &options.bag)?;
-    let sensors = contents.sensors(&options.bag)?;
-    if sensors.dimension != 3 {
-        let advice = "they are 2-D; name clouds or depth images with --topic for a map in 3-D";
-        return Err(IoError::layout(path, "the topics of scans", sensors.names.join(", "), advice));
-    }
-    let mut stats = BagLogStats {
-        topics: sensors.names.clone(),
-        guesses: sensors.guesses,
-        notes: contents.bag.notes().to_vec(),
-        ..BagLogStats::default()
-    };
-    let numbers: Vec<u32> = sensors.names.iter().flat_map(|name| contents.numbers(name)).collect();
+    let advice = "they are 2-D; name clouds or depth images with --topic for a map in 3-D";
+    let (contents, names, mut stats) = Contents::of_scans(path, &options.bag, 3, advice)?;
+    let numbers: Vec<u32> = names.iter().flat_map(|name| contents.numbers(name)).collect();
     let decoders = contents.decoders(&numbers)?;
     decoders.notes(&mut stats.notes);
     let mut scans = scan_messages(&contents, &numbers, &decoders, options.bag.time_offset, &mut stats)?;
@@ -67,7 +57,7 @@ pub(crate) fn open_bag(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         return Err(IoError::layout(path, "the number of scans that can be used", value, advice));
     }
     let clouds = Clouds::new(&contents, &scans, &decoders, options, &mut stats)?;
-    let pictures = Pictures::new(&contents, &sensors.names, &scans, &decoders, options, &mut stats)?;
+    let pictures = Pictures::new(&contents, &names, &scans, &decoders, options, &mut stats)?;
     stats.notes.extend(contents.note_of_longer());
     let camera = pictures.camera().cloned();
     let ids = scans.iter().map(|s| ScanId {

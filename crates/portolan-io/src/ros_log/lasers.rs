@@ -35,20 +35,10 @@ impl LaserLog {
     /// that can be used: with the first reason.
     pub fn read_bag(path: impl AsRef<Path>, options: &ScanLogOptions) -> Result<Self> {
         let path = path.as_ref();
-        let contents = Contents::open(path, &options.bag)?;
-        let sensors = contents.sensors(&options.bag)?;
-        if sensors.dimension != 2 {
-            let advice = "they are 3-D; name a LaserScan with --topic for a map in 2-D";
-            return Err(IoError::layout(path, "the topics of scans", sensors.names.join(", "), advice));
-        }
-        let mut stats = BagLogStats {
-            topics: sensors.names.clone(),
-            guesses: sensors.guesses,
-            notes: contents.bag.notes().to_vec(),
-            ..BagLogStats::default()
-        };
+        let advice = "they are 3-D; name a LaserScan with --topic for a map in 2-D";
+        let (contents, names, mut stats) = Contents::of_scans(path, &options.bag, 2, advice)?;
         let mut scans = Vec::new();
-        for name in &sensors.names {
+        for name in &names {
             let mut of_topic = read_scans(&contents, name, &mut stats)?;
             // A file's poses have the stamps of the scans that they were made of.
             let guess = options.poses.is_none();

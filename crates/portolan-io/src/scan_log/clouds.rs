@@ -114,8 +114,20 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
         let advice = "give a folder of .pcd, .ply, .bin or .xyz files";
         return Err(IoError::layout(path, "the number of clouds", "0", advice));
     };
-    let (names, format) = clouds_in(&folder, endings)?;
-    let files: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
+    let found = clouds_in(&folder, endings)?;
+    let files = found.names.iter().map(|name| folder.join(name)).collect();
+    let mut parts = in_folder(path, &folder, files, found.format, options)?;
+    parts.stats.warnings.extend(found.others);
+    Ok(parts)
+}
+
+fn in_folder(
+    path: &Path,
+    folder: &Path,
+    files: Vec<PathBuf>,
+    format: PointFormat,
+    options: &ScanLogOptions,
+) -> Result<Parts> {
     if has_poses(format) {
         return scanner::open(path, &files, format, options);
     }
@@ -124,7 +136,7 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     }
     let pose_file = match &options.poses {
         Some(_) => None,
-        None => pose_file(path, &folder)?,
+        None => pose_file(path, folder)?,
     };
     let (poses, rays) = match (&options.poses, pose_file) {
         // The caller's poses replace these.
@@ -226,7 +238,8 @@ pub(super) fn assumed(
 
 /// Clouds of a survey, which say nothing of the scanner: points without rays, or seen along the caller's poses.
 fn survey(path: &Path, files: Vec<PathBuf>, options: &ScanLogOptions) -> Result<Parts> {
-    let (rays, mut notes) = (way_of_scanner(options)?, Vec::new());
+    let mut notes = Vec::new();
+    let rays = way_of_scanner(options, &mut notes)?;
     if matches!(rays, Rays::Unknown) && !options.points_only {
         notes.push(format!(
             "{}: LAS does not say where points were seen from: they are taken as points without rays, so that free space \
@@ -250,13 +263,19 @@ fn survey(path: &Path, files: Vec<PathBuf>, options: &ScanLogOptions) -> Result<
 }
 
 /// Where the scanner of a survey was.
-fn way_of_scanner(options: &ScanLogOptions) -> Result<Rays> {
+fn way_of_scanner(options: &ScanLogOptions, notes: &mut Vec<String>) -> Result<Rays> {
     let Some(file) = &options.poses else { return Ok(Rays::Unknown) };
     let read = read_poses_3d(file)?;
     let mut track = Vec::new();
+    let mut refused = Vec::new();
     for raw in &read.poses {
         let pose = raw.resolve(options.pose_convention.unwrap_or(PoseConvention::WorldFromSensor));
+        let pose = pose.map_err(|fault| refused.push(format!("line {}: {fault}", raw.line)));
         track.push(TrackPose { pose: pose.ok().map(|(pose, _)| pose), time: raw.time, number: raw.number });
+    }
+    if let Some(first) = refused.first() {
+        let file = read.path.display();
+        notes.push(format!("{} poses of {file} could not be used (first: {first})", refused.len()));
     }
     let timed = TimedPoses::new(&track).map_err(|error| contradiction(&read.path, &error))?;
     match timed.filter(|poses| poses.span().is_some()) {
@@ -273,8 +292,17 @@ fn is_one_of(endings: &[(&'static str, PointFormat)], name: &str) -> bool {
     ending_among(endings, name).is_some() && !is_poses(name)
 }
 
-/// The clouds of the most frequent ending, in natural order.
-fn clouds_in(folder: &Path, endings: &[(&'static str, PointFormat)]) -> Result<(Vec<String>, PointFormat)> {
+/// The clouds of one kind in a folder.
+struct CloudsIn {
+    /// In natural order.
+    names: Vec<String>,
+    format: PointFormat,
+    /// What is said of clouds of other kinds beside them.
+    others: Option<String>,
+}
+
+/// The clouds of the most frequent ending.
+fn clouds_in(folder: &Path, endings: &[(&'static str, PointFormat)]) -> Result<CloudsIn> {
     let names = names_in(folder, |name| is_one_of(endings, name))?;
     let ending = |name: &String| ending_among(endings, name).map(|(ending, _)| ending);
     let count = |wanted: &str| names.iter().filter(|n| ending(n) == Some(wanted)).count();
@@ -285,8 +313,18 @@ fn clouds_in(folder: &Path, endings: &[(&'static str, PointFormat)]) -> Result<(
             best = *candidate;
         }
     }
-    let wanted = names.iter().filter(|name| ending(name) == Some(best.0)).cloned().collect();
-    Ok((wanted, best.1))
+    let (wanted, other): (Vec<String>, Vec<String>) =
+        names.into_iter().partition(|name| ending_among(endings, name).map(|(e, _)| e) == Some(best.0));
+    let others = other.first().map(|first| {
+        format!(
+            "{} files of {} are of another kind than its {} files *.{}, and were left out (first: {first})",
+            other.len(),
+            folder.display(),
+            wanted.len(),
+            best.0
+        )
+    });
+    Ok(CloudsIn { names: wanted, format: best.1, others })
 }
 
 fn is_poses(name: &str) -> bool {

@@ -58,7 +58,7 @@ pub(super) fn depth_image_size(path: &Path) -> Result<[usize; 2]> {
 }
 
 /// The bytes of a picture's file.
-pub(super) fn read_picture(path: &Path) -> Result<Vec<u8>> {
+pub(crate) fn read_picture(path: &Path) -> Result<Vec<u8>> {
     use std::io::Read;
     let file = open_file(path)?;
     let size = file.metadata().map_or(0, |m| m.len()).min(MOST_BYTES);
@@ -77,7 +77,7 @@ pub(super) fn png_reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<Reader<Curs
     decoder.read_info().map_err(|e| damaged(path, &e.to_string()))
 }
 
-pub(super) fn damaged(path: &Path, why: &str) -> IoError {
+pub(crate) fn damaged(path: &Path, why: &str) -> IoError {
     IoError::layout(path, "the picture", format!("damaged ({why})"), "copy or download the file again")
 }
 
@@ -90,7 +90,7 @@ fn depth_size(path: &Path, info: &Info<'_>, file_bytes: usize) -> Result<[usize;
 }
 
 /// Columns and rows, where the file can hold so many pixels.
-pub(super) fn size_within_limits(
+pub(crate) fn size_within_limits(
     path: &Path,
     width: u32,
     height: u32,

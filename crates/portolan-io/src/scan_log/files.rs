@@ -9,7 +9,8 @@ use crate::{IoError, Result};
 /// The most files of a folder that are looked at.
 const MOST_FILES: usize = 1 << 21;
 
-/// The names in a folder for which `wanted` is true, in natural order (`scan2` before `scan10`).
+/// The names in a folder for which `wanted` is true, in natural order (`scan2` before `scan10`). Hidden files are passed over:
+/// file managers leave `._NAME` beside every `NAME`.
 ///
 /// # Errors
 /// [`IoError::Os`] where the folder cannot be read, [`IoError::Layout`] for one with millions of files.
@@ -24,6 +25,7 @@ pub(crate) fn names_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<V
         let entry = entry.map_err(|e| IoError::os(folder, "list it", e))?;
         // The names of all formats are Unicode.
         if let Ok(name) = entry.file_name().into_string()
+            && is_shown(&name)
             && wanted(&name)
         {
             names.push(name);
@@ -36,7 +38,12 @@ pub(crate) fn names_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Result<V
 /// Whether a folder has a name for which `wanted` is true. `false` for a path that is not a folder.
 pub(crate) fn has_name(folder: &Path, wanted: impl Fn(&str) -> bool) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else { return false };
-    entries.take(MOST_FILES).flatten().any(|entry| entry.file_name().to_str().is_some_and(&wanted))
+    let is_it = |name: &str| is_shown(name) && wanted(name);
+    entries.take(MOST_FILES).flatten().any(|entry| entry.file_name().to_str().is_some_and(is_it))
+}
+
+fn is_shown(name: &str) -> bool {
+    !name.starts_with('.')
 }
 
 /// Whether a name ends like this, in capitals or not.
@@ -94,6 +101,16 @@ fn digits<'a>(text: &mut &'a [u8]) -> &'a [u8] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn hidden_files_are_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["0.bin", "._0.bin", ".DS_Store"] {
+            std::fs::write(folder.path().join(name), b"").unwrap();
+        }
+        assert_eq!(names_in(folder.path(), |_| true).unwrap(), ["0.bin"]);
+        assert!(!has_name(folder.path(), |name| name.contains("DS")) && has_name(folder.path(), |_| true));
+    }
 
     #[test]
     fn names_are_in_the_order_of_their_numbers() {

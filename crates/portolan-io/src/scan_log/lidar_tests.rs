@@ -108,6 +108,20 @@ fn kitti_poses_are_the_cameras_and_lead_to_the_lidar() {
 }
 
 #[test]
+fn clouds_of_other_kinds_in_a_folder_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["0.bin", "1.bin", "._0.bin"] {
+        std::fs::write(folder.path().join(name), [0u8, 0, 128, 63].repeat(4)).unwrap();
+    }
+    std::fs::write(folder.path().join("poses.csv"), "0 0 0 0 0 0 1\n".repeat(2)).unwrap();
+    let open = || ScanLog::open(folder.path(), &ScanLogOptions::default()).unwrap();
+    assert!(open().stats().warnings.is_empty() && open().len() == 2);
+    std::fs::write(folder.path().join("2.ply"), b"").unwrap();
+    let warnings = open().stats().warnings.clone();
+    assert!(warnings.len() == 1 && warnings[0].contains("(first: 2.ply)"), "{warnings:?}");
+}
+
+#[test]
 fn folders_of_clouds_with_poses_in_every_layout() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();

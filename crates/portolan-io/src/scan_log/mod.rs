@@ -60,13 +60,15 @@ mod stats;
 mod survey_tests;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+pub(crate) use testing::png_of;
 mod transforms;
 mod tum_rgbd;
 mod views;
 
 pub(crate) use cloud_frames::{about, file_from_frames, scan_from};
 pub(crate) use color::decode_color;
-pub(crate) use depth_png::{decode_depth, decode_gray16};
+pub(crate) use depth_png::{damaged, decode_depth, decode_gray16, read_picture, size_within_limits};
 pub(crate) use deskew::{BEYOND, Fate, Fates};
 pub use deskew::{MotionStats, PointClock};
 pub use distortion::Distortion;

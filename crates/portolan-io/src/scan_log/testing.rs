@@ -71,7 +71,7 @@ pub(super) fn gray_png([w, h]: [usize; 2], values: &[u16]) -> Vec<u8> {
 }
 
 /// Any PNG.
-pub(super) fn png_of(size: [usize; 2], color: png::ColorType, depth: png::BitDepth, bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn png_of(size: [usize; 2], color: png::ColorType, depth: png::BitDepth, bytes: &[u8]) -> Vec<u8> {
     let mut all = Vec::new();
     let mut encoder = png::Encoder::new(&mut all, size[0] as u32, size[1] as u32);
     encoder.set_color(color);

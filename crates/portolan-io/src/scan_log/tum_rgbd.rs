@@ -89,7 +89,10 @@ fn read_list(path: &Path) -> Result<Vec<(f64, PathBuf)>> {
         if line.is_empty() || line.starts_with(b"#") {
             continue;
         }
-        let end = line.iter().position(|b| b.is_ascii_whitespace() || *b == b',').unwrap_or(line.len());
+        // A comma separates where no white space comes before it: "1,5 rgb/1.png" has a decimal comma.
+        let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
+        let comma = line[..end].iter().position(|b| *b == b',');
+        let end = comma.filter(|at| end == line.len() || *at + 1 == end).unwrap_or(end);
         let (time, file) = line.split_at(end);
         let Some(time) = parse_f64(time).filter(|t| t.is_finite()) else {
             return Err(IoError::text(path, number, "the time", shown(time), "write seconds, then a file"));
