@@ -15,6 +15,8 @@
 mod choice;
 mod clouds;
 mod contents;
+#[cfg(test)]
+mod frame_tests;
 mod frames;
 mod info;
 mod lasers;
@@ -22,6 +24,8 @@ mod pictures;
 mod pose_source;
 mod sensors;
 mod stats;
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;
 

@@ -1,201 +1,15 @@
-//! Bags that are written here, and the real ones.
+//! Bags of planar lasers that are written here, and the real ones.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use portolan::geom::vector::distance;
-use portolan::scan::{BeamKind, Frame, RangeLimits};
+use portolan::scan::{BeamKind, RangeLimits};
 
+use super::testing::*;
 use super::*;
 use crate::scan_log::{ScanLog, ScanLogOptions};
 use crate::testing::{no_panic, real_data, says, temporary};
-use crate::{FileKind, LaserLog, LaserLogStats, detect, detect_no_return};
-
-const HEADER: &str = "===\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n";
-const SCAN: &str = "Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\nfloat32 time_increment\nfloat32 scan_time\n\
-    float32 range_min\nfloat32 range_max\nfloat32[] ranges\nfloat32[] intensities\n";
-const POSE: &str = "===\nMSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n===\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n\
-    ===\nMSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
-const STAMPED: &str = "Header header\ngeometry_msgs/Pose pose\n";
-const TF: &str = "geometry_msgs/TransformStamped[] transforms\n===\nMSG: geometry_msgs/TransformStamped\nHeader header\nstring child_frame_id\nTransform transform\n\
-    ===\nMSG: geometry_msgs/Transform\nVector3 translation\nQuaternion rotation\n===\nMSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n\
-    ===\nMSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
-const CLOUD: &str = "Header header\nuint32 height\nuint32 width\nPointField[] fields\nbool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n\
-    ===\nMSG: sensor_msgs/PointField\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n";
-const IMAGE: &str = "Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n";
-const INFO: &str = "Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] D\nfloat64[9] K\nfloat64[9] R\nfloat64[12] P\n\
-    uint32 binning_x\nuint32 binning_y\n";
-
-/// The start of the runs here (seconds): of the world's clock.
-const START: f64 = 1.7e9;
-
-/// The bytes of a message as ROS 1 has them.
-#[derive(Default)]
-struct Message(Vec<u8>);
-
-impl Message {
-    fn header(time: f64, frame: &str) -> Self {
-        let mut m = Self::default();
-        m.u32(&[0, time.floor() as u32, ((time - time.floor()) * 1e9).round() as u32]).text(frame);
-        m
-    }
-
-    fn u32(&mut self, all: &[u32]) -> &mut Self {
-        all.iter().for_each(|v| self.0.extend(v.to_le_bytes()));
-        self
-    }
-
-    fn f32(&mut self, all: &[f32]) -> &mut Self {
-        all.iter().for_each(|v| self.0.extend(v.to_le_bytes()));
-        self
-    }
-
-    fn f64(&mut self, all: &[f64]) -> &mut Self {
-        all.iter().for_each(|v| self.0.extend(v.to_le_bytes()));
-        self
-    }
-
-    fn text(&mut self, text: &str) -> &mut Self {
-        self.blob(text.as_bytes())
-    }
-
-    fn blob(&mut self, bytes: &[u8]) -> &mut Self {
-        self.u32(&[bytes.len() as u32]);
-        self.0.extend(bytes);
-        self
-    }
-
-    fn u8(&mut self, v: u8) -> &mut Self {
-        self.0.push(v);
-        self
-    }
-}
-
-/// Writes a bag.
-struct Run {
-    writer: mcap::Writer<std::io::Cursor<Vec<u8>>>,
-    channels: BTreeMap<String, u16>,
-}
-
-impl Run {
-    fn new() -> Self {
-        let writer = mcap::WriteOptions::new().compression(None).create(std::io::Cursor::new(Vec::new()));
-        Self { writer: writer.unwrap(), channels: BTreeMap::new() }
-    }
-
-    fn put(&mut self, topic: &str, kind: &str, text: &str, time: f64, message: &Message) {
-        let channel = match self.channels.get(topic) {
-            Some(channel) => *channel,
-            None => {
-                let text = format!("{text}{HEADER}");
-                let schema = self.writer.add_schema(kind, "ros1msg", text.as_bytes()).unwrap();
-                let channel = self.writer.add_channel(schema, topic, "ros1", &BTreeMap::new()).unwrap();
-                self.channels.insert(topic.into(), channel);
-                channel
-            }
-        };
-        let nanoseconds = (time * 1e9) as u64;
-        let header = mcap::records::MessageHeader {
-            channel_id: channel,
-            sequence: 0,
-            log_time: nanoseconds,
-            publish_time: nanoseconds,
-        };
-        self.writer.write_to_known_channel(&header, &message.0).unwrap();
-    }
-
-    /// Bearings from `first` by `step`; a range of 0.5 to 10 m is declared.
-    fn scan(&mut self, topic: &str, frame: &str, time: f64, [first, step]: [f32; 2], ranges: &[f32]) {
-        self.scan_at(topic, frame, time, time, [first, step], ranges);
-    }
-
-    fn scan_at(
-        &mut self,
-        topic: &str,
-        frame: &str,
-        log: f64,
-        time: f64,
-        [first, step]: [f32; 2],
-        ranges: &[f32],
-    ) {
-        let mut m = Message::header(time, frame);
-        m.f32(&[first, 0.0, step, 0.0, 0.0, 0.5, 10.0]).u32(&[ranges.len() as u32]).f32(ranges).u32(&[0]);
-        self.put(topic, "sensor_msgs/LaserScan", SCAN, log, &m);
-    }
-
-    fn transform(&mut self, topic: &str, [parent, child]: [&str; 2], time: f64, pose: [f64; 7]) {
-        let mut m = Message::default();
-        m.u32(&[1]);
-        m.0.extend(Message::header(time, parent).0);
-        m.text(child).f64(&pose);
-        self.put(topic, "tf2_msgs/TFMessage", TF, time, &m);
-    }
-
-    fn pose(&mut self, topic: &str, frame: &str, time: f64, pose: [f64; 7]) {
-        let mut m = Message::header(time, frame);
-        m.f64(&pose);
-        self.put(topic, "geometry_msgs/PoseStamped", &format!("{STAMPED}{POSE}"), time, &m);
-    }
-
-    /// Points of x, y, z as `f32`, a color, a time in nanoseconds.
-    fn cloud(&mut self, topic: &str, frame: &str, time: f64, points: &[[f32; 3]]) {
-        let mut data = Message::default();
-        for (i, p) in points.iter().enumerate() {
-            data.f32(p).u32(&[0x00ff_8000 + i as u32, 1_000_000 * i as u32]);
-        }
-        let mut m = Message::header(time, frame);
-        m.u32(&[1, points.len() as u32, 5]);
-        for (name, offset, kind) in [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("rgb", 12, 7), ("t", 16, 6)] {
-            m.text(name).u32(&[offset]).u8(kind).u32(&[1]);
-        }
-        m.u8(0).u32(&[20, 20 * points.len() as u32]).blob(&data.0).u8(1);
-        self.put(topic, "sensor_msgs/PointCloud2", CLOUD, time, &m);
-    }
-
-    fn image(&mut self, topic: &str, frame: &str, time: f64, encoding: &str, data: &[u8]) {
-        let mut m = Message::header(time, frame);
-        m.u32(&[2, 3]).text(encoding).u8(0).u32(&[data.len() as u32 / 2]).blob(data);
-        self.put(topic, "sensor_msgs/Image", IMAGE, time, &m);
-    }
-
-    fn bytes(mut self) -> Vec<u8> {
-        self.writer.finish().unwrap();
-        self.writer.into_inner().into_inner()
-    }
-
-    fn save(self) -> (tempfile::TempDir, PathBuf) {
-        let (folder, path) = temporary("run.mcap");
-        std::fs::write(&path, self.bytes()).unwrap();
-        (folder, path)
-    }
-}
-
-const LEVEL: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
-
-fn at(x: f64, y: f64, z: f64, [a, b, c, d]: [f64; 4]) -> [f64; 7] {
-    [x, y, z, a, b, c, d]
-}
-
-/// A robot that drives 1 m/s along x of `odom`, with a laser 0.2 m before and 0.3 m above its base.
-fn robot() -> Run {
-    let mut run = Run::new();
-    for k in 0..31 {
-        let t = 0.05 * f64::from(k);
-        run.transform("/tf", ["/odom", "/base_link"], START + t, at(t, 0.0, 0.0, LEVEL));
-    }
-    run
-}
-
-fn options(choice: BagChoice) -> ScanLogOptions {
-    ScanLogOptions { bag: choice, ..ScanLogOptions::default() }
-}
-
-fn stats(log: &LaserLog) -> &BagLogStats {
-    match log.stats() {
-        LaserLogStats::Bag(stats) => stats,
-        LaserLogStats::Carmen(_) => panic!("a bag"),
-    }
-}
+use crate::{FileKind, LaserLog, detect, detect_no_return};
 
 #[test]
 fn scans_have_poses_at_their_stamps_and_keep_what_the_sensor_says() {
@@ -417,91 +231,6 @@ fn a_turn_that_ends_at_the_stamp_is_told() {
 }
 
 #[test]
-fn clouds_are_read_by_index_with_colors_and_times() {
-    let mut run = robot();
-    for k in 0..5 {
-        let points = [[1.0, 2.0, 3.0], [f32::NAN; 3], [4.0 + k as f32, 5.0, 6.0]];
-        run.cloud("/points", "lidar", START + 0.25 * f64::from(k), &points);
-    }
-    run.transform("/tf_static", ["base_link", "lidar"], START, at(0.2, 0.0, 0.3, LEVEL));
-    let (_folder, path) = run.save();
-    let log =
-        ScanLog::open(&path, &ScanLogOptions { time_tolerance: 0.0, ..ScanLogOptions::default() }).unwrap();
-    assert_eq!((log.len(), log.kind().word()), (5, "bag"));
-    assert!(distance(log.pose(2).translation, [0.7, 0.0, 0.3]) < 1e-6);
-    assert!((log.time(2).unwrap() - START - 0.5).abs() < 1e-6);
-    for i in [3, 0] {
-        let Frame::Points(scan) = log.frame(i).unwrap() else { panic!("points") };
-        assert_eq!(scan.points, [[1.0, 2.0, 3.0], [4.0 + i as f32, 5.0, 6.0]]);
-        assert_eq!(scan.colors, [[0xff, 0x80, 0], [0xff, 0x80, 2]]);
-        assert_eq!(scan.refused.not_finite, 1);
-        assert!((scan.times[1] - 0.002).abs() < 1e-6 && scan.times[0] == 0.0, "{:?}", scan.times);
-    }
-    let about = log.bag().unwrap();
-    assert_eq!(about.point_times.as_deref(), Some("/points: t in nanoseconds after the stamp"));
-    // Without colors, by other poses.
-    let (_other, file) = temporary("poses.txt");
-    let rows: String =
-        (0..5).map(|k| format!("{:.3} {k} 0 0 0 0 0 1\n", START + 0.25 * f64::from(k))).collect();
-    std::fs::write(&file, rows).unwrap();
-    let own = ScanLogOptions { poses: Some(file), color: false, ..ScanLogOptions::default() };
-    let log = ScanLog::open(&path, &own).unwrap();
-    assert!((log.pose(3).translation[0] - 3.0).abs() < 1e-6);
-    let Frame::Points(scan) = log.frame(0).unwrap() else { panic!("points") };
-    assert!(scan.colors.is_empty());
-}
-
-#[test]
-fn depth_has_its_camera_and_the_colors_of_its_frame() {
-    let depth = [1000u16, 0, 2000, 500, 1500, 3000].map(u16::to_le_bytes).concat();
-    let write = |color_frame: &str, size: [u32; 2]| {
-        let mut run = robot();
-        run.transform(
-            "/tf_static",
-            ["base_link", "optical"],
-            START,
-            at(0.1, 0.0, 1.0, [-0.5, 0.5, -0.5, 0.5]),
-        );
-        for k in 0..3 {
-            let t = START + 0.1 * f64::from(k);
-            run.image("/camera/depth/image_rect_raw", "optical", t, "16UC1", &depth);
-            run.image("/camera/color/image_raw", color_frame, t + 0.001, "bgr8", &[7; 18]);
-            let mut m = Message::header(t, "optical");
-            m.u32(&[size[1], size[0]]).text("plumb_bob").u32(&[1]).f64(&[0.1]);
-            m.f64(&[2.0, 0.0, 1.5, 0.0, 2.5, 1.0, 0.0, 0.0, 1.0]).f64(&[0.0; 9]);
-            m.f64(&[3.0, 0.0, 1.25, 0.0, 0.0, 3.5, 0.75, 0.0, 0.0, 0.0, 1.0, 0.0]).u32(&[0, 0]);
-            run.put("/camera/depth/camera_info", "sensor_msgs/CameraInfo", INFO, t, &m);
-        }
-        run.save()
-    };
-    let (_a, path) = write("optical", [3, 2]);
-    let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
-    let pinhole = log.camera().unwrap().pinhole;
-    // Rectified pictures have the camera of P.
-    assert_eq!([pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy], [3.0, 3.5, 1.25, 0.75]);
-    let Frame::Image(image) = log.frame(1).unwrap() else { panic!("an image") };
-    assert_eq!(image.values, [1.0, 0.0, 2.0, 0.5, 1.5, 3.0]);
-    assert_eq!((image.columns, image.rows, &*image.colors), (3, 2, &[[7; 3]; 6][..]));
-    assert!(distance(log.pose(1).translation, [0.2, 0.0, 1.0]) < 1e-6);
-    let (_b, path) = write("color_optical", [3, 2]);
-    let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
-    let Frame::Image(image) = log.frame(0).unwrap() else { panic!("an image") };
-    assert!(image.colors.is_empty());
-    assert!(
-        log.bag()
-            .unwrap()
-            .notes
-            .iter()
-            .any(|n| n.contains("/camera/color/image_raw (frame color_optical) is not registered"))
-    );
-    let (_c, path) = write("optical", [640, 480]);
-    says(
-        ScanLog::open(&path, &ScanLogOptions::default()),
-        "the size of the picture is 3 x 2; the camera is for 640 x 480",
-    );
-}
-
-#[test]
 fn info_proposes_what_map_would_choose() {
     let mut run = robot();
     for k in 0..10 {
@@ -638,4 +367,30 @@ fn beams_have_times_and_the_laser_poses_at_them() {
             assert!((at.translation[0] - x).abs() < 1e-5, "{time}: {at:?}");
         }
     }
+}
+
+/// A laser that drives 1 m/s while it looks ahead, to the side and behind: what it sees is where it is in the frame of the stamp.
+#[test]
+fn the_motion_of_the_laser_is_taken_out_of_its_beams() {
+    let mut run = robot();
+    let mut m = Message::header(START + 0.5, "base_link");
+    let quarter = std::f32::consts::FRAC_PI_2;
+    m.f32(&[0.0, 0.0, quarter, 0.1, 0.3, 0.5, 10.0]).u32(&[4]).f32(&[2.0, 3.0, 4.0, f32::INFINITY]).u32(&[0]);
+    run.put("/scan", "sensor_msgs/LaserScan", SCAN, START + 0.5, &m);
+    let (_folder, path) = run.save();
+    let log = LaserLog::read_bag(&path, &ScanLogOptions::default()).unwrap();
+    let limits = RangeLimits::default();
+    let ends = |log: &LaserLog| -> Vec<[f64; 2]> {
+        log.scan(0, &limits).hits_world(&log.raw(0).world_from_laser).collect()
+    };
+    let near = |found: Vec<[f64; 2]>, expected: [[f64; 2]; 3]| {
+        assert!(found.iter().zip(expected).all(|(a, b)| distance(*a, b) < 1e-5), "{found:?}");
+    };
+    near(ends(&log), [[2.5, 0.0], [0.6, 3.0], [-3.3, 0.0]]);
+    let motion = log.motion().unwrap();
+    assert!((motion.deskewed, motion.still, motion.not_covered.0) == (1, 0, 0), "{motion:?}");
+    assert!((motion.largest - 0.2).abs() < 1e-5, "{motion:?}");
+    let left = log.without_deskew();
+    near(ends(&left), [[2.5, 0.0], [0.5, 3.0], [-3.5, 0.0]]);
+    assert_eq!(left.motion(), None);
 }
