@@ -23,7 +23,8 @@ pub(super) struct Clouds {
     /// How the times of points are read, by topic; none: there are none, or they have no meaning.
     times: BTreeMap<u32, PointTimes>,
     colors: bool,
-    origin: [f64; 3],
+    /// Where rays begin, where the caller said it.
+    origin: Option<[f64; 3]>,
     /// Whole meters that are taken off every point, so that an `f32` holds clouds far from zero.
     base: [f64; 3],
 }
@@ -37,8 +38,7 @@ impl Clouds {
         options: &ScanLogOptions,
         stats: &mut BagLogStats,
     ) -> Result<Self> {
-        let mut clouds =
-            Self { colors: options.color, origin: options.origin.unwrap_or([0.0; 3]), ..Self::default() };
+        let mut clouds = Self { colors: options.color, origin: options.origin, ..Self::default() };
         let mut of_topic: BTreeMap<u32, Vec<&ScanMessage>> = BTreeMap::new();
         for scan in scans {
             of_topic.entry(scan.message.topic).or_default().push(scan);
@@ -98,9 +98,10 @@ impl Clouds {
         file_from_frames(self.base)
     }
 
-    /// Where rays begin in the frame of the points (meters).
-    pub(super) fn origin(&self) -> [f64; 3] {
-        std::array::from_fn(|k| self.origin[k] - self.base[k])
+    /// Where rays begin in the frame of a scan's points (meters).
+    pub(super) fn origin(&self, scan: &ScanMessage) -> [f64; 3] {
+        let origin = self.origin.or(scan.origin).unwrap_or([0.0; 3]);
+        std::array::from_fn(|k| origin[k] - self.base[k])
     }
 
     /// Reads a scan.
@@ -126,7 +127,8 @@ impl Clouds {
                 IoError::layout(&contents.path, "a cloud", missing, "it is no cloud of points")
             })?
         };
-        Ok(scan_from(about(cloud, self.base, &contents.path)?, self.origin))
+        let origin = self.origin.or(scan.origin).unwrap_or([0.0; 3]);
+        Ok(scan_from(about(cloud, self.base, &contents.path)?, origin))
     }
 }
 

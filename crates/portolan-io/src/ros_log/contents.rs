@@ -77,6 +77,11 @@ impl Contents {
         Ok((contents, sensors.names, stats))
     }
 
+    /// Whether these topics are clouds, all of them.
+    pub(super) fn are_clouds(&self, mut numbers: impl Iterator<Item = u32>) -> bool {
+        numbers.all(|n| matches!(self.kind(n), Some(MessageKind::PointCloud2 | MessageKind::Livox)))
+    }
+
     /// Opens a bag. Messages are not read.
     pub(crate) fn open(path: &Path, choice: &BagChoice) -> Result<Self> {
         let bag_error = IoError::bag(path);

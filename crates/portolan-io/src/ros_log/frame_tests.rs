@@ -3,6 +3,7 @@
 use portolan::geom::vector::distance;
 use portolan::scan::{Frame, FrameFilter};
 
+use super::BagChoice;
 use super::testing::*;
 use crate::scan_log::{ScanLog, ScanLogOptions};
 use crate::testing::{says, temporary};
@@ -116,6 +117,49 @@ fn the_motion_of_the_sensor_is_taken_out_of_clouds() {
     );
     assert_eq!(motion.unwrap().deskewed, 1);
     assert_eq!(x(false), (vec![1.0, 4.0, 4.0], None));
+}
+
+/// What a SLAM publishes: clouds in the map's frame, and where it was. They are seen from there and not from zero.
+#[test]
+fn clouds_that_were_moved_into_the_maps_frame_are_seen_from_the_robot() {
+    let points = [[1.0, 2.0, 3.0], [4.0, 0.0, 0.0]];
+    let write = |tree: bool, topic: bool| {
+        let mut run = Run::new();
+        for k in 0..11 {
+            let t = 0.1 * f64::from(k);
+            let pose = at(2.0 * t, 1.0, 0.5, [0.0, 0.0, 1.0, 0.0]);
+            if tree {
+                run.transform("/tf", ["camera_init", "body"], START + t, pose);
+            }
+            if topic {
+                run.pose("/pose", "camera_init", START + t, pose);
+            }
+            run.cloud("/cloud_registered", "camera_init", START + t, &points);
+        }
+        run.save()
+    };
+    for (tree, topic) in [(false, true), (true, true), (true, false)] {
+        let (_folder, path) = write(tree, topic);
+        let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
+        let guesses = &log.bag().unwrap().guesses;
+        assert!(guesses.iter().any(|g| g.contains("were moved into the map's frame")), "{guesses:?}");
+        assert_eq!(*log.pose(5), portolan::geom::Pose::IDENTITY);
+        assert!(distance(log.sensor_position(5), [1.0, 1.0, 0.5]) < 1e-5, "{tree} {topic}");
+        let Frame::Points(scan) = log.frame(5).unwrap() else { panic!("points") };
+        assert_eq!(scan.points, points);
+        assert!(distance(scan.origin_of(0).unwrap(), [1.0, 1.0, 0.5]) < 1e-5);
+    }
+    // Where the frame of the scans moves, or nothing does, they are a sensor's.
+    let (_folder, path) = write(true, false);
+    let named = BagChoice { base_frame: Some("body".into()), ..BagChoice::default() };
+    let log = ScanLog::open(&path, &options(named)).unwrap();
+    assert!(distance(log.sensor_position(5), [1.0, 1.0, 0.5]) < 1e-5);
+    let mut still = Run::new();
+    still.transform("/tf_static", ["camera_init", "body"], START, at(1.0, 0.0, 0.0, LEVEL));
+    still.cloud("/points", "camera_init", START, &points);
+    let (_folder, path) = still.save();
+    let log = ScanLog::open(&path, &ScanLogOptions::default()).unwrap();
+    assert_eq!(log.sensor_position(0), [0.0; 3]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use portolan_ros::message::{Header, MessageKind};
 use super::clouds::Clouds;
 use super::contents::Decoders;
 use super::pictures::Pictures;
-use super::pose_source::{NoPose, PoseSource};
+use super::pose_source::{NoPose, PoseSource, SensorFrames};
 use super::{BagLogStats, Contents};
 use crate::poses3::RawPose;
 use crate::scan_log::{FrameSource, LayoutPoses, Parts, ScanId, ScanLogOptions, UnreadColors};
@@ -27,6 +27,8 @@ const MOST_SCANS: usize = 1 << 22;
 pub(super) struct ScanMessage {
     pub(super) message: MessageRef,
     pub(super) header: Header,
+    /// Where it was seen from in its frame (meters), where that is not the frame's zero.
+    pub(super) origin: Option<[f64; 3]>,
 }
 
 /// Opens a bag as a log of 3-D scans.
@@ -95,7 +97,7 @@ fn scan_messages(
                     unstamped += 1;
                     header.stamp = message.log_time;
                 }
-                scans.push(ScanMessage { message, header });
+                scans.push(ScanMessage { message, header, origin: None });
             }
             Err(error) => stats.refuse("cannot be read", || error.to_string()),
         }
@@ -131,10 +133,13 @@ fn poses_of(
         return Ok(LayoutPoses::PerScan(Vec::new()));
     }
     let frames = stats.sensor_frames.clone();
-    let source = PoseSource::choose(contents, &options.bag, options.time_tolerance, &frames, stats)?;
+    let clouds = contents.are_clouds(scans.iter().map(|scan| scan.message.topic));
+    let sensors = SensorFrames { names: &frames, clouds };
+    let source = PoseSource::choose(contents, &options.bag, options.time_tolerance, sensors, stats)?;
     let mut poses = Vec::with_capacity(scans.len());
-    scans.retain(|scan| match source.at(&scan.header.frame, scan.header.stamp) {
-        Ok(pose) => {
+    scans.retain_mut(|scan| match source.seen_from(&scan.header.frame, scan.header.stamp) {
+        Ok((pose, origin)) => {
+            scan.origin = origin;
             let raw = RawPose::new(pose.rotation, pose.translation, 0);
             poses.push(Some((contents.path.clone(), raw)));
             true
@@ -174,8 +179,8 @@ impl FrameSource for BagFrames {
         }
     }
 
-    fn origin(&self, _i: usize) -> [f64; 3] {
-        self.clouds.origin()
+    fn origin(&self, i: usize) -> [f64; 3] {
+        self.clouds.origin(&self.scans[i])
     }
 
     fn unread_colors(&self) -> Option<UnreadColors> {

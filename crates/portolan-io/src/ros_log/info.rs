@@ -6,7 +6,7 @@ use portolan_ros::container::TopicSummary;
 use portolan_ros::message::Header;
 use portolan_ros::transforms::FrameTree;
 
-use super::pose_source::PoseSource;
+use super::pose_source::{PoseSource, SensorFrames};
 use super::{BagLogStats, Contents};
 use crate::scan_log::ScanLogOptions;
 use crate::{IoError, Result};
@@ -143,7 +143,9 @@ impl BagInfo {
             .collect();
         frames.dedup();
         let mut stats = BagLogStats { guesses: sensors.guesses, ..BagLogStats::default() };
-        match PoseSource::choose(contents, &options.bag, options.time_tolerance, &frames, &mut stats) {
+        let clouds = contents.are_clouds(sensors.names.iter().flat_map(|name| contents.numbers(name)));
+        let of = SensorFrames { names: &frames, clouds };
+        match PoseSource::choose(contents, &options.bag, options.time_tolerance, of, &mut stats) {
             Ok(source) => {
                 let mut words: Vec<String> =
                     sensors.names.iter().flat_map(|name| ["--topic".to_owned(), name.clone()]).collect();

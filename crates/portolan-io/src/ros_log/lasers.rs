@@ -6,7 +6,7 @@ use std::sync::Arc;
 use portolan::geom::{Pose, Trajectory};
 use portolan_ros::message::{EchoChoice, LaserScan, MessageKind};
 
-use super::pose_source::{NoPose, PoseSource};
+use super::pose_source::{NoPose, PoseSource, SensorFrames};
 use super::{BagLogStats, Contents};
 use crate::laser_log::{Entry, FanShape, Fans, LaserLog, LaserLogStats, MOST_READINGS, MOST_SCANS};
 use crate::scan_log::ScanLogOptions;
@@ -196,7 +196,8 @@ impl Poses {
     ) -> Result<Self> {
         let Some(file) = &options.poses else {
             let frames = stats.sensor_frames.clone();
-            let source = PoseSource::choose(contents, &options.bag, options.time_tolerance, &frames, stats)?;
+            let sensors = SensorFrames { names: &frames, clouds: false };
+            let source = PoseSource::choose(contents, &options.bag, options.time_tolerance, sensors, stats)?;
             return Ok(Self::Bag(Box::new(source)));
         };
         let poses = read_poses_2d(file)?;

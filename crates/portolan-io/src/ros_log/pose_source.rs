@@ -17,6 +17,24 @@ pub(crate) struct PoseSource {
     /// The poses of a topic; `None`: the tree has them.
     topic: Option<PoseTopic>,
     tolerance: f64,
+    /// Scans are in a frame in which the robot moves: that of the map, into which a SLAM has moved its clouds already.
+    registered: Option<Registered>,
+}
+
+/// The frames of the scans.
+#[derive(Clone, Copy)]
+pub(crate) struct SensorFrames<'a> {
+    pub(crate) names: &'a [String],
+    /// Whether all scans are clouds.
+    pub(crate) clouds: bool,
+}
+
+/// What scans of the map's own frame were seen from.
+struct Registered {
+    /// The frame of the scans.
+    frame: String,
+    /// The frame whose position counts; `None`: the poses of the topic.
+    body: Option<String>,
 }
 
 struct PoseTopic {
@@ -47,7 +65,7 @@ impl PoseSource {
         contents: &Contents,
         choice: &BagChoice,
         tolerance: f64,
-        sensor_frames: &[String],
+        SensorFrames { names: sensor_frames, clouds }: SensorFrames<'_>,
         stats: &mut BagLogStats,
     ) -> Result<Self> {
         let tree = contents.tree(&mut stats.notes)?;
@@ -84,8 +102,11 @@ impl PoseSource {
                 return Err(IoError::layout(&contents.path, "where poses are", value, advice));
             }
         };
+        let scans = (sensor, clouds);
         let topic =
-            topic.map(|name| PoseTopic::read(contents, &name, choice, &tree, sensor, stats)).transpose()?;
+            topic.map(|name| PoseTopic::read(contents, &name, choice, &tree, scans, stats)).transpose()?;
+        // A laser's ranges are always seen from its own zero, whatever its frame is called.
+        let registered = if clouds { registered(topic.as_ref(), choice, &tree, sensor, stats) } else { None };
         let fixed = match (&choice.fixed_frame, &topic) {
             (Some(frame), _) => frame_name(frame).to_owned(),
             (None, Some(topic)) => topic.frame.clone(),
@@ -120,13 +141,16 @@ impl PoseSource {
                 format!("transforms {}", chain.join(" > "))
             }
             Some(topic) => match &topic.body {
+                None if registered.is_some() => {
+                    format!("scans are in the map's frame, seen from the poses of topic {}", topic.name)
+                }
                 None => format!("topic {}, taken as poses of the sensor", topic.name),
                 Some(body) => {
                     format!("topic {} of {body}, and transforms from {body} to the sensor", topic.name)
                 }
             },
         };
-        Ok(Self { tree, fixed, topic, tolerance })
+        Ok(Self { tree, fixed, topic, tolerance, registered })
     }
 
     /// The tree of frames.
@@ -139,22 +163,49 @@ impl PoseSource {
         self.topic.as_ref().map(|t| &*t.name)
     }
 
-    /// The pose of a frame in the fixed frame at a stamp (nanoseconds).
-    pub(crate) fn at(&self, sensor: &str, stamp: i64) -> Result<Pose<3>, NoPose> {
-        let lookup = |target: &str, source: &str| {
-            self.tree.lookup(target, source, stamp, self.tolerance).map_err(|cause| NoPose {
-                missing: match &cause {
-                    NoTransform::Time { parent, child, .. } => format!("transform {parent} > {child}"),
-                    other => other.to_string(),
-                },
-                text: format!("{cause} (stamp {:.3} s)", stamp as f64 * 1e-9),
-            })
+    /// Where a scan was seen from, in its own frame (meters), at a stamp (nanoseconds): `None` where that is the zero of a sensor's
+    /// frame. Scans that were moved into the map's frame were seen from where the robot was.
+    fn origin(&self, sensor: &str, stamp: i64) -> Result<Option<[f64; 3]>, NoPose> {
+        let Some(registered) = self.registered.as_ref().filter(|r| r.frame == sensor) else {
+            return Ok(None);
         };
-        let Some(topic) = &self.topic else { return lookup(&self.fixed, sensor) };
-        let frame_from_body = topic.track.at(stamp, self.tolerance).map_err(|cause| NoPose {
+        let pose = match (&registered.body, &self.topic) {
+            (None, Some(topic)) => self.on_topic(topic, stamp)?,
+            (body, _) => self.in_tree(sensor, body.as_deref().unwrap_or(sensor), stamp)?,
+        };
+        Ok(Some(pose.translation))
+    }
+
+    /// The pose of a scan's frame, and where it was seen from in it.
+    pub(crate) fn seen_from(&self, sensor: &str, stamp: i64) -> Result<(Pose<3>, Option<[f64; 3]>), NoPose> {
+        Ok((self.at(sensor, stamp)?, self.origin(sensor, stamp)?))
+    }
+
+    fn in_tree(&self, target: &str, source: &str, stamp: i64) -> Result<Pose<3>, NoPose> {
+        self.tree.lookup(target, source, stamp, self.tolerance).map_err(|cause| NoPose {
+            missing: match &cause {
+                NoTransform::Time { parent, child, .. } => format!("transform {parent} > {child}"),
+                other => other.to_string(),
+            },
+            text: format!("{cause} (stamp {:.3} s)", stamp as f64 * 1e-9),
+        })
+    }
+
+    fn on_topic(&self, topic: &PoseTopic, stamp: i64) -> Result<Pose<3>, NoPose> {
+        topic.track.at(stamp, self.tolerance).map_err(|cause| NoPose {
             missing: format!("topic {}", topic.name),
             text: format!("topic {}: {cause} (stamp {:.3} s)", topic.name, stamp as f64 * 1e-9),
-        })?;
+        })
+    }
+
+    /// The pose of a frame in the fixed frame at a stamp (nanoseconds).
+    pub(crate) fn at(&self, sensor: &str, stamp: i64) -> Result<Pose<3>, NoPose> {
+        let lookup = |target: &str, source: &str| self.in_tree(target, source, stamp);
+        let Some(topic) = &self.topic else { return lookup(&self.fixed, sensor) };
+        if self.registered.as_ref().is_some_and(|r| r.frame == sensor) {
+            return if topic.frame == self.fixed { Ok(Pose::IDENTITY) } else { lookup(&self.fixed, sensor) };
+        }
+        let frame_from_body = self.on_topic(topic, stamp)?;
         let fixed_from_body = match topic.frame == self.fixed {
             true => frame_from_body,
             false => lookup(&self.fixed, &topic.frame)? * frame_from_body,
@@ -164,6 +215,40 @@ impl PoseSource {
             Some(body) => Ok(fixed_from_body * lookup(body, sensor)?),
         }
     }
+}
+
+/// Whether scans of this frame were moved into the frame in which poses are, and what they were seen from then.
+fn registered(
+    topic: Option<&PoseTopic>,
+    choice: &BagChoice,
+    tree: &FrameTree,
+    sensor: &str,
+    stats: &mut BagLogStats,
+) -> Option<Registered> {
+    let moves_below = |frame: &str| {
+        let chain = tree.chain(frame);
+        let below = chain.iter().position(|e| e.parent == sensor);
+        below.is_some_and(|top| chain[..=top].iter().any(|edge| !edge.is_static))
+    };
+    let moves = tree.chain(sensor).iter().any(|edge| !edge.is_static);
+    let named = choice.base_frame.as_deref().map(frame_name).filter(|frame| moves_below(frame));
+    let (body, who) = if let Some(topic) = topic.filter(|topic| topic.frame == sensor) {
+        (None, format!("the poses of {}", topic.name))
+    } else if topic.is_some() || moves {
+        return None;
+    } else if let Some(frame) = named {
+        (Some(frame.to_owned()), format!("frame {frame}"))
+    } else {
+        let known = BODIES.iter().copied().find(|frame| moves_below(frame));
+        let below = || tree.edges().find(|e| e.parent == sensor && !e.is_static).map(|e| e.child);
+        let frame = known.or_else(below)?;
+        (Some(frame.to_owned()), format!("frame {frame} (--base-frame)"))
+    };
+    stats.guesses.push(format!(
+        "scans are in {sensor}, in which the robot moves: they were moved into the map's frame before, and were seen from \
+         {who}"
+    ));
+    Some(Registered { frame: sensor.to_owned(), body })
 }
 
 /// The frame of the map: `map` where it is above the sensor, else the top of the tree.
@@ -179,7 +264,7 @@ impl PoseTopic {
         name: &str,
         choice: &BagChoice,
         tree: &FrameTree,
-        sensor: &str,
+        (sensor, clouds): (&str, bool),
         stats: &mut BagLogStats,
     ) -> Result<Self> {
         let number = contents.existing(name, "--pose-topic")?;
@@ -241,7 +326,9 @@ impl PoseTopic {
         }
         let frame = frames.into_iter().next().unwrap_or_default();
         let child = children.into_iter().next().filter(|c| !c.is_empty());
-        let body = body_of(&name, choice, child, tree, sensor, stats);
+        // Clouds in the frame of the poses were moved there: see `registered`.
+        let is_moved = clouds && frame == sensor;
+        let body = if is_moved { None } else { body_of(&name, choice, child, tree, sensor, stats) };
         Ok(Self { name, track, frame, body })
     }
 }
