@@ -1,7 +1,6 @@
 //! How a failed run ends.
 
 use std::io::{self, Write};
-use std::process::ExitCode;
 
 /// The call was bad, whatever the files hold: exit status 2.
 #[derive(Debug)]
@@ -20,16 +19,23 @@ pub(crate) fn bad_call(text: impl Into<String>) -> anyhow::Error {
     BadCall(text.into()).into()
 }
 
+/// What was wrong with a call, in one line: the rest of what clap says is the usage of the command line.
+pub(crate) fn in_words(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let first = text.lines().next().unwrap_or_default();
+    first.strip_prefix("error: ").unwrap_or(first).to_owned()
+}
+
 /// Prints to stderr, in one line, what went wrong; gives the exit status.
-pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
+pub(crate) fn report(error: &anyhow::Error) -> u8 {
     // Whoever reads the output may stop early (`head`): not an error.
     if error.chain().any(|e| e.downcast_ref::<io::Error>().is_some_and(closed)) {
-        return ExitCode::SUCCESS;
+        return 0;
     }
     let text: String = format!("{error:#}").chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     // Without a stderr the text goes nowhere.
     let _ = writeln!(io::stderr(), "portolan: {text}");
-    ExitCode::from(if error.is::<BadCall>() { 2 } else { 1 })
+    if error.is::<BadCall>() { 2 } else { 1 }
 }
 
 fn closed(error: &io::Error) -> bool {

@@ -204,11 +204,10 @@ impl Args {
     }
 }
 
-/// Number of threads; those that share out the work are started.
+/// Number of threads. Those that share out the work are started where a number was asked for, else when they are needed.
 fn start_threads(threads: Option<u16>) -> anyhow::Result<usize> {
-    let threads = match threads {
-        Some(n) => usize::from(n),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
+    let Some(threads) = threads.map(usize::from) else {
+        return Ok(std::thread::available_parallelism().map_or(1, usize::from));
     };
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start threads")?;
     Ok(threads)

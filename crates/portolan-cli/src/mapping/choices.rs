@@ -103,6 +103,16 @@ pub(crate) enum WeightsArg {
 }
 
 impl WeightsArg {
+    /// Of the library's.
+    pub(super) fn of(model: WeightModel) -> Self {
+        match model {
+            WeightModel::Constant => Self::Constant,
+            WeightModel::InverseSquare => Self::Range,
+            WeightModel::CosIncidence => Self::Incidence,
+            WeightModel::InverseSquareCosIncidence => Self::RangeIncidence,
+        }
+    }
+
     /// As the library has it.
     pub(super) fn model(self) -> WeightModel {
         match self {

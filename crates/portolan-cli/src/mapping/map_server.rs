@@ -59,7 +59,7 @@ pub(crate) fn cells_for_map_server(file: &MapFile<2>) -> Option<(Grid<2>, Vec<Ma
 }
 
 /// The grid of a saved map.
-pub(super) fn grid_of(file: &MapFile<2>) -> Option<Grid<2>> {
+pub(crate) fn grid_of(file: &MapFile<2>) -> Option<Grid<2>> {
     let dense = file.tsdf.as_ref().map(|m| *m.grid());
     dense
         .or_else(|| file.grid.as_ref().map(|m| *m.store().grid()))

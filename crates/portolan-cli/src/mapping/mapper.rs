@@ -2,7 +2,7 @@
 
 use anyhow::{anyhow, bail};
 use portolan::Mapper;
-use portolan::geom::{Grid, Pose};
+use portolan::geom::{Aabb, Grid, Pose};
 use portolan::map::{Attenuation, Occupancy, OccupancyGrid, OccupancyTree, Tsdf, Tsdf2};
 use portolan::mapper::MapperMaps;
 use portolan::scan::Scan;
@@ -177,7 +177,27 @@ pub(crate) fn mapper_2d(
     // A box that ends at a face of cells touches the next ones, too.
     let mut bounds = grid.aabb();
     bounds.max = bounds.max.map(|v| v - 1e-6 * grid.lattice.resolution);
-    let how = recipe::mapper_settings(settings, Some(grid.lattice.origin), Some(bounds), limits.memory);
+    mapper_within(file, settings, grid, Some(bounds), limits)
+}
+
+/// The maps of a file, which are taken out of it and may grow beyond its grid.
+pub(crate) fn unbounded_mapper_2d(
+    file: &mut MapFile<2>,
+    settings: &Settings,
+    grid: &Grid<2>,
+    limits: &Limits,
+) -> anyhow::Result<Mapper<2>> {
+    mapper_within(file, settings, grid, None, limits)
+}
+
+fn mapper_within(
+    file: &mut MapFile<2>,
+    settings: &Settings,
+    grid: &Grid<2>,
+    bounds: Option<Aabb<2>>,
+    limits: &Limits,
+) -> anyhow::Result<Mapper<2>> {
+    let how = recipe::mapper_settings(settings, Some(grid.lattice.origin), bounds, limits.memory);
     let held = [
         (MapKind::Grid, file.grid.is_some()),
         (MapKind::Tree, file.tree.is_some()),
@@ -249,7 +269,7 @@ pub(crate) fn store_2d(
 }
 
 /// New maps on a lattice that fits the first pose, or those of a file, which are taken out of it.
-fn mapper_3d(
+pub(crate) fn mapper_3d(
     file: &mut MapFile<3>,
     settings: &Settings,
     first: &Pose<3>,
@@ -294,7 +314,7 @@ fn attenuation_bricks<const D: usize>(map: Attenuation<D>) -> AttenuationBricks<
 }
 
 /// Puts the maps into a file.
-fn store_3d(mapper: Mapper<3>, file: &mut MapFile<3>) {
+pub(crate) fn store_3d(mapper: Mapper<3>, file: &mut MapFile<3>) {
     let MapperMaps { occupancy, tsdf, attenuation } = mapper.into_maps();
     file.attenuation = attenuation.map(attenuation_bricks);
     file.occupancy_bricks = occupancy.map(|map| {

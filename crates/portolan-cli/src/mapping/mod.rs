@@ -32,8 +32,10 @@ pub(crate) use derived::{Derived, DistanceField};
 pub(crate) use extent::{brick_extent, check_memory, grid_over, seen, with_outlier};
 pub(crate) use files::{dense_esdf, polylines, write_contour, write_mesh};
 pub(crate) use fuse::{FusionReport, fuse_2d};
-pub(crate) use map_server::cells_for_map_server;
-pub(crate) use mapper::{Limits, OccupancyKinds, Run, mapper_2d, store_2d};
+pub(crate) use map_server::{cells_for_map_server, grid_of};
+pub(crate) use mapper::{
+    Limits, OccupancyKinds, Run, mapper_2d, mapper_3d, store_2d, store_3d, unbounded_mapper_2d,
+};
 pub(crate) use memory::available_memory;
 pub(crate) use octomap::Octree;
 pub(crate) use settings::Settings;

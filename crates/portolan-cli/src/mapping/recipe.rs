@@ -2,10 +2,14 @@
 
 use portolan::cell::{AttenuationRule, OccupancyModel, TsdfRule};
 use portolan::geom::Aabb;
+use portolan::map::BeamSweep;
 use portolan::mapper::MapperSettings;
 
-use super::choices::SweepArg;
+use super::choices::{SweepArg, WeightsArg};
+use super::settings::Shape;
 use super::{MapKind, Settings};
+use crate::arguments::ForgettingArgs;
+use crate::dimension::Dimension;
 
 /// Cells around everything that was seen, besides the truncation, in a dense map.
 pub(super) const MARGIN_CELLS: f64 = 4.0;
@@ -36,6 +40,52 @@ pub(super) fn mapper_settings<const D: usize>(
         max_distance: settings.max_distance,
         thin: settings.thin,
         ..MapperSettings::new(settings.resolution())
+    }
+}
+
+impl Settings {
+    /// The inverse: what a file says of maps that were made by this recipe.
+    pub(crate) fn of_mapper<const D: usize>(how: &MapperSettings<D>, dimension: Dimension) -> Self {
+        let sweep = match dimension {
+            Dimension::Two if how.beams == BeamSweep::March => SweepArg::March,
+            Dimension::Two => SweepArg::CellCentre,
+            Dimension::Three if how.exact => SweepArg::Exact,
+            Dimension::Three => SweepArg::Auto,
+        };
+        let mut settings = Self {
+            shape: Shape {
+                resolution: how.resolution,
+                truncation: Some(how.truncation()),
+                forgetting: ForgettingArgs::of(how.w_max),
+                weights: WeightsArg::of(how.weights),
+                sweep: Some(sweep),
+                carve: how.carve,
+                carve_weight: how.carve_weight,
+                color: how.color,
+                ..Shape::default()
+            },
+            max_distance: how.max_distance,
+            thin: how.thin,
+            ..Self::default()
+        }
+        .resolved(dimension);
+        settings.keep(&[
+            (MapKind::Grid, how.occupancy.is_some()),
+            (MapKind::Tree, how.occupancy.is_some()),
+            (MapKind::Tsdf, how.distances),
+            (MapKind::Attenuation, how.attenuation.is_some()),
+        ]);
+        settings
+    }
+
+    /// Drops the maps that there are not, and what is derived from them.
+    pub(crate) fn keep(&mut self, held: &[(MapKind, bool)]) {
+        let is_held = |kind: MapKind| held.iter().any(|(k, held)| *k == kind && *held);
+        let tsdf = is_held(MapKind::Tsdf);
+        self.maps.retain(|&kind| match kind {
+            MapKind::Esdf | MapKind::Contour | MapKind::Mesh => tsdf,
+            _ => is_held(kind),
+        });
     }
 }
 

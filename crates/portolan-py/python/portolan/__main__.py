@@ -1,0 +1,5 @@
+"""``python -m portolan``."""
+
+from ._command import main
+
+main()
