@@ -113,7 +113,7 @@ pub use points_csv::QueryPoints;
 pub use poses::{TimedPose, parse_poses_2d, read_poses_2d};
 pub use ros_log::{BagChoice, BagInfo, BagLogStats, EdgeOfBag, TopicOfBag, bag_dimension};
 pub use scan_graph::{ScanGraphNode, parse_scan_graph, read_scan_graph};
-pub use svg::{SvgStyle, write_svg};
+pub use svg::{SvgStyle, svg_text, write_svg};
 pub use xyz::read_xyz;
 
 /// Points joined by straight segments (meters); a closed line repeats its first point at the end.

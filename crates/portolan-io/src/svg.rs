@@ -7,7 +7,7 @@ use std::path::Path;
 use portolan::geom::Aabb;
 
 use crate::geojson::check_finite;
-use crate::{Polyline, Result, write_atomic};
+use crate::{IoError, Polyline, Result, write_atomic};
 
 /// How a contour is drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +42,22 @@ const FAR: f64 = 10_000.0;
 pub fn write_svg(path: impl AsRef<Path>, lines: &[Polyline], style: &SvgStyle) -> Result<()> {
     let path = path.as_ref();
     check_finite(path, lines)?;
+    write_atomic(path, |w| draw(w, lines, style))
+}
+
+/// The text of [`write_svg`].
+///
+/// # Errors
+/// [`crate::IoError::Unwritable`] for a coordinate that is not finite.
+pub fn svg_text(lines: &[Polyline], style: &SvgStyle) -> Result<String> {
+    let name = Path::new("contour.svg");
+    check_finite(name, lines)?;
+    let mut text = Vec::new();
+    draw(&mut text, lines, style).map_err(|error| IoError::os(name, "written", error))?;
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
+
+fn draw(w: &mut dyn Write, lines: &[Polyline], style: &SvgStyle) -> std::io::Result<()> {
     let mut bounds = Aabb::<2>::EMPTY;
     lines.iter().flatten().for_each(|&p| bounds.include(p));
     if bounds.is_empty() {
@@ -52,20 +68,18 @@ pub fn write_svg(path: impl AsRef<Path>, lines: &[Polyline], style: &SvgStyle) -
     let origin = if far { bounds.min.map(f64::floor) } else { [0.0; 2] };
     let [width, height] = bounds.extent();
     let scale = style.size_px / width.max(height);
-    write_atomic(path, |w| {
-        write!(w, "<svg xmlns=\"http://www.w3.org/2000/svg\" ")?;
-        let (left, top) = (bounds.min[0] - origin[0], -(bounds.max[1] - origin[1]));
-        write!(w, "viewBox=\"{left:.3} {top:.3} {width:.3} {height:.3}\" ")?;
-        write!(w, "width=\"{:.0}\" height=\"{:.0}\" ", width * scale, height * scale)?;
-        writeln!(w, "data-units=\"metres\" data-origin=\"{} {}\">", origin[0], origin[1])?;
-        // Negative scale: y is up in the world and down on the screen.
-        write!(w, "<g transform=\"scale(1 -1)\" fill=\"none\" stroke=\"{}\" ", escaped(&style.stroke))?;
-        writeln!(w, "stroke-width=\"{}\" stroke-linejoin=\"round\">", style.stroke_width_px / scale)?;
-        for line in lines.iter().filter(|l| l.len() > 1) {
-            writeln!(w, "<path d=\"{}\"/>", data(line, origin))?;
-        }
-        writeln!(w, "</g>\n</svg>")
-    })
+    write!(w, "<svg xmlns=\"http://www.w3.org/2000/svg\" ")?;
+    let (left, top) = (bounds.min[0] - origin[0], -(bounds.max[1] - origin[1]));
+    write!(w, "viewBox=\"{left:.3} {top:.3} {width:.3} {height:.3}\" ")?;
+    write!(w, "width=\"{:.0}\" height=\"{:.0}\" ", width * scale, height * scale)?;
+    writeln!(w, "data-units=\"metres\" data-origin=\"{} {}\">", origin[0], origin[1])?;
+    // Negative scale: y is up in the world and down on the screen.
+    write!(w, "<g transform=\"scale(1 -1)\" fill=\"none\" stroke=\"{}\" ", escaped(&style.stroke))?;
+    writeln!(w, "stroke-width=\"{}\" stroke-linejoin=\"round\">", style.stroke_width_px / scale)?;
+    for line in lines.iter().filter(|l| l.len() > 1) {
+        writeln!(w, "<path d=\"{}\"/>", data(line, origin))?;
+    }
+    writeln!(w, "</g>\n</svg>")
 }
 
 /// Path commands, a tenth of a millimeter fine.

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Mutex;
 
+use numpy::PyArrayDyn;
 use portolan::geom::Pose;
 use portolan::map::MapError;
-use portolan::scan::ScanStats;
-use portolan_cli::library::{MapperOfFile, read_mapper, save_2d, save_3d};
+use portolan::scan::{Frame, Projection, ScanStats};
+use portolan_cli::library::{MapperOfFile, picture_2d, picture_of_mesh, read_mapper, save_2d, save_3d};
 use portolan_io::MapFile;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -20,7 +21,7 @@ use crate::fault::{of_command, of_map, value_error, work};
 use crate::log::{Log, Scan};
 use crate::occupancy::Occupancy;
 use crate::options::{Options, sweep_of, weights_of};
-use crate::pose::pose_of;
+use crate::pose::{matrices, pose_of};
 use crate::readings::{AnyScan, Readings};
 use crate::stats::counts;
 use crate::surface::{Contour, Mesh};
@@ -30,6 +31,8 @@ use crate::tsdf::Tsdf;
 struct Held<const D: usize> {
     mapper: portolan::Mapper<D>,
     rest: MapFile<D>,
+    /// Whether depth images were fused: their sensor looks along z.
+    camera: bool,
 }
 
 /// Fuses scans into an occupancy map, signed distances and hits per meter of one lattice. See the stubs for its arguments.
@@ -69,11 +72,11 @@ impl Mapper {
             *maps = Some(match d {
                 2 => {
                     let mapper = portolan::Mapper::with(options.settings::<2>()?);
-                    Either::Two(Box::new(Held { mapper, rest: MapFile::default() }))
+                    Either::Two(Box::new(Held { mapper, rest: MapFile::default(), camera: false }))
                 }
                 _ => {
                     let mapper = portolan::Mapper::with(options.settings::<3>()?);
-                    Either::Three(Box::new(Held { mapper, rest: MapFile::default() }))
+                    Either::Three(Box::new(Held { mapper, rest: MapFile::default(), camera: false }))
                 }
             });
         }
@@ -395,12 +398,16 @@ impl Mapper {
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         let held = self.with(py, |maps| {
             maps.as_ref().map(|maps| match maps {
-                Either::Two(h) => {
-                    Either::Two(Box::new(Held { mapper: h.mapper.clone(), rest: h.rest.clone() }))
-                }
-                Either::Three(h) => {
-                    Either::Three(Box::new(Held { mapper: h.mapper.clone(), rest: h.rest.clone() }))
-                }
+                Either::Two(h) => Either::Two(Box::new(Held {
+                    mapper: h.mapper.clone(),
+                    rest: h.rest.clone(),
+                    camera: h.camera,
+                })),
+                Either::Three(h) => Either::Three(Box::new(Held {
+                    mapper: h.mapper.clone(),
+                    rest: h.rest.clone(),
+                    camera: h.camera,
+                })),
             })
         })?;
         Ok(Self { options: self.options.clone(), held: Mutex::new(held) })
@@ -422,6 +429,35 @@ impl Mapper {
             None => Err(anyhow::anyhow!("{}: nothing was fused, there is no map to write", path.display())),
         })?
         .map_err(|error| of_command(&error))
+    }
+
+    /// What notebooks show: cells, contour and path in 2-D, the mesh from sensible views in 3-D.
+    fn _repr_png_(&self, py: Python<'_>) -> PyResult<Option<Vec<u8>>> {
+        self.with(py, |maps| match maps {
+            Some(Either::Two(held)) => picture_2d(held.mapper.clone(), held.rest.clone()),
+            Some(Either::Three(held)) => {
+                let title =
+                    format!("cells of {} m, {} scans", self.options.resolution, held.mapper.stats().scans);
+                Ok(picture_of_mesh(&held.mapper.mesh(), &held.rest.poses, held.camera, &title))
+            }
+            None => Ok(None),
+        })?
+        .map_err(|error| of_command(&error))
+    }
+
+    /// Poses of the fused scans, world from sensor: `(N, 3, 3)` or `(N, 4, 4)`.
+    #[getter]
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<f64>>>> {
+        let poses = self.with(py, |maps| match maps {
+            Some(Either::Two(held)) => Some(Either::Two(held.rest.poses.clone())),
+            Some(Either::Three(held)) => Some(Either::Three(held.rest.poses.clone())),
+            None => None,
+        })?;
+        Ok(match poses {
+            Some(Either::Two(poses)) => Some(matrices::<2, 3>(py, &poses)?),
+            Some(Either::Three(poses)) => Some(matrices::<3, 4>(py, &poses)?),
+            None => None,
+        })
     }
 
     /// 2 or 3; `None` until the first scan.
@@ -477,11 +513,11 @@ pub(crate) fn load(py: Python<'_>, path: PathBuf, memory: Option<usize>) -> PyRe
     let (held, resolution) = match read {
         MapperOfFile::Two(mapper, rest) => {
             let resolution = mapper.settings().resolution;
-            (Either::Two(Box::new(Held { mapper: *mapper, rest: *rest })), resolution)
+            (Either::Two(Box::new(Held { mapper: *mapper, rest: *rest, camera: false })), resolution)
         }
         MapperOfFile::Three(mapper, rest) => {
             let resolution = mapper.settings().resolution;
-            (Either::Three(Box::new(Held { mapper: *mapper, rest: *rest })), resolution)
+            (Either::Three(Box::new(Held { mapper: *mapper, rest: *rest, camera: false })), resolution)
         }
     };
     let options = Options { memory, ..Options::usual(resolution) };

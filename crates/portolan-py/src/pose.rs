@@ -55,11 +55,23 @@ pub(crate) fn matrix<'py, const D: usize, const N: usize>(
     py: Python<'py>,
     pose: &Pose<D>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let mut all = vec![[0.0; N]; N];
+    rows(py, entries::<D, N>(pose).to_vec(), &[N])
+}
+
+/// Poses as matrices.
+pub(crate) fn matrices<'py, const D: usize, const N: usize>(
+    py: Python<'py>,
+    poses: &[Pose<D>],
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    rows(py, poses.iter().flat_map(entries::<D, N>).collect(), &[poses.len(), N])
+}
+
+fn entries<const D: usize, const N: usize>(pose: &Pose<D>) -> [[f64; N]; N] {
+    let mut all = [[0.0; N]; N];
     for i in 0..D {
         all[i][..D].copy_from_slice(&pose.rotation[i]);
         all[i][D] = pose.translation[i];
     }
     all[D][D] = 1.0;
-    rows(py, all, &[N])
+    all
 }

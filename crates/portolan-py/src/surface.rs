@@ -1,9 +1,12 @@
 //! Meshes and contours.
 
 use numpy::PyArrayDyn;
+use portolan_cli::library::picture_of_mesh;
+use portolan_io::{Polyline, SvgStyle, svg_text};
 use pyo3::prelude::*;
 
 use crate::arrays::rows;
+use crate::fault::{value_error, work};
 
 /// Triangles with shared vertices; normals point to free space.
 #[pyclass(frozen, module = "portolan")]
@@ -12,6 +15,18 @@ pub(crate) struct Mesh(pub(crate) portolan::surface::Mesh);
 /// Segments with shared vertices; free space lies on the left of every segment.
 #[pyclass(frozen, module = "portolan")]
 pub(crate) struct Contour(portolan::surface::Contour);
+
+/// The lines of a contour; closed ones repeat their first point.
+fn lines(contour: &portolan::surface::Contour) -> Vec<Polyline> {
+    let closed = |line: portolan::surface::Polyline| {
+        let mut points = line.vertices;
+        if line.closed {
+            points.extend(points.first().copied());
+        }
+        points
+    };
+    contour.polylines().into_iter().map(closed).collect()
+}
 
 impl Mesh {
     pub(crate) fn new(mesh: portolan::surface::Mesh) -> Self {
@@ -60,6 +75,11 @@ impl Mesh {
         self.0.area()
     }
 
+    /// What notebooks show: the mesh from sensible views.
+    fn _repr_png_(&self, py: Python<'_>) -> PyResult<Option<Vec<u8>>> {
+        work(py, || picture_of_mesh(&self.0, &[], false, "mesh"))
+    }
+
     fn __len__(&self) -> usize {
         self.0.triangles.len()
     }
@@ -85,21 +105,24 @@ impl Contour {
 
     /// The lines that the segments make, an array of points each; closed ones repeat their first point.
     fn polylines<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArrayDyn<f64>>>> {
-        let lines = self.0.polylines().into_iter().map(|line| {
-            let mut points = line.vertices;
-            if line.closed {
-                points.extend(points.first().copied());
-            }
+        let array = |points: Vec<_>| {
             let n = points.len();
             rows(py, points, &[n])
-        });
-        lines.collect()
+        };
+        lines(&self.0).into_iter().map(array).collect()
     }
 
     /// Length of all segments (meters).
     #[getter]
     fn length(&self) -> f64 {
         self.0.length()
+    }
+
+    /// What notebooks show: the lines, one unit a meter.
+    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
+        let text =
+            work(py, || svg_text(&lines(&self.0), &SvgStyle { size_px: 600.0, ..SvgStyle::default() }))?;
+        text.map_err(|error| value_error(error.to_string()))
     }
 
     fn __len__(&self) -> usize {

@@ -70,13 +70,18 @@ fn describe<const D: usize>(mapper: &Mapper<D>, settings: &Settings, header: &mu
 ///
 /// # Errors
 /// A map without scans, or one that spans too much for arrays; a file that cannot be written.
-pub fn save_2d(mapper: Mapper<2>, mut rest: MapFile<2>, path: &Path) -> anyhow::Result<()> {
+pub fn save_2d(mapper: Mapper<2>, rest: MapFile<2>, path: &Path) -> anyhow::Result<()> {
+    Ok(in_file_2d(mapper, rest, path)?.write(path)?)
+}
+
+/// The maps put into the rest of a file.
+pub(super) fn in_file_2d(mapper: Mapper<2>, mut rest: MapFile<2>, path: &Path) -> anyhow::Result<MapFile<2>> {
     let settings = Settings::of_mapper(mapper.settings(), Dimension::Two);
     describe(&mapper, &settings, &mut rest.header);
     let grid = grid(&mapper, path)?;
     let kinds = OccupancyKinds::of(&settings, &rest);
     mapping::store_2d(mapper, kinds, &grid, &mut rest)?;
-    Ok(rest.write(path)?)
+    Ok(rest)
 }
 
 /// [`save_2d`] in 3-D, in bricks.

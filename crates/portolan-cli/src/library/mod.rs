@@ -1,7 +1,9 @@
 //! What other front ends have in common with the command line: logs opened by the same options, maps in the same file.
 
 mod maps;
+mod pictures;
 mod scans;
 
 pub use maps::{MapperOfFile, read_mapper, save_2d, save_3d};
+pub use pictures::{picture_2d, picture_of_mesh};
 pub use scans::{OpenLog, StampedFrame, StampedScan};
