@@ -3,6 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use portolan::map::MapError;
+use portolan_io::IoError;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -29,7 +30,10 @@ pub(crate) fn of_map(error: &MapError) -> PyErr {
 /// What the command line would have said: `OSError` where the system refused, else `ValueError`.
 pub(crate) fn of_command(error: &anyhow::Error) -> PyErr {
     let text = format!("{error:#}");
-    let of_system = error.chain().find_map(|cause| cause.downcast_ref::<std::io::Error>());
+    let of_system = error.chain().find_map(|cause| match cause.downcast_ref::<IoError>() {
+        Some(IoError::Os { cause, .. }) => Some(cause),
+        _ => cause.downcast_ref::<std::io::Error>(),
+    });
     match of_system.map(std::io::Error::kind) {
         Some(std::io::ErrorKind::NotFound) => pyo3::exceptions::PyFileNotFoundError::new_err(text),
         Some(std::io::ErrorKind::PermissionDenied) => pyo3::exceptions::PyPermissionError::new_err(text),

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use numpy::PyArrayDyn;
 use portolan::geom::Pose;
 use portolan::map::MapError;
-use portolan::scan::{Frame, Projection, ScanStats};
+use portolan::scan::{Frame, Projection, RangeImage, ScanStats};
 use portolan_cli::library::{MapperOfFile, picture_2d, picture_of_mesh, read_mapper, save_2d, save_3d};
 use portolan_io::MapFile;
 use pyo3::exceptions::PyRuntimeError;
@@ -102,6 +102,8 @@ impl Mapper {
             let fused: Result<_, MapError> = match (maps, &pose, scan) {
                 (Either::Two(held), Either::Two(pose), Either::Two(scan)) => fuse_one(held, pose, scan),
                 (Either::Three(held), Either::Three(pose), Either::Three(frame)) => {
+                    let is_depth = |image: &RangeImage| matches!(image.projection, Projection::Pinhole(_));
+                    held.camera |= matches!(frame, Frame::Image(image) if is_depth(image));
                     fuse_one(held, pose, frame)
                 }
                 _ => return Err(value_error("pose, scan and map are of different dimensions")),

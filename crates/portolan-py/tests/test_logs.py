@@ -1,6 +1,5 @@
 """Logs: scans as arrays, and the same map as the command line makes, bit for bit."""
 
-import json
 import subprocess
 import sys
 
@@ -34,9 +33,8 @@ def test_a_2d_log_is_the_map_of_the_command_line(tmp_path):
     path = data("lidar2d_carmen/intel-corrected.log.gz")
     command_line("map", path, "--resolution", 0.1, "--every", 20, "--out", tmp_path)
     theirs = portolan.load(tmp_path)
-    summary = json.loads((tmp_path / "summary.json").read_text())
     log = portolan.open(path, every=20)
-    assert log.dimension == 2 and len(log) == summary["log"]["scans"] // 20 + 1 or len(log) > 10
+    assert log.dimension == 2 and len(log) > 10
     grid = theirs.esdf().to_array()
     # The same lattice, to the last bit.
     ours = portolan.Mapper(0.1, origin=grid["origin"])

@@ -14,9 +14,9 @@ def test_distances_are_those_to_the_walls(room):
     distance, gradient, status = field.distance_and_gradient(points)
     wall = 2 - np.abs(points).max(axis=1)
     known = status == Status.KNOWN
-    assert known.mean() > 0.7 and set(status[~known]) <= {Status.SATURATED}
+    assert known.mean() > 0.65 and set(status[~known]) <= {Status.SATURATED}
     assert np.abs(distance - wall)[known].max() < 0.02
-    assert (distance[~known] >= 1 - 1e-6).all() and (wall[~known] > 0.95).all()
+    assert (distance[~known] > 0.95).all() and (wall >= distance - 0.02)[~known].all()
     assert np.abs(np.linalg.norm(gradient[known], axis=1) - 1).max() < 0.3
     assert (field.distance(points)[0] == distance).all()
 
@@ -41,14 +41,16 @@ def test_unknown_is_never_a_number(room):
 
 def test_clearance_holds_the_distance_and_respects_the_unknown(room):
     points = np.random.default_rng(2).uniform(-1.9, 1.9, (500, 2))
-    field = room.esdf()
+    field, contour = room.esdf(), room.contour()
     lower, upper, status = field.clearance(points, unknown="optimistic")
-    assert (status == Status.KNOWN).any()
-    distance, _ = field.distance(points)
-    inside = np.isfinite(distance) & (status == Status.KNOWN)
-    assert (lower[inside] <= distance[inside] + 1e-6).all() and (distance[inside] <= upper[inside] + 1e-6).all()
+    known = status == Status.KNOWN
+    assert known.sum() > 200
+    a, b = (contour.vertices[contour.segments[:, k]] for k in range(2))
+    t = np.clip(((points[:, None] - a) * (b - a)).sum(axis=2) / ((b - a) ** 2).sum(axis=1), 0, 1)
+    exact = np.linalg.norm(points[:, None] - a - t[..., None] * (b - a), axis=2).min(axis=1)
+    assert (lower[known] <= exact[known] + 1e-9).all() and (exact[known] <= upper[known] + 1e-9).all()
     pessimistic, _, _ = field.clearance(points)
-    assert (pessimistic[inside] <= lower[inside] + 1e-9).all()
+    assert (pessimistic[known] <= lower[known] + 1e-9).all()
 
 
 def test_paths(room):
@@ -169,9 +171,10 @@ def test_saved_and_read_again(room, tmp_path):
         lambda m: m.occupancy.occupancy(points)[0],
         lambda m: m.tsdf.distance(points)[0],
         lambda m: m.attenuation.attenuation(points)[0],
-        lambda m: m.esdf().distance(points)[0],
     ]:
-        assert np.array_equal(np.nan_to_num(ask(room), nan=9e9), np.nan_to_num(ask(again), nan=9e9))
+        assert np.array_equal(ask(room), ask(again), equal_nan=True)
+    # Its array has a corner of its own, and so places that are rounded otherwise.
+    assert np.allclose(room.esdf().distance(points)[0], again.esdf().distance(points)[0], atol=1e-6, equal_nan=True)
     ranges, bearings = room_scan(at=(30.0, 0.0))
     again.integrate(ranges=np.full(720, 1.0), bearings=bearings, pose=(30, 0, 0))
     assert again.occupancy.occupancy([[31.01, 0.0]])[0] > 0.5, "a map that was read grows"

@@ -246,16 +246,30 @@ pub(crate) fn store_2d(
 ) -> anyhow::Result<()> {
     let lost = || anyhow!("the maps do not fit their grid");
     let MapperMaps { occupancy, tsdf, attenuation } = mapper.into_maps();
-    file.attenuation = attenuation.map(attenuation_bricks);
+    let attenuation = attenuation.map(|map| {
+        if *map.store().lattice() == grid.lattice {
+            return Ok(map);
+        }
+        let rule = *map.rule();
+        let dense = Dense::of_bricks(map.store(), *grid).ok_or_else(lost)?;
+        let store = Bricks::of_dense(&dense, grid.lattice).ok_or_else(lost)?;
+        anyhow::Ok(Attenuation::<2>::from_store(store, rule)?)
+    });
+    file.attenuation = attenuation.transpose()?.map(attenuation_bricks);
     if let Some(map) = occupancy {
         let model = *map.model();
         let store = map.into_store();
+        let dense = Dense::of_bricks(&store, *grid).ok_or_else(lost)?;
         if kinds.tree {
+            // A tree takes bricks of its own lattice.
+            let store = match *store.lattice() == grid.lattice {
+                true => store,
+                false => Bricks::of_dense(&dense, grid.lattice).ok_or_else(lost)?,
+            };
             let tree = Tree::covering(grid).and_then(|tree| tree.with_bricks(&store)).ok_or_else(lost)?;
             file.tree = Some(OccupancyTree::from_store(tree, model)?);
         }
         if kinds.grid {
-            let dense = Dense::of_bricks(&store, *grid).ok_or_else(lost)?;
             file.grid = Some(OccupancyGrid::from_store(dense, model)?);
         }
     }

@@ -8,8 +8,8 @@ Range scans with known poses, fused once, into the maps that robots, renderers a
 >>> mapper = portolan.Mapper(0.05)
 >>> stats = mapper.integrate(ranges=ranges, bearings=bearings, pose=(0, 0, 0))
 >>> distance, away, status = mapper.esdf().distance_and_gradient([[1.5, 0.02]])
->>> bool(abs(distance[0] - 0.5) < 0.01), status[0] == portolan.Status.KNOWN
-(True, True)
+>>> bool(abs(distance[0] - 0.5) < 0.01 and status[0] == portolan.Status.KNOWN)
+True
 
 Arrays of points have the shape ``(..., D)`` with D = 2 or 3, lengths are meters, angles radians, times seconds. Answers come
 with an array of statuses (:class:`Status`): a value is NaN where there is none.
