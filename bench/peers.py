@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """One workload by one peer: prints one JSON line. `compare.py` calls it; by hand: peers.py WORKLOAD PEER --data DIR.
 
-Only the peer's own library calls are inside the clock. What it reads is what portolan reads: KITTI folders, 7-Scenes
+Only the peer's own library calls are inside the clock, and its constructors and what they allocate beforehand are not. What it reads is what portolan reads: KITTI folders, 7-Scenes
 folders, npy volumes.
 """
 import argparse
@@ -53,10 +53,13 @@ def seven_scenes(folder, scans):
         yield cv2.imread(str(depth), cv2.IMREAD_UNCHANGED), pose
 
 
-def octomap_tree(args, scans, discretize):
+def octomap_tree(args):
     import octomap
 
-    tree = octomap.OcTree(args.resolution)
+    return octomap.OcTree(args.resolution)
+
+
+def insert(tree, scans, discretize):
     for points, origin in scans:
         tree.insertPointCloud(points, origin, -1.0, False, discretize)
     return tree
@@ -64,8 +67,8 @@ def octomap_tree(args, scans, discretize):
 
 def occupancy(args):
     scans = list(kitti(args.data / "lidar_building", args.scans))
-    run = lambda: octomap_tree(args, scans, args.peer == "octomap-discretized")
-    return len(scans), run, lambda tree: {"nodes": tree.size(), "bytes": tree.memoryUsage()}
+    run = lambda tree: insert(tree, scans, args.peer == "octomap-discretized")
+    return len(scans), lambda: octomap_tree(args), run, lambda tree: {"nodes": tree.size(), "bytes": tree.memoryUsage()}
 
 
 def lidar_tsdf(args):
@@ -79,13 +82,15 @@ def lidar_tsdf(args):
         pose[:3, 3] = origin
         poses.append(pose)
 
-    def run():
-        volume = vdbfusion.VDBVolume(args.resolution, 3 * args.resolution, args.carve)
+    def make():
+        return vdbfusion.VDBVolume(args.resolution, 3 * args.resolution, args.carve)
+
+    def run(volume):
         for (points, _), pose in zip(scans, poses):
             volume.integrate(points, pose)
         return volume
 
-    return len(scans), run, lambda volume: {}
+    return len(scans), make, run, lambda volume: {}
 
 
 def depth_tsdf(args):
@@ -99,16 +104,19 @@ def depth_tsdf(args):
         for depth, pose in seven_scenes(folder, args.scans)
     ]
 
-    def run():
-        grid = o3d.t.geometry.VoxelBlockGrid(
+    # Room for as many blocks as there will be: 0.4 s of clearing it are not a frame's.
+    def make():
+        return o3d.t.geometry.VoxelBlockGrid(
             ("tsdf", "weight"), (core.float32, core.float32), ((1), (1)), args.resolution, 8, 200_000
         )
+
+    def run(grid):
         for image, camera_from_world in frames:
             blocks = grid.compute_unique_block_coordinates(image, intrinsics, camera_from_world, 1000.0, 8.0, 4.0)
             grid.integrate(blocks, image, intrinsics, camera_from_world, 1000.0, 8.0, 4.0)
         return grid
 
-    return len(frames), run, lambda grid: {"blocks": int(grid.hashmap().size())}
+    return len(frames), make, run, lambda grid: {"blocks": int(grid.hashmap().size())}
 
 
 def surface(args):
@@ -118,11 +126,13 @@ def surface(args):
     if args.peer == "scikit-image":
         from skimage import measure
 
-        run, count = lambda: measure.marching_cubes(volume, 0.0)[:2], lambda r: len(r[1])
+        make, run = lambda: None, lambda _: measure.marching_cubes(volume, 0.0)[:2]
+        count = lambda r: len(r[1])
     elif args.peer == "pymcubes":
         import mcubes
 
-        run, count = lambda: mcubes.marching_cubes(volume, 0.0), lambda r: len(r[1])
+        make, run = lambda: None, lambda _: mcubes.marching_cubes(volume, 0.0)
+        count = lambda r: len(r[1])
     else:
         import vtk
         from vtk.util import numpy_support
@@ -134,27 +144,29 @@ def surface(args):
         image.SetDimensions(*volume.shape[::-1])
         image.GetPointData().SetScalars(numpy_support.numpy_to_vtk(volume.ravel(), deep=0))
 
-        def run():
+        def make():
             edges = vtk.vtkFlyingEdges3D()
             edges.SetInputData(image)
             edges.SetValue(0, 0.0)
             edges.ComputeGradientsOff()
             if args.peer == "flying-edges":
                 edges.ComputeNormalsOff()
+            return edges
+
+        def run(edges):
             edges.Update()
             return edges.GetOutput()
 
         count = lambda r: r.GetNumberOfPolys()
-    return 1, run, lambda result: {"triangles": count(result)}
+    return 1, make, run, lambda result: {"triangles": count(result)}
 
 
 def query(args):
     import numpy as np
 
-    tree = octomap_tree(args, kitti(args.data / "lidar_building", args.scans), True)
+    tree = insert(octomap_tree(args), kitti(args.data / "lidar_building", args.scans), True)
     points = np.fromfile(args.data / "grids" / "w5_queries_1e6x3.f32", "<f4").reshape(-1, 3).astype(np.float64)
-    run = lambda: tree.getLabels(points)
-    return len(points), run, lambda labels: {"known": int((np.asarray(labels) >= 0).sum())}
+    return len(points), lambda: None, lambda _: tree.getLabels(points), lambda labels: {"known": int((np.asarray(labels) >= 0).sum())}
 
 
 def main():
@@ -164,15 +176,16 @@ def main():
         for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR"):
             os.environ[f"{name}_NUM_THREADS"] = "1"
     try:
-        per, run, describe = globals()[args.workload.replace("-", "_")](args)
+        per, make, run, describe = globals()[args.workload.replace("-", "_")](args)
     except ImportError as missing:
         print(json.dumps({"missing": str(missing)}))
         return
     seconds, result = [], None
     for _ in range(args.repeats):
         result = None  # the last run's memory is not this one's
+        made = make()
         start = time.perf_counter()
-        result = run()
+        result = run(made)
         seconds.append(time.perf_counter() - start)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     print(json.dumps({"seconds": seconds, "per": per, "peak": peak, **describe(result)}))
