@@ -17,7 +17,9 @@ def test_distances_are_those_to_the_walls(room):
     assert known.mean() > 0.65 and set(status[~known]) <= {Status.SATURATED}
     assert np.abs(distance - wall)[known].max() < 0.02
     assert (distance[~known] > 0.95).all() and (wall >= distance - 0.02)[~known].all()
-    assert np.abs(np.linalg.norm(gradient[known], axis=1) - 1).max() < 0.3
+    # Shorter where two walls are equally near.
+    length = np.linalg.norm(gradient[known], axis=1)
+    assert (np.abs(length - 1) < 0.01).mean() > 0.9 and length.max() < 1.1
     assert (field.distance(points)[0] == distance).all()
 
 

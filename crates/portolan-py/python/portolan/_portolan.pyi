@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 __version__: str
 
-Floats = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
-Path = Union[str, PathLike[str]]
-Unknown = Literal["pessimistic", "optimistic"]
+_Floats = NDArray[np.float64]
+_Bytes = NDArray[np.uint8]
+_Path = Union[str, PathLike[str]]
+_Unknown = Literal["pessimistic", "optimistic"]
 
 class MapFull(MemoryError):
     """A map would need more memory than it may have. What was fused before stays."""
@@ -135,7 +135,7 @@ class Mapper:
     def copy(self) -> Mapper:
         """A copy that goes its own way; cells are shared until one of the two changes them."""
 
-    def save(self, path: Path) -> None:
+    def save(self, path: _Path) -> None:
         """Writes a `map.portolan`, as `portolan map` does. Raises `OSError`, `ValueError`."""
 
     def export(self, path: str, **options: Any) -> None:
@@ -150,7 +150,7 @@ class Mapper:
         """Edge of a cell (meters)."""
 
     @property
-    def poses(self) -> Optional[Floats]:
+    def poses(self) -> Optional[_Floats]:
         """Poses of the fused scans, (N, 3, 3) or (N, 4, 4); `None` until the first scan."""
 
     @property
@@ -159,7 +159,7 @@ class Mapper:
 
     @property
     def memory_bytes(self) -> int:
-        """Bytes that the maps hold and what is derived from them: measured."""
+        """_Bytes that the maps hold and what is derived from them: measured."""
 
     def __copy__(self) -> Mapper: ...
     def __deepcopy__(self, _memo: Any, /) -> Mapper: ...
@@ -169,10 +169,10 @@ class Mapper:
 class Occupancy:
     """Log odds of being occupied, a snapshot."""
 
-    def occupancy(self, points: ArrayLike) -> tuple[Floats, Bytes]:
+    def occupancy(self, points: ArrayLike) -> tuple[_Floats, _Bytes]:
         """Probability of being occupied of the cells that hold the points (..., D), and statuses. One look-up each."""
 
-    def cells(self, least: float = 0.5) -> tuple[Floats, Floats]:
+    def cells(self, least: float = 0.5) -> tuple[_Floats, _Floats]:
         """Centers (N, D) of the cells that are occupied with at least this probability, and their probabilities (N,)."""
 
     @property
@@ -190,7 +190,7 @@ class Occupancy:
 class Tsdf:
     """Signed distances along rays, up to the truncation, positive in free space; a snapshot."""
 
-    def distance(self, points: ArrayLike) -> tuple[Floats, Bytes]:
+    def distance(self, points: ArrayLike) -> tuple[_Floats, _Bytes]:
         """Estimates of the cells that hold the points (..., D), in meters, and statuses: saturated at the truncation. Measured
         along rays, not Euclidean: for clearance see `Esdf`.
         """
@@ -203,14 +203,14 @@ class Tsdf:
         max_range: float = 100.0,
         unknown_tolerance: float = 0.0,
         blind: float = 0.0,
-    ) -> tuple[Floats, Bytes]:
+    ) -> tuple[_Floats, _Bytes]:
         """Ranges at which rays (world, directions of any length) meet the surface, and statuses: known, a hit; saturated, free
         up to `max_range`; unknown, it entered unknown space; outside, it left the map. One origin, or one each. O(length).
 
-        Unknown space of up to `unknown_tolerance` meters is crossed, and ignored up to `blind` meters from the origin.
+        _Unknown space of up to `unknown_tolerance` meters is crossed, and ignored up to `blind` meters from the origin.
         """
 
-    def color(self, points: ArrayLike) -> tuple[Bytes, Bytes]:
+    def color(self, points: ArrayLike) -> tuple[_Bytes, _Bytes]:
         """Colors (..., 3) of the cells that hold the points, and statuses: unknown where no color was seen."""
 
     def frontiers(self, min_cells: int = 10) -> list[Frontier]:
@@ -240,15 +240,15 @@ class Frontier:
         """Indices of the cells, (N, D)."""
 
     @property
-    def middle(self) -> Floats:
+    def middle(self) -> _Floats:
         """Center of the cell nearest to their mean (world): a goal for a robot."""
 
     @property
-    def centroid(self) -> Floats:
+    def centroid(self) -> _Floats:
         """Mean of the cell centers (world). Of a curved frontier it may lie in a wall."""
 
     @property
-    def normal(self) -> Optional[Floats]:
+    def normal(self) -> Optional[_Floats]:
         """Unit direction from free to unknown space; `None` where its faces cancel out."""
 
     def __len__(self) -> int: ...
@@ -257,20 +257,20 @@ class Frontier:
 class Esdf:
     """Euclidean distances to the nearest obstacle, negative behind surfaces; a snapshot."""
 
-    def distance(self, points: ArrayLike) -> tuple[Floats, Bytes]:
+    def distance(self, points: ArrayLike) -> tuple[_Floats, _Bytes]:
         """Distances at the points (..., D), in meters, and statuses: saturated at `max_distance`. One interpolation each."""
 
-    def distance_and_gradient(self, points: ArrayLike) -> tuple[Floats, Floats, Bytes]:
+    def distance_and_gradient(self, points: ArrayLike) -> tuple[_Floats, _Floats, _Bytes]:
         """Distances, gradients (..., D) that point away from the nearest obstacle, and statuses."""
 
-    def clearance(self, points: ArrayLike, *, unknown: Unknown = "pessimistic") -> tuple[Floats, Floats, Bytes]:
+    def clearance(self, points: ArrayLike, *, unknown: _Unknown = "pessimistic") -> tuple[_Floats, _Floats, _Bytes]:
         """Certified bounds, lower and upper (meters), of the distance to the nearest obstacle, and statuses. Negative inside of
         obstacles. Space that was never observed is an obstacle, unless `unknown="optimistic"`. Saturated: only `lower` says
         something.
         """
 
     def check_path(
-        self, waypoints: ArrayLike, clearance: float, *, unknown: Unknown = "pessimistic", tolerance: float = 1e-3
+        self, waypoints: ArrayLike, clearance: float, *, unknown: _Unknown = "pessimistic", tolerance: float = 1e-3
     ) -> PathCheck:
         """Whether every point of the straight lines between the waypoints (N, D) has the clearance demanded (meters), by
         conservative advancement (Mirtich 1996).
@@ -322,7 +322,7 @@ class PathCheck:
 class Attenuation:
     """Hits of beams over the length of all in a cell: what a renderer calls density (Schaefer, Luft, Burgard 2017)."""
 
-    def attenuation(self, points: ArrayLike) -> tuple[Floats, Bytes]:
+    def attenuation(self, points: ArrayLike) -> tuple[_Floats, _Bytes]:
         """Hits per meter (1/m) of the cells that hold the points (..., D), and statuses."""
 
     def predict_ranges(
@@ -332,7 +332,7 @@ class Attenuation:
         *,
         max_range: float = 100.0,
         quantiles: Sequence[float] = ...,
-    ) -> tuple[Floats, Floats]:
+    ) -> tuple[_Floats, _Floats]:
         """Quantiles (..., Q) of the range that a sensor would read along rays (meters; NaN where fewer beams end; the median
         where none are asked for), and the share of beams that pass all up to `max_range`. One origin, or one each. O(length).
         """
@@ -351,11 +351,11 @@ class Cloud:
     """Points (..., D) under a k-d tree. Raises `ValueError` where one is not finite."""
 
     def __new__(cls, points: ArrayLike) -> Cloud: ...
-    def nearest_distance(self, points: ArrayLike) -> Floats:
+    def nearest_distance(self, points: ArrayLike) -> _Floats:
         """Distances from the points (..., D) to the nearest of the cloud (meters); NaN where the cloud is empty."""
 
     @property
-    def points(self) -> Floats: ...
+    def points(self) -> _Floats: ...
     @property
     def dimension(self) -> int: ...
     @property
@@ -367,7 +367,7 @@ class Mesh:
     """Triangles with shared vertices; normals point to free space."""
 
     @property
-    def vertices(self) -> Floats:
+    def vertices(self) -> _Floats:
         """Positions (N, 3) (world, meters)."""
 
     @property
@@ -379,7 +379,7 @@ class Mesh:
         """Unit normals of the vertices; zero where undefined."""
 
     @property
-    def colors(self) -> Optional[Bytes]:
+    def colors(self) -> Optional[_Bytes]:
         """Red, green and blue of the vertices; `None` where there are none."""
 
     @property
@@ -403,14 +403,14 @@ class Contour:
     """Segments with shared vertices; free space lies on the left of every segment."""
 
     @property
-    def vertices(self) -> Floats:
+    def vertices(self) -> _Floats:
         """Positions (N, 2) (world, meters)."""
 
     @property
     def segments(self) -> NDArray[np.uint32]:
         """Pairs of vertex indices."""
 
-    def polylines(self) -> list[Floats]:
+    def polylines(self) -> list[_Floats]:
         """The lines that the segments make, (N, 2) each; closed ones repeat their first point."""
 
     @property
@@ -449,23 +449,23 @@ class Scan:
         """Seconds of the log's clock; `None` where it has none."""
 
     @property
-    def pose(self) -> Floats:
+    def pose(self) -> _Floats:
         """World from sensor, (3, 3) or (4, 4)."""
 
     @property
-    def points(self) -> Floats:
+    def points(self) -> _Floats:
         """The surfaces that were hit, (N, D) in the sensor's frame (meters)."""
 
     @property
-    def ranges(self) -> Optional[Floats]:
+    def ranges(self) -> Optional[_Floats]:
         """Range of each beam of a planar laser (N,), or of a lidar's rings (rows, columns); else `None`."""
 
     @property
-    def bearings(self) -> Optional[Floats]:
+    def bearings(self) -> Optional[_Floats]:
         """Bearing of each beam of a planar laser (radians); else `None`."""
 
     @property
-    def kinds(self) -> Optional[Bytes]:
+    def kinds(self) -> Optional[_Bytes]:
         """`BeamKind` of each beam of a planar laser; else `None`."""
 
     @property
@@ -477,18 +477,18 @@ class Scan:
         """(fx, fy, cx, cy) of a camera (pixels); else `None`."""
 
     @property
-    def colors(self) -> Optional[Bytes]:
+    def colors(self) -> Optional[_Bytes]:
         """Red, green and blue of each pixel or point; `None` where there are none."""
 
     @property
     def dimension(self) -> int: ...
 
-def load(path: Path, *, memory: Optional[int] = None) -> Mapper:
+def load(path: _Path, *, memory: Optional[int] = None) -> Mapper:
     """Reads a `map.portolan`, or the one in a folder, as a mapper that goes on with it. `memory`: bytes that its maps may take.
 
     Raises `OSError`, `ValueError`.
     """
 
-def open(path: Path, options: Sequence[str], /) -> Log: ...
-def run(words: Sequence[str], /) -> int: ...
-def call(words: Sequence[str], /) -> None: ...
+def open(path: _Path, options: Sequence[str]) -> Log: ...
+def run(words: Sequence[str]) -> int: ...
+def call(words: Sequence[str]) -> None: ...

@@ -4,61 +4,65 @@ import os
 import tempfile
 from typing import Any
 
-from ._portolan import Contour, Mapper, Mesh, Occupancy
+from ._portolan import Mapper, Mesh
 
 
-def _export(mapper: Mapper, path: str, **options: Any) -> None:
+def _export(self: Mapper, path: str, **options: Any) -> None:
     """Writes the map in any format of ``portolan.convert``, by the ending of ``path``."""
     from . import convert
 
     if os.fspath(path).endswith(".portolan"):
-        mapper.save(path)
+        self.save(path)
         return
     with tempfile.TemporaryDirectory() as folder:
         whole = os.path.join(folder, "map.portolan")
-        mapper.save(whole)
+        self.save(whole)
         convert(whole, path, **options)
 
 
-def _to_trimesh(mesh: Mesh) -> Any:
+def _to_trimesh(self: Mesh) -> Any:
     """A ``trimesh.Trimesh``."""
-    import trimesh
+    import trimesh  # type: ignore
 
     return trimesh.Trimesh(
-        mesh.vertices, mesh.triangles, vertex_normals=mesh.normals, vertex_colors=mesh.colors, process=False
+        self.vertices, self.triangles, vertex_normals=self.normals, vertex_colors=self.colors, process=False
     )
 
 
-def _to_open3d(mesh: Mesh) -> Any:
+def _to_open3d(self: Mesh) -> Any:
     """An ``open3d.geometry.TriangleMesh``."""
-    import open3d
+    import open3d  # type: ignore
 
     made = open3d.geometry.TriangleMesh(
-        open3d.utility.Vector3dVector(mesh.vertices), open3d.utility.Vector3iVector(mesh.triangles.astype("int32"))
+        open3d.utility.Vector3dVector(self.vertices), open3d.utility.Vector3iVector(self.triangles.astype("int32"))
     )
-    if mesh.normals is not None:
-        made.vertex_normals = open3d.utility.Vector3dVector(mesh.normals.astype(float))
-    if mesh.colors is not None:
-        made.vertex_colors = open3d.utility.Vector3dVector(mesh.colors / 255)
+    if self.normals is not None:
+        made.vertex_normals = open3d.utility.Vector3dVector(self.normals.astype(float))
+    if self.colors is not None:
+        made.vertex_colors = open3d.utility.Vector3dVector(self.colors / 255)
     return made
 
 
-def _to_pyvista(mesh: Mesh) -> Any:
+def _to_pyvista(self: Mesh) -> Any:
     """A ``pyvista.PolyData``."""
     import numpy
-    import pyvista
+    import pyvista  # type: ignore
 
-    triangles = mesh.triangles.astype(numpy.int64)
+    triangles = self.triangles.astype(numpy.int64)
     faces = numpy.column_stack([numpy.full(len(triangles), 3), triangles])
-    made = pyvista.PolyData(mesh.vertices, faces.ravel())
-    if mesh.colors is not None:
-        made["colors"] = mesh.colors
+    made = pyvista.PolyData(self.vertices, faces.ravel())
+    if self.colors is not None:
+        made["colors"] = self.colors
     return made
 
 
 def attach() -> None:
     """Gives the classes of the extension what is written in Python."""
-    Mapper.export = _export  # type: ignore[method-assign]
-    Mesh.to_trimesh = _to_trimesh  # type: ignore[method-assign]
-    Mesh.to_open3d = _to_open3d  # type: ignore[method-assign]
-    Mesh.to_pyvista = _to_pyvista  # type: ignore[method-assign]
+    for of, name, method in [
+        (Mapper, "export", _export),
+        (Mesh, "to_trimesh", _to_trimesh),
+        (Mesh, "to_open3d", _to_open3d),
+        (Mesh, "to_pyvista", _to_pyvista),
+    ]:
+        method.__name__ = name
+        setattr(of, name, method)

@@ -12,7 +12,7 @@ def show(mapper: Mapper, ax: Optional[Any] = None, *, distance: bool = False) ->
 
     Needs matplotlib. Raises `ValueError` for a 3-D map, or one without scans.
     """
-    import matplotlib.pyplot as plt
+    import matplotlib.pyplot as plt  # type: ignore
 
     if mapper.dimension != 2:
         raise ValueError(f"mapper: a 2-D map is wanted, this one is {mapper.dimension or 'without scans'}")

@@ -13,7 +13,7 @@ def log(path: str, what: Union[Mapper, Mesh, Contour, Occupancy, Scan], **option
     A mapper: its mesh or contour, its occupied cells and the way of its sensor. A scan: its points, placed by its pose.
     `options` go to `rerun.log`.
     """
-    import rerun as rr
+    import rerun as rr  # type: ignore
 
     if isinstance(what, Mapper):
         if what.dimension is None:
