@@ -207,7 +207,7 @@ class Tsdf:
         """Ranges at which rays (world, directions of any length) meet the surface, and statuses: known, a hit; saturated, free
         up to `max_range`; unknown, it entered unknown space; outside, it left the map. One origin, or one each. O(length).
 
-        _Unknown space of up to `unknown_tolerance` meters is crossed, and ignored up to `blind` meters from the origin.
+        Unknown space of up to `unknown_tolerance` meters is crossed, and ignored up to `blind` meters from the origin.
         """
 
     def color(self, points: ArrayLike) -> tuple[_Bytes, _Bytes]:
