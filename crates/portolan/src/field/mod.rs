@@ -5,7 +5,7 @@
 //! | how far, for certain, with a gradient; kept up to date with its map | [`Esdf`], in bricks |
 //! | the same as one array, for files and programs that want one | [`EsdfGrid`], by [`Esdf::dense`] |
 //! | what the textbook makes of a dense map | [`esdf_from_tsdf`] |
-//! | how far every cell of a mask is from one that is set, and from which | [`MaskTransform`] |
+//! | how far every cell of a mask is from one that is set, and from which; of labels, from another label | [`MaskTransform`] |
 //!
 //! Three distance transforms stand side by side, because none can do the work of another. The passes over bricks
 //! ([`Esdf`]) are bounded by a largest distance, so that they fill only bricks near the surface. The transform of samples
@@ -24,5 +24,5 @@ mod smooth;
 pub use clearance::{Clearance, ClearanceField, UnknownSpace};
 pub use esdf::{Esdf, EsdfMethod, EsdfSettings, EsdfUpdate, ObstacleCells, PointKind, SurfaceNoise};
 pub use grid::{EsdfError, EsdfGrid, esdf_from_tsdf, squared_distance_transform};
-pub use mask::{MaskCell, MaskError, MaskTransform};
+pub use mask::{Label, MaskCell, MaskError, MaskTransform};
 pub use smooth::{FieldSlots, Interpolation, Smooth};
