@@ -1,10 +1,12 @@
 //! NumPy arrays in and out.
 
+use numpy::ndarray::ArrayD;
 use numpy::{
     IntoPyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use portolan::Answer;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -221,7 +223,9 @@ pub(crate) fn array<'py, T: numpy::Element>(
     values: Vec<T>,
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
-    values.into_pyarray(py).reshape(shape.to_vec())
+    let array =
+        ArrayD::from_shape_vec(shape, values).map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+    Ok(array.into_pyarray(py))
 }
 
 /// An array of rows.

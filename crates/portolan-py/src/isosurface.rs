@@ -42,7 +42,7 @@ fn extent(samples: &[f32]) -> Option<(f32, f32)> {
 
 /// Axes in the order of the array, lengths in its unit, triangles turned if that mirrors them or if it is asked for.
 fn place(found: &mut Isosurface, spacing: [f64; 3], fortran: bool, turned: bool) {
-    let axes = if fortran { [0, 1, 2] } else { [2, 1, 0] };
+    let axes: [usize; 3] = if fortran { [0, 1, 2] } else { [2, 1, 0] };
     let scale = spacing.map(|s| s as f32);
     for v in &mut found.mesh.vertices {
         *v = [0, 1, 2].map(|k| v[axes[k]] * scale[k]);
@@ -161,8 +161,8 @@ pub(crate) fn marching_cubes<'py>(
                 None => Err("volume: no value is finite".into()),
             };
         }
-        // Reversed axes are a mirror.
-        place(&mut found, spacing, fortran, fortran != descent);
+        // Triangles are seen from the smaller values; reversed axes mirror them, so that they are as 'descent' wants them.
+        place(&mut found, spacing, fortran, fortran == descent);
         Ok(Some(found))
     })?;
     let Some(Isosurface { mesh, ranges }) = found.map_err(value_error)? else {

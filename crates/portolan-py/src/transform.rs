@@ -1,14 +1,11 @@
 //! The distance transform of masks and labels as one function.
 
-use numpy::npyffi::NPY_ORDER;
-use numpy::{
-    IntoPyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use portolan::field::{Label, MaskError, MaskTransform};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::arrays::{dense, shown};
+use crate::arrays::{array as array_of, dense, shown};
 use crate::fault::{value_error, work};
 
 /// What is asked of one array.
@@ -137,17 +134,14 @@ fn of_cells<T: Label + numpy::Element>(
     match shape.len() {
         1 => run::<T, 1>(py, cells, shape, sampling, fortran, asked),
         2 => run::<T, 2>(py, cells, shape, sampling, fortran, asked),
-        3 => run::<T, 3>(py, cells, shape, sampling, fortran, asked),
-        _ => Err(value_error(format!(
-            "mask: an array of 1, 2 or 3 axes is wanted, got shape {}",
-            shown(shape)
-        ))),
+        _ => run::<T, 3>(py, cells, shape, sampling, fortran, asked),
     }
 }
 
 /// Labels as they lie in memory: whole numbers without a sign, of which only equality counts.
 fn labels<'py>(array: Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let (kind, size) = (array.dtype().kind(), array.dtype().itemsize());
+    let dtype = array.dtype();
+    let (kind, size) = (dtype.kind(), dtype.itemsize());
     let bits = match (kind, size) {
         (b'b', _) | (b'u', _) => return Ok(array),
         (b'i', 1) => "u1",
@@ -155,10 +149,7 @@ fn labels<'py>(array: Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntyp
         (b'i' | b'f', 4) => "u4",
         (b'i' | b'f', 8) => "u8",
         _ => {
-            return Err(value_error(format!(
-                "mask: booleans or numbers are wanted, got dtype {}",
-                array.dtype()
-            )));
+            return Err(value_error(format!("mask: booleans or numbers are wanted, got dtype {dtype}")));
         }
     };
     if kind == b'i' {
@@ -178,35 +169,34 @@ fn answer<'py>(
     asked: Question,
 ) -> PyResult<(Bound<'py, PyArrayDyn<f32>>, Option<Bound<'py, PyArrayDyn<i32>>>)> {
     let py = mask.py();
-    let array = labels(dense(mask, "mask")?)?;
+    let array = dense(mask, "mask")?;
+    if !(1..=3).contains(&array.ndim()) {
+        let shape = shown(array.shape());
+        return Err(value_error(format!("mask: an array of 1, 2 or 3 axes is wanted, got shape {shape}")));
+    }
+    let array = labels(array)?;
     let shape = array.shape();
     let fortran = !array.is_c_contiguous();
-    let (distance, nearest) = match (array.dtype().kind(), array.dtype().itemsize()) {
+    let dtype = array.dtype();
+    let (distance, nearest) = match (dtype.kind(), dtype.itemsize()) {
         (b'b', _) => of_cells::<bool>(&array, sampling, fortran, asked)?,
         (_, 1) => of_cells::<u8>(&array, sampling, fortran, asked)?,
         (_, 2) => of_cells::<u16>(&array, sampling, fortran, asked)?,
         (_, 4) => of_cells::<u32>(&array, sampling, fortran, asked)?,
         _ => of_cells::<u64>(&array, sampling, fortran, asked)?,
     };
-    let order = if fortran { NPY_ORDER::NPY_FORTRANORDER } else { NPY_ORDER::NPY_CORDER };
-    let distance = distance.into_pyarray(py);
-    let distance = if shape.len() == 1 {
-        distance.to_dyn().clone()
-    } else {
-        distance.reshape_with_order(shape, order)?
-    };
+    let given =
+        |shape: &[usize]| if fortran { shape.iter().rev().copied().collect() } else { shape.to_vec() };
+    // As it lies in memory; the axes are turned round after that.
+    let distance = array_of(py, distance, &given(shape))?;
+    let distance = if fortran { distance.permute(None::<Vec<usize>>)? } else { distance };
     if asked.what != What::Nearest {
         return Ok((distance, None));
     }
-    let nearest = nearest.into_pyarray(py);
     let axes = shape.len();
-    let nearest = if fortran {
-        let backward = shape.iter().rev().copied();
-        let there = nearest.reshape(std::iter::once(axes).chain(backward).collect::<Vec<_>>())?;
-        there.permute(Some(std::iter::once(0).chain((1..=axes).rev()).collect::<Vec<_>>()))?
-    } else {
-        nearest.reshape([&[axes], shape].concat())?
-    };
+    let nearest = array_of(py, nearest, &[&[axes], &given(shape)[..]].concat())?;
+    let turned = std::iter::once(0).chain((1..=axes).rev()).collect::<Vec<_>>();
+    let nearest = if fortran { nearest.permute(Some(turned))? } else { nearest };
     Ok((distance, Some(nearest)))
 }
 

@@ -10,9 +10,9 @@
 //! Three distance transforms stand side by side, because none can do the work of another. The passes over bricks
 //! ([`Esdf`]) are bounded by a largest distance, so that they fill only bricks near the surface. The transform of samples
 //! ([`squared_distance_transform`]) takes any real heights and has no bound, in `f64`: the textbook's numbers come from
-//! it, and bounded passes in `f32` would change them. The transform of masks ([`MaskTransform`]) is in whole numbers,
-//! which is exact and several times as fast, and finds the nearest cell too; it takes no heights, and masks whose diagonal
-//! is below 46 340 cells.
+//! it, and bounded passes in `f32` would change them. The transform of masks ([`MaskTransform`]) is in whole numbers
+//! where axes have one spacing and the diagonal is below 46 340 cells, which is exact and several times as fast, else in
+//! `f32`; it finds the nearest cell too, and takes labels, but no heights.
 
 mod clearance;
 mod esdf;
