@@ -16,7 +16,7 @@ use portolan::cell::OccupancyModel;
 use portolan::geom::{Lattice, Pose};
 use portolan::map::{Occupancy, Tsdf3, TsdfConfig};
 use portolan::scan::Frame;
-use portolan::surface::isosurface;
+use portolan::surface::{IsosurfaceSettings, isosurface};
 use portolan::sweep::OccupancySweep;
 use portolan_io::scan_log::{ScanLog, ScanLogOptions};
 use serde_json::{Value, json};
@@ -149,7 +149,8 @@ fn tsdf(args: &Args, folder: &str) -> anyhow::Result<Timed> {
 
 fn surface(args: &Args) -> anyhow::Result<Timed> {
     let (samples, shape) = read_npy(&args.data.join("grids/w4_gyroid_256_f32.npy"))?;
-    let (seconds, mesh) = timed(args.repeats, || Ok(isosurface(&samples, shape, 0.0, false)))?;
+    let settings = IsosurfaceSettings { normals: false, ..IsosurfaceSettings::default() };
+    let (seconds, mesh) = timed(args.repeats, || Ok(isosurface(&samples, shape, &settings).mesh))?;
     Ok((seconds, 1, json!({ "vertices": mesh.vertices.len(), "triangles": mesh.triangles.len() })))
 }
 

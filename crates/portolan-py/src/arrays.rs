@@ -1,10 +1,12 @@
 //! NumPy arrays in and out.
 
+use numpy::ndarray::ArrayD;
 use numpy::{
     IntoPyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use portolan::Answer;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -20,27 +22,33 @@ pub(crate) struct Numbers<'py> {
 
 /// The array of an argument, whatever its type; complex numbers, objects, strings, booleans and masked values are refused.
 pub(crate) fn checked<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let py = given.py();
-    let numpy = py.import("numpy")?;
-    let array = match given.cast::<PyUntypedArray>() {
-        Ok(array) => array.clone(),
-        Err(_) => numpy
-            .call_method1("asarray", (given,))
-            .map_err(|error| value_error(format!("{name}: not an array of numbers: {error}")))?
-            .cast_into::<PyUntypedArray>()?,
-    };
-    let kind = array.dtype().kind();
-    if !matches!(kind, b'f' | b'i' | b'u') {
+    let array = some_array(given, name)?;
+    if !matches!(array.dtype().kind(), b'f' | b'i' | b'u') {
         return Err(value_error(format!(
             "{name}: numbers are wanted, got an array of dtype {}",
             array.dtype()
         )));
     }
+    without_mask(array, name)
+}
+
+/// What is given as an array.
+fn some_array<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+    if let Ok(array) = given.cast::<PyUntypedArray>() {
+        return Ok(array.clone());
+    }
+    let array = given.py().import("numpy")?.call_method1("asarray", (given,));
+    let array = array.map_err(|error| value_error(format!("{name}: not an array of numbers: {error}")))?;
+    Ok(array.cast_into::<PyUntypedArray>()?)
+}
+
+/// Refuses masked values.
+fn without_mask<'py>(array: Bound<'py, PyUntypedArray>, name: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
     // Ordinary arrays have no mask; asking the class costs less than asking the instance.
     if array.is_exact_instance_of::<PyUntypedArray>() {
         return Ok(array);
     }
-    let masked = numpy.getattr("ma")?;
+    let masked = array.py().import("numpy")?.getattr("ma")?;
     if array.is_instance(&masked.getattr("MaskedArray")?)? {
         let mask: usize = masked.call_method1("count_masked", (&array,))?.extract()?;
         if mask > 0 {
@@ -51,6 +59,29 @@ pub(crate) fn checked<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bo
         }
     }
     Ok(array)
+}
+
+/// An array of booleans or numbers in C or in Fortran order, in the machine's order of bytes: the one that is given, if it
+/// is such a one.
+pub(crate) fn dense<'py>(given: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let array = some_array(given, name)?;
+    let dtype = array.dtype();
+    if !matches!(dtype.kind(), b'b' | b'f' | b'i' | b'u') {
+        return Err(value_error(format!(
+            "{name}: booleans or numbers are wanted, got an array of dtype {dtype}"
+        )));
+    }
+    let native = dtype.is_native_byteorder() != Some(false);
+    if native && array.is_contiguous() && array.is_exact_instance_of::<PyUntypedArray>() {
+        return Ok(array);
+    }
+    let array = without_mask(array, name)?;
+    let options = PyDict::new(array.py());
+    options.set_item("dtype", dtype.call_method1("newbyteorder", ("=",))?)?;
+    let numpy = array.py().import("numpy")?;
+    // What is contiguous already is not copied, whatever its class.
+    let how = if array.is_fortran_contiguous() { "asfortranarray" } else { "ascontiguousarray" };
+    Ok(numpy.call_method(how, (array,), Some(&options))?.cast_into()?)
 }
 
 /// The same array with this type of numbers, in C order.
@@ -192,7 +223,9 @@ pub(crate) fn array<'py, T: numpy::Element>(
     values: Vec<T>,
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
-    values.into_pyarray(py).reshape(shape.to_vec())
+    let array =
+        ArrayD::from_shape_vec(shape, values).map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+    Ok(array.into_pyarray(py))
 }
 
 /// An array of rows.

@@ -12,6 +12,7 @@ mod dimension;
 mod esdf;
 mod events;
 mod fault;
+mod isosurface;
 mod log;
 mod mapper;
 mod occupancy;
@@ -21,6 +22,7 @@ mod pose;
 mod readings;
 mod stats;
 mod surface;
+mod transform;
 mod tsdf;
 
 use pyo3::prelude::*;
@@ -38,6 +40,8 @@ mod _portolan {
     #[pymodule_export]
     use crate::fault::MapFull;
     #[pymodule_export]
+    use crate::isosurface::marching_cubes;
+    #[pymodule_export]
     use crate::log::{Log, Scan, open};
     #[pymodule_export]
     use crate::mapper::{Mapper, load};
@@ -47,6 +51,8 @@ mod _portolan {
     use crate::path::PathCheck;
     #[pymodule_export]
     use crate::surface::{Contour, Mesh};
+    #[pymodule_export]
+    use crate::transform::{edt, sdf};
     #[pymodule_export]
     use crate::tsdf::{Frontier, Tsdf};
 

@@ -5,7 +5,7 @@ use divan::{Bencher, black_box};
 use portolan::cell::{Color, ColorBrick, DistanceBrick, SignedDistance};
 use portolan::geom::{BlockKey, Lattice};
 use portolan::store::Bricks;
-use portolan::surface::{MeshSettings, isosurface, marching_cubes};
+use portolan::surface::{IsosurfaceSettings, MeshSettings, isosurface, marching_cubes};
 use std::sync::LazyLock;
 
 fn main() {
@@ -56,23 +56,27 @@ fn pool(threads: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
 }
 
+fn settings(normals: bool) -> IsosurfaceSettings<'static> {
+    IsosurfaceSettings { normals, ..IsosurfaceSettings::default() }
+}
+
 /// Counted in triangles.
 #[divan::bench(args = [1, 2], sample_count = 10)]
 fn array(bencher: Bencher, threads: usize) {
     let pool = pool(threads);
-    let triangles = isosurface(&GYROID, [N; 3], 0.0, false).triangles.len();
+    let triangles = isosurface(&GYROID, [N; 3], &settings(false)).mesh.triangles.len();
     bencher
         .counter(ItemsCount::new(triangles))
-        .bench(|| pool.install(|| isosurface(black_box(&GYROID), [N; 3], 0.0, false)));
+        .bench(|| pool.install(|| isosurface(black_box(&GYROID), [N; 3], &settings(false))));
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10)]
 fn array_with_normals(bencher: Bencher, threads: usize) {
     let pool = pool(threads);
-    let triangles = isosurface(&GYROID, [N; 3], 0.0, false).triangles.len();
+    let triangles = isosurface(&GYROID, [N; 3], &settings(false)).mesh.triangles.len();
     bencher
         .counter(ItemsCount::new(triangles))
-        .bench(|| pool.install(|| isosurface(black_box(&GYROID), [N; 3], 0.0, true)));
+        .bench(|| pool.install(|| isosurface(black_box(&GYROID), [N; 3], &settings(true))));
 }
 
 #[divan::bench(args = [1, 2], sample_count = 10)]

@@ -54,7 +54,18 @@ pub(crate) fn for_each<T: Send, S>(
     scratch: impl Fn() -> S + Sync,
     work: impl Fn(T, &mut S) + Sync,
 ) {
-    let workers = tasks.size_hint().1.unwrap_or(usize::MAX).min(threads());
+    for_each_on(usize::MAX, tasks, scratch, work);
+}
+
+/// [`for_each`] on so many threads at most. On one, the caller's, no other is woken.
+pub(crate) fn for_each_on<T: Send, S>(
+    most: usize,
+    tasks: impl Iterator<Item = T> + Send,
+    scratch: impl Fn() -> S + Sync,
+    work: impl Fn(T, &mut S) + Sync,
+) {
+    let workers =
+        if most < 2 { 1 } else { tasks.size_hint().1.unwrap_or(usize::MAX).min(threads()).min(most) };
     if workers < 2 {
         let mut scratch = scratch();
         return tasks.for_each(|task| work(task, &mut scratch));

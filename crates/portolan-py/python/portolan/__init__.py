@@ -34,7 +34,10 @@ from ._portolan import (
     Scan,
     Tsdf,
     __version__,
+    edt,
     load,
+    marching_cubes,
+    sdf,
 )
 from . import _portolan
 from . import _show
@@ -56,8 +59,11 @@ __all__ = [
     "Status",
     "Tsdf",
     "convert",
+    "edt",
     "load",
+    "marching_cubes",
     "open",
+    "sdf",
     "__version__",
 ]
 

@@ -16,7 +16,9 @@ pub use compare::{
     CompareSettings, Reference, SurfaceComparison, SurfaceDistances, area_samples, compare_surfaces,
 };
 pub use contour::Contour;
-pub use cubes::{IncrementalMesh, MeshSettings, isosurface, marching_cubes};
+pub use cubes::{
+    IncrementalMesh, Inside, Isosurface, IsosurfaceSettings, MeshSettings, isosurface, marching_cubes,
+};
 pub use measures::{DoubledLength, ThinWalls, doubled_length, thin_walls};
 pub use mesh::{EdgeCounts, Mesh};
 pub use nearest::NearestSurface;

@@ -1,6 +1,6 @@
 //! One pass over lines that lie side by side.
 
-use super::integer::Integer;
+use super::number::Number;
 use super::search::{Found, Window};
 use multiversion::multiversion;
 
@@ -25,7 +25,7 @@ pub(super) const PLAIN: usize = 48;
 /// Rows on each side that are searched before it is worth knowing where the minima are.
 const NEAR: usize = 12;
 
-impl<L: Integer, const N: usize> Panel<L, N> {
+impl<L: Number, const N: usize> Panel<L, N> {
     /// For lines of `n` cells.
     pub(super) fn new(n: usize, with_offsets: bool) -> Self {
         let rows = vec![[L::FAR; N]; n];
@@ -179,7 +179,7 @@ impl<L: Integer, const N: usize> Panel<L, N> {
 
 /// The lowest and the highest row that the offsets of a row lead to.
 #[inline(always)]
-fn bounds<L: Integer, const N: usize>(offsets: &[L; N], row: usize) -> (u32, u32) {
+fn bounds<L: Number, const N: usize>(offsets: &[L; N], row: usize) -> (u32, u32) {
     let (mut low, mut high) = (isize::MAX, isize::MIN);
     for offset in offsets {
         low = low.min(offset.offset());
@@ -193,7 +193,7 @@ fn bounds<L: Integer, const N: usize>(offsets: &[L; N], row: usize) -> (u32, u32
 /// less than its square, mean nothing. Where cells are asked for, they become those of the minima: `stride` more with
 /// every row.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+fma", "aarch64+neon"))]
-pub(super) fn solve<L: Integer, const N: usize>(
+pub(super) fn solve<L: Number, const N: usize>(
     panel: &mut Panel<L, N>,
     reach: usize,
     squares: &[L],

@@ -1,6 +1,6 @@
 //! The minimum for one row of a panel, searched outwards from it.
 
-use super::integer::Integer;
+use super::number::Number;
 
 /// Offsets between two looks at whether anything can still be found.
 const STEPS: usize = 4;
@@ -36,7 +36,7 @@ impl Window {
     }
 }
 
-impl<L: Integer, const N: usize> Found<L, N> {
+impl<L: Number, const N: usize> Found<L, N> {
     /// The row itself, where it may hold the minimum.
     #[inline(always)]
     pub(super) fn at(f: &[[L; N]], window: Window) -> Self {

@@ -23,8 +23,12 @@ const TOGETHER: usize = 128;
 const NONE: u32 = u32::MAX;
 
 /// Joins pieces in ascending order of keys. Every crossing belongs to the brick where its edge starts; lower neighbors find
-/// it by its place there, without comparing positions.
-pub(super) fn assemble(pieces: &[(&Part, &Piece)], placement: &Placement, want: Attributes) -> Mesh {
+/// it by its place there, without comparing positions. Beside the mesh the ranges of its vertices, if they are wanted.
+pub(super) fn assemble(
+    pieces: &[(&Part, &Piece)],
+    placement: &Placement,
+    want: Attributes,
+) -> (Mesh, Vec<f32>) {
     let lowest = |k: usize| pieces.iter().map(|(_, p)| p.key.0[k]).min().unwrap_or(0);
     let first = placement.first.unwrap_or_else(|| [0, 1, 2].map(lowest));
     let owners = owners(pieces);
@@ -40,6 +44,8 @@ pub(super) fn assemble(pieces: &[(&Part, &Piece)], placement: &Placement, want: 
         normals: vec![[0.0; 3]; if want.normals { vertices as usize } else { 0 }],
         colors: vec![[0; 3]; if want.colors { vertices as usize } else { 0 }],
     };
+    let mut ranges = vec![0.0; if want.ranges { vertices as usize } else { 0 }];
+    let mut r = &mut ranges[..];
     let (mut v, mut t) = (&mut mesh.vertices[..], &mut mesh.triangles[..]);
     let (mut n, mut c) = (&mut mesh.normals[..], &mut mesh.colors[..]);
     let mut places: Vec<Place> = (0..pieces.len().div_ceil(TOGETHER))
@@ -53,12 +59,13 @@ pub(super) fn assemble(pieces: &[(&Part, &Piece)], placement: &Placement, want: 
                 triangles: t.split_off_mut(..triangles).unwrap_or_default(),
                 normals: n.split_off_mut(..count).unwrap_or_default(),
                 colors: c.split_off_mut(..count).unwrap_or_default(),
+                ranges: r.split_off_mut(..count).unwrap_or_default(),
             }
         })
         .collect();
     parallel::change_each(&mut places, 1, Vec::new, |place, numbers| joint.fill(place, numbers));
     super::normals::complete(&mut mesh);
-    mesh
+    (mesh, ranges)
 }
 
 /// The crossings of a brick that are vertices, for bricks with others.
@@ -88,6 +95,7 @@ struct Place<'a> {
     triangles: &'a mut [[u32; 3]],
     normals: &'a mut [[f32; 3]],
     colors: &'a mut [[u8; 3]],
+    ranges: &'a mut [f32],
 }
 
 impl Joint<'_> {
@@ -126,6 +134,9 @@ impl Joint<'_> {
         if self.want.colors {
             place.colors[to..to + count].copy_from_slice(&part.colors[from..from + count]);
         }
+        if self.want.ranges {
+            place.ranges[to..to + count].copy_from_slice(&part.ranges[from..from + count]);
+        }
     }
 
     /// Writes those vertices of a piece that some cube uses.
@@ -145,6 +156,9 @@ impl Joint<'_> {
             }
             if self.want.colors {
                 place.colors[to] = part.colors[from + j];
+            }
+            if self.want.ranges {
+                place.ranges[to] = part.ranges[from + j];
             }
         }
     }

@@ -5,39 +5,116 @@ use super::numbers::Numbers;
 use super::piece::Part;
 use super::samples::DenseSamples;
 use super::signs::{Layers, Signs, byte};
-use super::vertex::Attributes;
+use super::vertex::{Attributes, MARGIN};
 use crate::geom::BlockKey;
 use crate::parallel;
 use crate::surface::Mesh;
 
-/// The level set of samples on a grid as triangles whose normals point to larger values.
+/// Which samples are inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inside {
+    /// Those below the level, as distances are.
+    Below,
+    /// Those above the level, as densities are.
+    Above,
+}
+
+/// What is asked of an array.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IsosurfaceSettings<'a> {
+    /// The samples at the surface; a sample of this value is not inside.
+    pub level: f64,
+    /// Normals point away from it.
+    pub inside: Inside,
+    /// Whether vertices have normals: central differences of the samples, interpolated.
+    pub normals: bool,
+    /// Whether vertices have ranges.
+    pub ranges: bool,
+    /// Vertices stay 1/256 from all nodes, so that there are no triangles without area and no two vertices in one place.
+    /// Without it they lie where the samples say.
+    pub apart: bool,
+    /// A flag for each sample: cubes whose highest node's is not set have no surface. `None`: all may have.
+    pub cubes: Option<&'a [bool]>,
+}
+
+impl Default for IsosurfaceSettings<'_> {
+    /// The zero of distances, with normals.
+    fn default() -> Self {
+        Self { level: 0.0, inside: Inside::Below, normals: true, ranges: false, apart: true, cubes: None }
+    }
+}
+
+/// The level set of an array.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Isosurface {
+    /// In units of the grid, sample (0, 0, 0) at the origin.
+    pub mesh: Mesh,
+    /// By vertex: the largest difference of two samples of one cube with surface at it. Empty where not requested.
+    pub ranges: Vec<f32>,
+}
+
+/// The level set of samples on a grid as triangles whose normals point away from the inside.
 ///
-/// `samples` are x fastest, `shape` of them along each axis; the mesh is in units of the grid with sample (0, 0, 0) at the
-/// origin. Samples below the level are inside, samples that are not finite are unknown; otherwise as
-/// [`marching_cubes`](super::marching_cubes), with the same code. O(samples), limited by memory bandwidth away from the
-/// surface.
+/// `samples` are x fastest, `shape` of them along each axis. Samples that are not finite are unknown: cubes with one have no
+/// surface. Otherwise as [`marching_cubes`](super::marching_cubes), with the same code. O(samples), limited by memory
+/// bandwidth away from the surface.
 ///
 /// # Panics
-/// Where the length of `samples` is not the product of `shape`, or an axis has more than 2^30 samples.
-pub fn isosurface(samples: &[f32], shape: [usize; 3], level: f32, normals: bool) -> Mesh {
+/// Where the length of `samples` or of flags is not the product of `shape`, or an axis has more than 2^30 samples.
+pub fn isosurface(samples: &[f32], shape: [usize; 3], settings: &IsosurfaceSettings) -> Isosurface {
     let product = shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s));
     assert_eq!(product, Some(samples.len()), "one sample per node");
+    assert!(settings.cubes.is_none_or(|cubes| cubes.len() == samples.len()), "one flag per node");
     assert!(shape.iter().all(|&n| n <= 1 << 30), "an index of a node is an i32");
-    let want = Attributes { normals, colors: false };
+    let want = Attributes { normals: settings.normals, colors: false, ranges: settings.ranges };
+    let below = Below::of(settings);
+    let dense = DenseSamples {
+        samples,
+        shape,
+        level: settings.level,
+        sign: below.sign,
+        margin: if settings.apart { MARGIN } else { 0.0 },
+        cubes: settings.cubes,
+        first: [0; 3],
+    };
     let tiles = Tiles::new(shape);
     let scratch = || (Vec::new(), Numbers::new(), [0; 4]);
     let parts = parallel::map_numbers(tiles.count(), scratch, |i, (signs, numbers, sizes)| {
         let tile = tiles.tile(i);
-        tile.read(samples, shape, level, signs);
+        tile.read(samples, shape, below, signs);
         // The sizes of the previous tile: arrays seldom grow.
         let mut part = Part::like(sizes);
-        tile.mesh(&DenseSamples { samples, shape, level, first: [0; 3] }, want, signs, numbers, &mut part);
+        tile.mesh(&dense, want, signs, numbers, &mut part);
         *sizes = part.sizes();
         part
     });
     let pieces: Vec<_> = parts.iter().flat_map(|part| part.pieces.iter().map(move |p| (part, p))).collect();
     let placement = Placement { origin: [0.0; 3], resolution: 1.0, offset: 0.0, first: Some([0; 3]) };
-    assemble(&pieces, &placement, want)
+    let (mesh, ranges) = assemble(&pieces, &placement, want);
+    Isosurface { mesh, ranges }
+}
+
+/// What is inside, in the numbers of the samples: `sign * sample < threshold`.
+#[derive(Clone, Copy)]
+struct Below {
+    sign: f32,
+    threshold: f32,
+}
+
+impl Below {
+    /// The least `f32` that is not less than the level says the same of all `f32` as the level itself.
+    fn of(settings: &IsosurfaceSettings) -> Self {
+        let sign = if settings.inside == Inside::Below { 1.0f32 } else { -1.0 };
+        let level = settings.level * f64::from(sign);
+        let near = level as f32;
+        let threshold = if f64::from(near) < level { near.next_up() } else { near };
+        Self { sign, threshold }
+    }
+
+    #[inline(always)]
+    fn holds(self, sample: f32) -> bool {
+        self.sign * sample < self.threshold
+    }
 }
 
 /// Samples of a tile. Their signs are read first, then values near the surface: few enough to stay in the second level of
@@ -86,14 +163,14 @@ impl Tile {
     }
 
     /// Signs of the tile's nodes, and of the nearest ones of its upper neighbors.
-    fn read(&self, samples: &[f32], shape: [usize; 3], level: f32, signs: &mut Vec<Signs>) {
+    fn read(&self, samples: &[f32], shape: [usize; 3], below: Below, signs: &mut Vec<Signs>) {
         signs.clear();
         signs.resize(2 * self.nx * (self.y.len() + 1), Signs::NOTHING);
         for z in 8 * self.z..(8 * self.z + 9).min(shape[2]) {
             for y in 8 * self.y.start..(8 * self.y.end + 1).min(shape[1]) {
                 let row = &samples[(y + shape[1] * z) * shape[0]..][..shape[0]];
                 let first = self.place(0, y >> 3, z >> 3);
-                read_row(row, level, &mut signs[first..first + self.nx], [y & 7, z & 7]);
+                read_row(row, below, &mut signs[first..first + self.nx], [y & 7, z & 7]);
             }
         }
     }
@@ -124,16 +201,15 @@ impl Tile {
 }
 
 /// Signs of one row of nodes along x.
-fn read_row(row: &[f32], level: f32, signs: &mut [Signs], [y, z]: [usize; 2]) {
+fn read_row(row: &[f32], below: Below, signs: &mut [Signs], [y, z]: [usize; 2]) {
     let (whole, rest) = row.as_chunks::<8>();
     let shift = 8 * y;
     for (signs, values) in signs.iter_mut().zip(whole) {
-        let values = values.map(|v| v - level);
-        signs.inside[z] |= u64::from(byte(&values, |v| v < 0.0)) << shift;
-        signs.observed[z] |= u64::from(byte(&values, f32::is_finite)) << shift;
+        signs.inside[z] |= u64::from(byte(values, |v| below.holds(v))) << shift;
+        signs.observed[z] |= u64::from(byte(values, f32::is_finite)) << shift;
     }
-    for (k, v) in rest.iter().map(|v| v - level).enumerate() {
-        signs[whole.len()].inside[z] |= u64::from(v < 0.0 && v.is_finite()) << (shift + k);
+    for (k, v) in rest.iter().enumerate() {
+        signs[whole.len()].inside[z] |= u64::from(below.holds(*v) && v.is_finite()) << (shift + k);
         signs[whole.len()].observed[z] |= u64::from(v.is_finite()) << (shift + k);
     }
 }
@@ -141,6 +217,11 @@ fn read_row(row: &[f32], level: f32, signs: &mut [Signs], [y, z]: [usize; 2]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn isosurface(samples: &[f32], shape: [usize; 3], level: f64, normals: bool) -> Mesh {
+        let settings = IsosurfaceSettings { level, normals, ..IsosurfaceSettings::default() };
+        super::isosurface(samples, shape, &settings).mesh
+    }
     use crate::surface::EdgeCounts;
     use crate::surface::cubes::testing::bricks;
     use crate::surface::{MeshSettings, marching_cubes};
@@ -290,6 +371,94 @@ mod tests {
         assert_eq!(mesh.edge_counts().faulty, 0);
         assert_eq!(mesh.triangles.len(), 2 * (19 * 19 - 3 * 4));
         assert!(mesh.vertices.iter().all(|v| v[2] == 9.5));
+    }
+
+    /// The level is not representable in `f32`; the sample nearest to it is beyond it, or not.
+    #[test]
+    fn levels_between_two_f32_have_the_right_side() {
+        let level = 0.1f64;
+        let near = 0.1f32;
+        assert!(f64::from(near) > level);
+        for (low, surface) in [(near, false), (near.next_down(), true)] {
+            let samples = field([4; 3], |p| if p[0] < 2.0 { f64::from(low) } else { 1.0 });
+            let mesh = isosurface(&samples, [4; 3], level, false);
+            assert_eq!(!mesh.triangles.is_empty(), surface);
+            assert!(mesh.vertices.iter().all(|v| v[0] == 1.0 + 1.0 / 256.0));
+        }
+    }
+
+    #[test]
+    fn above_is_below_of_the_negative() {
+        let samples = noise(7, 19, true);
+        let negative: Vec<f32> = samples.iter().map(|v| -v).collect();
+        let settings = IsosurfaceSettings { level: 0.2, ranges: true, ..IsosurfaceSettings::default() };
+        let above = IsosurfaceSettings { inside: Inside::Above, level: -0.2, ..settings };
+        let found = super::isosurface(&samples, [19; 3], &settings);
+        assert!(found.mesh.triangles.len() > 1000 && found.ranges.len() == found.mesh.vertices.len());
+        assert_eq!(super::isosurface(&negative, [19; 3], &above), found);
+    }
+
+    #[test]
+    fn vertices_may_lie_in_nodes() {
+        let samples = field([6; 3], |p| p[0] - 2.0);
+        let settings = IsosurfaceSettings { apart: false, ..IsosurfaceSettings::default() };
+        let mesh = super::isosurface(&samples, [6; 3], &settings).mesh;
+        assert_eq!(mesh.triangles.len(), 2 * 25);
+        assert!(mesh.vertices.iter().all(|v| v[0] == 2.0));
+    }
+
+    #[test]
+    fn ranges_are_those_of_the_cubes_around() {
+        let (n, holes) = (14, [(3, 4, 5), (0, 9, 9), (8, 8, 2)]);
+        for masked in [false, true] {
+            let mut samples = noise(2, n, false);
+            holes.iter().for_each(|&(x, y, z)| samples[x + n * (y + n * z)] = f32::NAN);
+            let flags: Vec<bool> = (0..n * n * n).map(|i| i % 7 != 3).collect();
+            let cubes = masked.then_some(&flags[..]);
+            let settings =
+                IsosurfaceSettings { ranges: true, apart: false, cubes, ..IsosurfaceSettings::default() };
+            let Isosurface { mesh, ranges } = super::isosurface(&samples, [n; 3], &settings);
+            assert!(ranges.len() == mesh.vertices.len() && ranges.len() > 1000);
+            let range = |lowest: [usize; 3]| {
+                let node = |c: usize| [0, 1, 2].map(|k| lowest[k] + (c >> k & 1));
+                let index = |p: [usize; 3]| p[0] + n * (p[1] + n * p[2]);
+                let all: Vec<f32> = (0..8).map(|c| samples[index(node(c))]).collect();
+                let allowed = (!masked || flags[index(node(7))]) && all.iter().all(|v| v.is_finite());
+                let (least, most) =
+                    (all.iter().copied().reduce(f32::min), all.iter().copied().reduce(f32::max));
+                allowed.then(|| most.unwrap() - least.unwrap())
+            };
+            for (v, got) in mesh.vertices.iter().zip(&ranges) {
+                let Some(axis) = (0..3).find(|&k| v[k].fract() != 0.0) else { continue };
+                if (0..3).any(|k| k != axis && v[k].fract() != 0.0) {
+                    continue; // in the middle of a cube
+                }
+                let at = v.map(|c| c as usize);
+                let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+                let around = (0..4).filter_map(|i| {
+                    let mut lowest = at;
+                    lowest[a] = lowest[a].checked_sub(i & 1)?;
+                    lowest[b] = lowest[b].checked_sub(i >> 1)?;
+                    (lowest.iter().all(|&c| c + 1 < n)).then(|| range(lowest))?
+                });
+                assert_eq!(around.reduce(f32::max), Some(*got), "{v:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn cubes_that_are_not_asked_for_have_no_surface() {
+        let n = 21;
+        let samples = field([n; 3], |p| p[2] - 9.5);
+        let flags: Vec<bool> = (0..n * n * n).map(|i| i % n > 4 && i / n % n != 9).collect();
+        let settings = IsosurfaceSettings { cubes: Some(&flags), ..IsosurfaceSettings::default() };
+        let mesh = super::isosurface(&samples, [n; 3], &settings).mesh;
+        assert_eq!(mesh.edge_counts().faulty, 0);
+        // 16 columns of cubes along x, 19 rows along y.
+        assert_eq!(mesh.triangles.len(), 2 * 16 * 19);
+        let mut used = vec![false; mesh.vertices.len()];
+        mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        assert!(used.iter().all(|&u| u) && mesh.vertices.iter().all(|v| v[0] >= 4.0));
     }
 
     #[test]

@@ -38,7 +38,7 @@ impl MeshSettings {
     }
 
     pub(super) fn attributes(&self, colors: bool) -> Attributes {
-        Attributes { normals: self.normals, colors: self.colors && colors }
+        Attributes { normals: self.normals, colors: self.colors && colors, ranges: false }
     }
 }
 
@@ -111,7 +111,7 @@ fn mesh_of(
         part
     });
     let pieces: Vec<_> = parts.iter().flat_map(|part| part.pieces.iter().map(move |p| (part, p))).collect();
-    assemble(&pieces, &Placement::of(store), want)
+    assemble(&pieces, &Placement::of(store), want).0
 }
 
 /// The order of keys as a tuple.

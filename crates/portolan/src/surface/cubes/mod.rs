@@ -28,7 +28,7 @@ mod testing;
 mod tunnel;
 mod vertex;
 
-pub use dense::isosurface;
+pub use dense::{Inside, Isosurface, IsosurfaceSettings, isosurface};
 pub use extract::{MeshSettings, marching_cubes};
 pub use incremental::IncrementalMesh;
 pub(crate) use numbering::edge_start;

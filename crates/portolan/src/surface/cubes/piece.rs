@@ -52,6 +52,8 @@ pub(super) struct Part {
     /// Gradients of the field there, not normalized; empty if not requested.
     pub(super) gradients: Vec<[f32; 3]>,
     pub(super) colors: Vec<[u8; 3]>,
+    /// How far samples around them lie from each other; empty if not requested.
+    pub(super) ranges: Vec<f32>,
     pub(super) foreign: Vec<EdgeCode>,
     pub(super) triangles: Vec<[u16; 3]>,
 }
@@ -93,7 +95,7 @@ impl Part {
             crossing[3 * z] = (i.at ^ i.x) & o.at & o.x;
             crossing[3 * z + 1] = (i.at ^ i.y) & o.at & o.y;
             crossing[3 * z + 2] = (i.at ^ above.at) & o.at & observed[z + 1].at;
-            full[z] = o.all() & observed[z + 1].all();
+            full[z] = o.all() & observed[z + 1].all() & samples.cubes(z);
             active[z] = full[z] & (i.any() | above.any()) & !(i.all() & above.all());
             any |= crossing[3 * z] | crossing[3 * z + 1] | crossing[3 * z + 2] | active[z];
         }
@@ -148,6 +150,7 @@ impl Part {
         self.pieces.capacity() * size_of::<Piece>()
             + (self.vertices.capacity() + self.gradients.capacity()) * 12
             + self.colors.capacity() * 3
+            + self.ranges.capacity() * 4
             + self.foreign.capacity() * 2
             + self.triangles.capacity() * 6
     }
@@ -159,6 +162,9 @@ impl Part {
         }
         if want.colors {
             self.colors.push(vertex.color);
+        }
+        if want.ranges {
+            self.ranges.push(vertex.range);
         }
     }
 
@@ -202,6 +208,9 @@ impl Part {
             }
             if want.colors {
                 self.colors.push(vertex.color);
+            }
+            if want.ranges {
+                self.ranges.push(vertex.range);
             }
         }
         piece.own = u32::from(count);

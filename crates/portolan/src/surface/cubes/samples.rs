@@ -1,5 +1,6 @@
 //! The nodes of the cubes of a brick: from bricks of a store, or from a dense array.
 
+use super::vertex::MARGIN;
 use crate::cell::{Color, ColorBrick, DistanceBrick};
 
 /// The nodes around a brick. Node (0, 0, 0) is its lowest one; indices are -1 to 9 along each axis.
@@ -17,6 +18,29 @@ pub(super) trait Samples {
     /// axis was observed, 0 where none was.
     fn gradient(&self, node: [i32; 3]) -> [f32; 3] {
         careful_gradient(self, node)
+    }
+
+    /// Least distance of vertices from nodes (cells).
+    #[inline(always)]
+    fn margin(&self) -> f32 {
+        MARGIN
+    }
+
+    /// The cubes (by their lowest node, x fastest) of a layer of the brick that may have surface.
+    #[inline(always)]
+    fn cubes(&self, _layer: usize) -> u64 {
+        u64::MAX
+    }
+
+    /// The difference of the largest and the smallest sample of a cube; `None` where it has no surface, or is none of a dense
+    /// array.
+    fn cube_range(&self, _lowest: [i32; 3]) -> Option<f32> {
+        None
+    }
+
+    /// The largest range of the cubes with surface around the edge that starts at `node`.
+    fn range(&self, _node: [i32; 3], _axis: usize) -> f32 {
+        0.0
     }
 }
 
@@ -120,7 +144,12 @@ impl Samples for BrickSamples<'_> {
 pub(super) struct DenseSamples<'a> {
     pub(super) samples: &'a [f32],
     pub(super) shape: [usize; 3],
-    pub(super) level: f32,
+    pub(super) level: f64,
+    /// 1 where smaller samples are inside, -1 where larger ones are.
+    pub(super) sign: f32,
+    pub(super) margin: f32,
+    /// By the highest node of a cube: whether it may have surface.
+    pub(super) cubes: Option<&'a [bool]>,
     /// Lowest node of the brick.
     pub(super) first: [usize; 3],
 }
@@ -133,16 +162,51 @@ impl DenseSamples<'_> {
     }
 }
 
+impl DenseSamples<'_> {
+    #[inline]
+    fn finite(&self, node: [i32; 3]) -> bool {
+        let inside = (0..3).all(|k| self.first[k].wrapping_add_signed(node[k] as isize) < self.shape[k]);
+        inside && self.samples[self.index(node)].is_finite()
+    }
+
+    /// How far samples lie from each other in the four cubes around an edge away from the border; `None` where a sample is
+    /// not finite.
+    #[inline]
+    fn range_inside(&self, node: [i32; 3], axis: usize) -> Option<f32> {
+        let strides = [1, self.shape[0], self.shape[0] * self.shape[1]];
+        let (along, u, v) = (strides[axis], strides[(axis + 1) % 3], strides[(axis + 2) % 3]);
+        let first = self.index(node).wrapping_sub(u + v);
+        let (mut low, mut high, mut sum) = ([[0.0f32; 3]; 3], [[0.0f32; 3]; 3], 0.0);
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let at = first + i * u + j * v;
+            let (a, b) = (self.samples[at], self.samples[at + along]);
+            (low[i][j], high[i][j]) = if a < b { (a, b) } else { (b, a) };
+            sum += 0.0 * (a + b);
+        }
+        if sum != 0.0 {
+            return None;
+        }
+        let mut range = 0.0f32;
+        for (i, j) in (0..2).flat_map(|i| (0..2).map(move |j| (i, j))) {
+            let least = low[i][j].min(low[i + 1][j]).min(low[i][j + 1]).min(low[i + 1][j + 1]);
+            let most = high[i][j].max(high[i + 1][j]).max(high[i][j + 1]).max(high[i + 1][j + 1]);
+            range = range.max(most - least);
+        }
+        Some(range)
+    }
+}
+
 impl Samples for DenseSamples<'_> {
     #[inline(always)]
     fn value(&self, node: [i32; 3]) -> f32 {
-        self.samples.get(self.index(node)).copied().unwrap_or(0.0) - self.level
+        let sample = self.samples.get(self.index(node)).copied().unwrap_or(0.0);
+        // Subtracted in f64, so that the sign is right for every level.
+        self.sign * ((f64::from(sample) - self.level) as f32).clamp(f32::MIN, f32::MAX)
     }
 
     #[inline]
     fn observed(&self, node: [i32; 3]) -> Option<f32> {
-        let inside = (0..3).all(|k| self.first[k].wrapping_add_signed(node[k] as isize) < self.shape[k]);
-        inside.then(|| self.value(node)).filter(|v| v.is_finite())
+        self.finite(node).then(|| self.value(node))
     }
 
     /// Away from the border the neighbors are at fixed distances in memory.
@@ -154,7 +218,8 @@ impl Samples for DenseSamples<'_> {
         };
         if inner(0) && inner(1) && inner(2) {
             let (i, row) = (self.index(node), self.shape[0]);
-            let half = |stride: usize| 0.5 * (self.samples[i + stride] - self.samples[i - stride]);
+            let half =
+                |stride: usize| 0.5 * self.sign * (self.samples[i + stride] - self.samples[i - stride]);
             let gradient = [half(1), half(row), half(row * self.shape[1])];
             // A neighbor that is not finite makes the difference not finite.
             if gradient.iter().all(|v| v.is_finite()) {
@@ -166,5 +231,59 @@ impl Samples for DenseSamples<'_> {
 
     fn color(&self, _: [i32; 3]) -> Option<Color> {
         None
+    }
+
+    #[inline(always)]
+    fn margin(&self) -> f32 {
+        self.margin
+    }
+
+    #[inline]
+    fn cubes(&self, layer: usize) -> u64 {
+        let Some(cubes) = self.cubes else { return u64::MAX };
+        let mut word = 0;
+        for i in 0..64 {
+            let node = [self.first[0] + i % 8 + 1, self.first[1] + i / 8 + 1, self.first[2] + layer + 1];
+            let inside = (0..3).all(|k| node[k] < self.shape[k]);
+            let index = node[0] + self.shape[0] * (node[1] + self.shape[1] * node[2]);
+            word |= u64::from(inside && cubes[index]) << i;
+        }
+        word
+    }
+
+    fn cube_range(&self, lowest: [i32; 3]) -> Option<f32> {
+        let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+        for c in 0..8 {
+            let node = [lowest[0] + (c & 1), lowest[1] + (c >> 1 & 1), lowest[2] + (c >> 2)];
+            if !self.finite(node) {
+                return None;
+            }
+            let sample = self.samples[self.index(node)];
+            (least, most) = (least.min(sample), most.max(sample));
+        }
+        let allowed = self.cubes.is_none_or(|cubes| cubes[self.index(lowest.map(|i| i + 1))]);
+        allowed.then_some(most - least)
+    }
+
+    #[inline]
+    fn range(&self, node: [i32; 3], axis: usize) -> f32 {
+        let inner = |k: usize| {
+            let at = self.first[k].wrapping_add_signed(node[k] as isize);
+            k == axis || at > 0 && at + 1 < self.shape[k]
+        };
+        if self.cubes.is_none()
+            && (0..3).all(inner)
+            && let Some(range) = self.range_inside(node, axis)
+        {
+            return range;
+        }
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let around = (0..4).filter_map(|i| {
+            let mut lowest = node;
+            lowest[u] -= i & 1;
+            lowest[v] -= i >> 1;
+            self.cube_range(lowest)
+        });
+        around.fold(0.0, f32::max)
     }
 }

@@ -8,11 +8,13 @@ use super::samples::Samples;
 pub(super) struct Attributes {
     pub(super) normals: bool,
     pub(super) colors: bool,
+    /// [`Samples::range`].
+    pub(super) ranges: bool,
 }
 
 /// Least distance of a crossing from both nodes (cells): with values of exactly zero there are still no triangles without
 /// area and no two vertices in one place. It moves a vertex by 1/256 of a cell at most.
-const MARGIN: f32 = 1.0 / 256.0;
+pub(super) const MARGIN: f32 = 1.0 / 256.0;
 
 /// Color of a vertex between nodes without color.
 const NO_COLOR: [u8; 3] = [128; 3];
@@ -22,12 +24,19 @@ pub(super) struct Vertex {
     pub(super) position: [f32; 3],
     pub(super) gradient: [f32; 3],
     pub(super) color: [u8; 3],
+    pub(super) range: f32,
 }
 
 /// Position of the zero crossing between two nodes with these values of different sign, in cells from the lower one.
 #[inline(always)]
 pub(crate) fn crossing_place(a: f32, b: f32) -> f32 {
-    (a / (a - b)).clamp(MARGIN, 1.0 - MARGIN)
+    crossing_beyond(MARGIN, a, b)
+}
+
+/// [`crossing_place`] with another distance from both nodes: 0, and zeros are crossings in a node.
+#[inline(always)]
+pub(super) fn crossing_beyond(margin: f32, a: f32, b: f32) -> f32 {
+    (a / (a - b)).clamp(margin, 1.0 - margin)
 }
 
 /// The crossing of the edge that starts at `node`: linear between its ends, from the lower one to the upper one, so
@@ -37,7 +46,7 @@ pub(super) fn crossing(samples: &impl Samples, node: [i32; 3], axis: usize, want
     let mut end = node;
     end[axis] += 1;
     let (a, b) = (samples.value(node), samples.value(end));
-    let t = crossing_place(a, b);
+    let t = crossing_beyond(samples.margin(), a, b);
     let mut vertex =
         Vertex { position: [node[0] as f32, node[1] as f32, node[2] as f32], ..Vertex::default() };
     vertex.position[axis] += t;
@@ -49,6 +58,9 @@ pub(super) fn crossing(samples: &impl Samples, node: [i32; 3], axis: usize, want
     }
     if want.colors {
         vertex.color = color(samples, node, end, t);
+    }
+    if want.ranges {
+        vertex.range = samples.range(node, axis);
     }
     vertex
 }
@@ -70,6 +82,10 @@ pub(super) fn centre(around: &[u8], at: [i32; 3], samples: &impl Samples, want: 
     let mut mean = Vertex::default();
     let mut color = [0u32; 3];
     let share = 1.0 / around.len() as f32;
+    if want.ranges {
+        mean.range = samples.cube_range(at).unwrap_or(0.0);
+    }
+    let want = Attributes { ranges: false, ..want };
     for &edge in around {
         let (axis, c) = edge_start(edge);
         let node = std::array::from_fn(|k| at[k] + i32::from(c >> k & 1));
