@@ -40,7 +40,8 @@ pub(crate) struct Fans {
 impl Fans {
     /// The number of the fan of a shape, which is made where it is new; `None` for a log of too many different ones.
     pub(crate) fn number(&mut self, shape: FanShape) -> Option<u32> {
-        let key = (shape.start.to_bits(), shape.step.to_bits(), shape.beams);
+        // 0.0 and -0.0 are one angle.
+        let key = ((shape.start + 0.0).to_bits(), (shape.step + 0.0).to_bits(), shape.beams);
         if let Some(&fan) = self.of_shape.get(&key) {
             return Some(fan);
         }

@@ -16,7 +16,8 @@ use crate::ros_log::{is_bag, open_bag};
 pub enum ScanLogKind {
     /// A folder of `frame-NNNNNN.depth.png` with `frame-NNNNNN.pose.txt` (7-Scenes, 3DMatch).
     SevenScenes,
-    /// A folder with `depth.txt`, `rgb.txt` and `groundtruth.txt` (TUM RGB-D, ETH3D SLAM).
+    /// A folder with `depth.txt`, `rgb.txt` and `groundtruth.txt` (TUM RGB-D, ETH3D SLAM), or with a file of any name that pairs
+    /// pictures; such a file.
     TumRgbd,
     /// A folder `masked_depth` with `pose/poses.txt` (BigBIRD as the GPIS tools store it).
     BigBird,

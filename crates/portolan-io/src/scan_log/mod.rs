@@ -10,6 +10,7 @@
 //! | | `*.e57`, `*.ptx` with any number of scans | in the file |
 //! | | `*.las`, `*.laz` | none: points without rays |
 //! | [`TumRgbd`](ScanLogKind::TumRgbd) | `depth.txt` and `rgb.txt` list pictures with times | `groundtruth.txt`, by time |
+//! | | a file of any name that pairs pictures (`t rgb/a.png t depth/b.png`) | in it, or `groundtruth.txt` |
 //! | [`Redwood`](ScanLogKind::Redwood) | `depth/*.png`, `color/*` (`image`, `rgb`) | `trajectory.log`, or `pose/*.txt` (ScanNet) |
 //! | [`Transforms`](ScanLogKind::Transforms) | `transforms.json` names pictures and depth images | in the file, of an OpenGL camera |
 //! | [`Colmap`](ScanLogKind::Colmap) | `sparse/0` a model, `depth/*.png`, `images` | in the model, of any scale |
@@ -29,6 +30,7 @@
 //! happen once, in `log.rs`.
 
 mod agreement;
+mod association;
 mod bigbird;
 mod cloud_frames;
 mod clouds;

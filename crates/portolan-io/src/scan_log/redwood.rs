@@ -9,8 +9,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::association::Association;
 use super::depth_frames::{DepthFrame, DepthFrames, color_beside};
-use super::files::{has_extension, has_name, names_in, number_in};
+use super::files::{has_extension, has_name, name_of, names_in, number_in};
 use super::intrinsics::{color_camera, find_camera};
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId, pose_beside, poses_beside_nothing};
@@ -50,6 +51,10 @@ pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
     camera.color = color_camera(&camera, None, options)?;
     let colors = colors_of(path, &names, options)?;
     let mut stats = ScanLogStats::default();
+    stats.notes.extend(Association::all_in(path).first().map(|a| {
+        let name = name_of(&a.path);
+        format!("{name} pairs pictures, too, and was not used; name it instead of the folder to use it")
+    }));
     let frames = names.iter().zip(colors);
     let frames = frames.map(|(name, color)| DepthFrame::of(&camera, folder.join(name), color)).collect();
     let poses = poses_of(path, &names, options)?;

@@ -4,21 +4,25 @@
 //! denser. Each depth image takes the color picture that is nearest in time, and the pose at its time, interpolated between
 //! the two beside it; both within [`ScanLogOptions::time_tolerance`]. Depth is in units of 1/5000 m.
 //!
+//! Where these lists are missing, a file of any name that pairs pictures line by line (`association.rs`) says the same, perhaps with
+//! poses. Several such files, of which none is the only one with poses, are an error: one of them is named instead of the folder.
+//!
 //! The camera is in no file of TUM's: it is published for the three sensors, and the folder's name decides which. ETH3D puts
 //! it in `calibration.txt`. What is published of the distortion of TUM's lenses is not
 //! applied unless the caller gives it.
 
 use std::path::{Path, PathBuf};
 
+use super::association::{Association, Pair};
 use super::depth_frames::{DepthFrame, DepthFrames};
 use super::files::name_of;
 use super::intrinsics::{color_camera, find_camera};
 use super::matching::nearest_in_time;
 use super::parts::{LayoutPoses, Parts, ScanId};
-use super::{ScanLogOptions, ScanLogStats};
+use super::{ScanLogOptions, ScanLogStats, colmap, redwood, transforms};
 use crate::bytes::{Lines, open as open_input, parse_f64};
 use crate::error::shown;
-use crate::poses3::read_poses_3d;
+use crate::poses3::{PoseFile, PoseLayout, read_poses_3d};
 use crate::{IoError, Result};
 
 const DEPTH: &str = "depth.txt";
@@ -30,38 +34,175 @@ const UNITS_PER_METRE: f64 = 5000.0;
 /// The most pictures of a list.
 const MOST_PICTURES: usize = 1 << 21;
 
+fn has_lists(folder: &Path) -> bool {
+    folder.join(DEPTH).is_file() && (folder.join(POSES).is_file() || folder.join("depth").is_dir())
+}
+
+/// Lists under TUM's names; an association file; a folder with one, unless it has the poses of another kind of log and none of this.
 pub(super) fn is_it(path: &Path) -> bool {
-    path.join(DEPTH).is_file() && (path.join(POSES).is_file() || path.join("depth").is_dir())
+    if path.is_file() {
+        return Association::in_file(path).is_some();
+    }
+    let has_poses =
+        |all: &[Association]| all.iter().any(Association::has_poses) || path.join(POSES).is_file();
+    let is_of_association = || {
+        let all = Association::all_in(path);
+        !all.is_empty() && (has_poses(&all) || !has_poses_of_others(path))
+    };
+    path.is_dir() && (has_lists(path) || is_of_association())
+}
+
+/// Whether a folder is a log with poses by itself, whatever pairs its pictures.
+fn has_poses_of_others(path: &Path) -> bool {
+    redwood::is_it(path) || transforms::is_it(path) || colmap::is_it(path)
+}
+
+/// The pictures of a log, in order of time where they have times, and what the file that pairs them knows of poses.
+#[derive(Default)]
+struct Pictures {
+    scans: Vec<ScanId>,
+    colors: Vec<Option<PathBuf>>,
+    poses: Option<LayoutPoses>,
+    notes: Vec<String>,
 }
 
 pub(super) fn open(path: &Path, options: &ScanLogOptions) -> Result<Parts> {
+    let folder = if path.is_file() { path.parent().unwrap_or(Path::new(".")) } else { path };
+    let (list, mut pictures) = pictures_of(path, options)?;
     let mut stats = ScanLogStats::default();
-    let mut depths = read_list(&path.join(DEPTH))?;
-    let listed = depths.len();
-    depths.retain(|(_, file)| file.is_file());
-    stats.missing_files = (listed - depths.len()) as u64;
-    if depths.is_empty() {
+    let listed = pictures.scans.len();
+    pictures.keep_those_that_are_there();
+    stats.missing_files = (listed - pictures.scans.len()) as u64;
+    if pictures.scans.is_empty() {
         let value = format!("0 of {listed}");
-        let advice = "name the folder that holds the pictures beside depth.txt";
+        let advice = format!("name the folder that holds the pictures beside {}", name_of(&list));
         let field = "the number of pictures that are there";
-        return Err(IoError::layout(&path.join(DEPTH), field, value, advice));
+        return Err(IoError::layout(&list, field, value, advice));
     }
-    let colors = path.join(COLOR);
-    let colors = if options.color && colors.is_file() { read_list(&colors)? } else { Vec::new() };
-    let mut camera = find_camera(path, &CAMERA_FILES, published_camera(&name_of(path)), options)?;
-    let color = |time| nearest_in_time(&colors, time, options.time_tolerance).filter(|file| file.is_file());
+    stats.notes = pictures.notes;
+    let mut camera = find_camera(folder, &CAMERA_FILES, published_camera(&name_of(folder)), options)?;
     camera.color = color_camera(&camera, None, options)?;
-    let frames =
-        depths.iter().map(|(time, file)| DepthFrame::of(&camera, file.clone(), color(*time).cloned()));
+    let depths = pictures.scans.iter().map(|scan| scan.path.clone());
+    let frames = depths.zip(pictures.colors).map(|(depth, color)| {
+        let color = color.filter(|file| options.color && file.is_file());
+        DepthFrame::of(&camera, depth, color)
+    });
     let frames = frames.collect();
-    let poses = path.join(POSES);
-    let poses = match &options.poses {
-        None if poses.is_file() => LayoutPoses::File(read_poses_3d(poses)?),
+    let truth = folder.join(POSES);
+    let poses = match (&options.poses, pictures.poses) {
+        (None, Some(poses)) => poses,
+        (None, None) if truth.is_file() => LayoutPoses::File(read_poses_3d(truth)?),
         _ => LayoutPoses::Missing(POSES.into()),
     };
     let source = DepthFrames::new(frames, &mut camera, UNITS_PER_METRE, options, &mut stats)?;
-    let scans = depths.into_iter().map(|(t, path)| ScanId { path, number: None, time: Some(t) }).collect();
-    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, scans, poses) })
+    Ok(Parts { camera: Some(camera), stats, ..Parts::new(path, source, pictures.scans, poses) })
+}
+
+/// What pairs the pictures, and the pictures.
+fn pictures_of(path: &Path, options: &ScanLogOptions) -> Result<(PathBuf, Pictures)> {
+    if path.is_file() {
+        let Some(association) = Association::in_file(path) else {
+            let advice = "write t rgb/a.png t depth/b.png in each line, perhaps with tx ty tz qx qy qz qw";
+            return Err(IoError::layout(path, "the first line", "no pair of pictures", advice));
+        };
+        return Ok((path.into(), Pictures::of_pairs(&association)?));
+    }
+    let all = Association::all_in(path);
+    let names = || all.iter().map(|a| name_of(&a.path)).collect::<Vec<_>>().join(", ");
+    if has_lists(path) {
+        let mut pictures = Pictures::of_lists(path, options)?;
+        if !all.is_empty() {
+            let names = names();
+            pictures.notes.push(format!(
+                "{names}: pairs pictures, too, and was not used, as {DEPTH} is there; name the file instead of the folder to use it"
+            ));
+        }
+        return Ok((path.join(DEPTH), pictures));
+    }
+    // One with poses is worth more than one without, where nothing else has any.
+    let wants_poses = options.poses.is_none() && !path.join(POSES).is_file();
+    let with_poses: Vec<_> = all.iter().filter(|a| a.has_poses()).collect();
+    let chosen = match (all.as_slice(), with_poses.as_slice()) {
+        ([one], _) => one,
+        (_, [one]) if wants_poses => one,
+        ([], _) => {
+            let advice =
+                format!("looked for {DEPTH} and for files that pair pictures (t rgb/a.png t depth/b.png)");
+            return Err(IoError::layout(path, "the list of pictures", "missing", advice));
+        }
+        _ => {
+            let value = format!("not clear ({})", names());
+            let advice = "several files pair pictures: name one of them instead of the folder";
+            return Err(IoError::layout(path, "the list of pictures", value, advice));
+        }
+    };
+    let mut pictures = Pictures::of_pairs(chosen)?;
+    if all.len() > 1 {
+        let (names, chosen) = (names(), name_of(&chosen.path));
+        pictures.notes.push(format!("of {names}, {chosen} was used: it alone has poses"));
+    }
+    Ok((chosen.path.clone(), pictures))
+}
+
+impl Pictures {
+    fn of_lists(folder: &Path, options: &ScanLogOptions) -> Result<Self> {
+        let depths = read_list(&folder.join(DEPTH))?;
+        let colors = folder.join(COLOR);
+        let colors = if options.color && colors.is_file() { read_list(&colors)? } else { Vec::new() };
+        let color =
+            |time| nearest_in_time(&colors, time, options.time_tolerance).filter(|file| file.is_file());
+        let colors = depths.iter().map(|(time, _)| color(*time).cloned()).collect();
+        let scan = |(t, path)| ScanId { path, number: None, time: Some(t) };
+        Ok(Self { scans: depths.into_iter().map(scan).collect(), colors, ..Self::default() })
+    }
+
+    fn of_pairs(association: &Association) -> Result<Self> {
+        let mut pairs = association.read()?;
+        if pairs.iter().all(|pair| pair.time.is_some()) {
+            let time = |pair: &Pair| pair.time.unwrap_or_default();
+            pairs.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        }
+        let path = &association.path;
+        let mut notes = vec![format!(
+            "{} pairs the pictures; depth is taken in units of 1/5000 m, as TUM has it (--depth-scale says otherwise)",
+            name_of(path)
+        )];
+        let has_poses = association.has_poses();
+        if has_poses && path.with_file_name(POSES).is_file() {
+            notes.push(format!("the poses are those of {}, not of {POSES}", name_of(path)));
+        }
+        // Poses at times of their own are a trajectory; else each is that of its picture.
+        let poses = pairs.iter().map(|pair| pair.pose.clone());
+        let has_times = pairs.iter().all(|pair| pair.time.is_some());
+        let poses = match has_poses {
+            true if association.has_times_of_poses() && has_times => LayoutPoses::File(PoseFile {
+                path: path.clone(),
+                layout: PoseLayout::Tum,
+                poses: poses.flatten().collect(),
+            }),
+            _ => LayoutPoses::PerScan(poses.map(|pose| Some((path.clone(), pose?))).collect()),
+        };
+        let scan = |pair: &Pair| ScanId { path: pair.depth.clone(), number: None, time: pair.time };
+        Ok(Self {
+            scans: pairs.iter().map(scan).collect(),
+            colors: pairs.into_iter().map(|pair| Some(pair.color)).collect(),
+            poses: has_poses.then_some(poses),
+            notes,
+        })
+    }
+
+    /// Leaves out pictures without a file, with their colors and the poses that are theirs alone.
+    fn keep_those_that_are_there(&mut self) {
+        let is_there: Vec<bool> = self.scans.iter().map(|scan| scan.path.is_file()).collect();
+        let mut keep = is_there.iter();
+        self.scans.retain(|_| keep.next().is_some_and(|k| *k));
+        let mut keep = is_there.iter();
+        self.colors.retain(|_| keep.next().is_some_and(|k| *k));
+        if let Some(LayoutPoses::PerScan(poses)) = &mut self.poses {
+            let mut keep = is_there.iter();
+            poses.retain(|_| keep.next().is_some_and(|k| *k));
+        }
+    }
 }
 
 /// What TUM publishes for the color cameras, to which its depth images are registered.
@@ -103,7 +244,8 @@ fn read_list(path: &Path) -> Result<Vec<(f64, PathBuf)>> {
             return Err(IoError::text(path, number, "the file", shown(line), "write seconds, then a file"));
         }
         IoError::unless_full(path, number, pictures.len(), MOST_PICTURES, "pictures", "list")?;
-        pictures.push((time, folder.join(file)));
+        // Zero has no sign.
+        pictures.push((time + 0.0, folder.join(file)));
     }
     pictures.sort_by(|a, b| a.0.total_cmp(&b.0));
     Ok(pictures)

@@ -6,7 +6,7 @@ use super::super::index::{Entry, FileIndex, NO_CHUNK, told, too_many};
 use super::super::reader::FileReader;
 use super::channels::{Channels, known};
 use super::chunk::load_chunk;
-use super::record::{MESSAGE_HEAD, RECORD_HEAD, Wrong, message_head, record_at, u64_at};
+use super::record::{MESSAGE_HEAD, RECORD_HEAD, Wrong, message_head, parse, record_at, u64_at};
 use crate::{BagError, Result};
 
 /// Reads the whole file. Without `allow_damage` the first damage is the error; with it a damaged chunk is left out and
@@ -60,9 +60,10 @@ fn scan_record(
         op::SCHEMA | op::CHANNEL => {
             let mut body = Vec::new();
             reader.bytes_at(body_at, length, &mut body, "a record")?;
-            let record = mcap::parse_record(code, &body);
+            let record = parse(code, &body);
             let record = record.map_err(|e| reader.damaged(place, "a schema or channel", e))?;
-            channels.take(record).map_err(|(field, value)| reader.damaged(place, field, value))?;
+            let taken = record.map_or(Ok(()), |record| channels.take(record));
+            taken.map_err(|(field, value)| reader.damaged(place, field, value))?;
         }
         op::MESSAGE => {
             let mut head = [0; MESSAGE_HEAD];
@@ -107,9 +108,9 @@ fn walk_chunk(
             return Err((at, "the number of messages", entries.len().to_string()));
         }
         let result: Result<(), Wrong> = match code {
-            op::SCHEMA | op::CHANNEL => mcap::parse_record(code, &chunk[body])
-                .map_err(|e| ("a schema or channel", e.to_string()))
-                .and_then(|record| channels.take(record)),
+            op::SCHEMA | op::CHANNEL => parse(code, &chunk[body])
+                .map_err(|e| ("a schema or channel", e))
+                .and_then(|record| record.map_or(Ok(()), |record| channels.take(record))),
             op::MESSAGE => message_head(&chunk[body]).and_then(|(channel, log_time)| {
                 known(channels, channel)?;
                 entries.push(Entry { channel, log_time, place, within: at as u32 });

@@ -7,7 +7,7 @@ use mcap::records::{self, Record, op};
 use super::super::index::{Entry, FileIndex, NO_CHUNK, too_many};
 use super::super::reader::FileReader;
 use super::channels::Channels;
-use super::record::{RECORD_HEAD, record_at, u32_at, u64_at};
+use super::record::{RECORD_HEAD, parse, record_at, u32_at, u64_at};
 use crate::Result;
 
 /// What the end of the file says of it.
@@ -45,15 +45,15 @@ pub(super) fn summary(reader: &mut FileReader) -> Result<Result<Summary, String>
             return Ok(Err("its index is damaged".into()));
         };
         place = body.end;
-        match mcap::parse_record(code, &bytes[body]) {
-            Ok(record @ Record::Schema { .. }) => {
+        match parse(code, &bytes[body]) {
+            Ok(Some(record @ Record::Schema { .. })) => {
                 if let Err((field, value)) = channels.take(record) {
                     return Ok(Err(format!("its index is damaged ({field} is {value})")));
                 }
             }
-            Ok(record @ Record::Channel(_)) => late.push(record.into_owned()),
-            Ok(Record::ChunkIndex(chunk)) => chunks.push(chunk),
-            Ok(Record::Statistics(s)) => statistics = Some(s),
+            Ok(Some(record @ Record::Channel(_))) => late.push(record.into_owned()),
+            Ok(Some(Record::ChunkIndex(chunk))) => chunks.push(chunk),
+            Ok(Some(Record::Statistics(s))) => statistics = Some(s),
             Ok(_) => {}
             Err(e) => return Ok(Err(format!("its index is damaged ({e})"))),
         }
@@ -113,7 +113,7 @@ fn entries(
         while at < bytes.len() {
             let Some((op::MESSAGE_INDEX, body)) = record_at(&bytes, at) else { return damaged() };
             at = body.end;
-            let Ok(Record::MessageIndex(index)) = mcap::parse_record(op::MESSAGE_INDEX, &bytes[body]) else {
+            let Ok(Some(Record::MessageIndex(index))) = parse(op::MESSAGE_INDEX, &bytes[body]) else {
                 return damaged();
             };
             for message in index.records {

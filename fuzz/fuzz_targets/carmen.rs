@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("carmen", portolan_fuzz::readers::carmen);

@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("container", portolan_fuzz::readers::container);

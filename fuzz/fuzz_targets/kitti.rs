@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("kitti", portolan_fuzz::readers::kitti);

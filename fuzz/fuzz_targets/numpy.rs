@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("numpy", portolan_fuzz::readers::numpy);

@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("pcd", portolan_fuzz::readers::pcd);

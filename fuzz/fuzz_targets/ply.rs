@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("ply", portolan_fuzz::readers::ply);

@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("poses", portolan_fuzz::readers::poses);

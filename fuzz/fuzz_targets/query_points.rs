@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("query_points", portolan_fuzz::readers::query_points);

@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("transforms_json", portolan_fuzz::readers::transforms_json);

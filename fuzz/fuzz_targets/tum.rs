@@ -1,0 +1,2 @@
+#![no_main]
+portolan_fuzz::target!("tum", portolan_fuzz::readers::tum);
