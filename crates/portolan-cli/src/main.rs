@@ -15,6 +15,7 @@ mod progress;
 mod saved;
 mod source;
 mod stale;
+mod unknown;
 
 use std::process::ExitCode;
 

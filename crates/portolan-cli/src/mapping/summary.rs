@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::field::{PointKind, UnknownSpace};
-use portolan_io::unknown_word;
 use serde_json::{Value, json};
 
 use portolan::scan::{Way, WhyRays};
@@ -166,7 +165,7 @@ impl Summary<'_> {
         json!({
             "thin_cells": count(PointKind::Thin),
             "loose_cells": count(PointKind::Loose),
-            "unknown_as": unknown_word(UnknownSpace::default()),
+            "unknown_as": UnknownSpace::default().word(),
         })
     }
 
