@@ -247,7 +247,7 @@ pub(crate) fn picture(place: &Place, title: &str, words: &str, lines: &[Drawn], 
     }
     canvas.scale_bar(&view);
 
-    let mut below = Chart::new(&format!(
+    let mut below = Chart::new(format!(
         "Certified clearance along the way (unknown space: {})",
         UnknownSpace::default().word()
     ))

@@ -234,7 +234,7 @@ fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
 
 fn of_map2(file: MapFile<2>, args: &Args) -> anyhow::Result<Field<2>> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
-        let field = esdf_2d(&file, t, &how(args, &file.header.settings))?;
+        let field = esdf_2d(&file, t, &how(args, &file.header.settings))?.esdf;
         let (distance, clearance) = sparse(field, f64::INFINITY, args);
         // A 2-D map is a box: what lies outside does not depend on where something was seen.
         let bounds = t.grid().aabb();
@@ -270,7 +270,7 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
         if how.method == EsdfArg::Accurate {
             how.max_distance += HELD_BACK * map.store.lattice().resolution;
         }
-        anyhow::Ok(sparse(esdf_3d(&file, map, &how)?, max_distance, args))
+        anyhow::Ok(sparse(esdf_3d(&file, map, &how)?.esdf, max_distance, args))
     });
     let of_points = file.occupancy_bricks.as_ref().filter(|_| is_of_points(&file.header.settings));
     let field = match (field, of_points) {

@@ -24,7 +24,7 @@ impl Field {
         Ok(Some(match source {
             Source::Map2(file) => match &file.tsdf {
                 Some(tsdf) => {
-                    let field = esdf_2d(file, tsdf, &how(args, &file.header.settings)?)?;
+                    let field = esdf_2d(file, tsdf, &how(args, &file.header.settings)?)?.esdf;
                     Self::Two(in_2d(field.dense(tsdf.grid()), args)?)
                 }
                 None => {
@@ -54,7 +54,7 @@ impl Field {
             Source::Map3(file) => {
                 let how = how(args, &file.header.settings)?;
                 let field = match (&file.tsdf_bricks, &file.occupancy_bricks) {
-                    (Some(map), _) => esdf_3d(file, map, &how)?,
+                    (Some(map), _) => esdf_3d(file, map, &how)?.esdf,
                     (None, Some(map)) if is_of_points(&file.header.settings) => {
                         // Files that hold distances alone say nothing of free space.
                         let filled = UnknownCells::space(args.arrays.unknown);
