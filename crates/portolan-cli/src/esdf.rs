@@ -69,6 +69,14 @@ impl FieldHow {
     }
 }
 
+/// A distance field of a map.
+pub(crate) struct Field<const D: usize> {
+    pub(crate) esdf: Esdf<D>,
+    /// Cells that log odds alone, counts alone, and both call occupied ([`ObstacleCells::agreement`]); `None` where one of the
+    /// two is not asked.
+    pub(crate) agreement: Option<[usize; 3]>,
+}
+
 /// Whether some map of a file beside its signed distances says what stops beams.
 pub(crate) fn keeps_thin<const D: usize>(file: &MapFile<D>) -> bool {
     let occupancy = file.grid.is_some() || file.tree.is_some() || file.occupancy_bricks.is_some();
@@ -94,22 +102,26 @@ pub(crate) fn check_thin(given: bool, method: EsdfArg) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// Where the maps of the file do not fit each other.
-pub(crate) fn esdf_2d(file: &MapFile<2>, tsdf: &Tsdf2, how: &FieldHow) -> anyhow::Result<Esdf<2>> {
+pub(crate) fn esdf_2d(file: &MapFile<2>, tsdf: &Tsdf2, how: &FieldHow) -> anyhow::Result<Field<2>> {
     let grid = tsdf.grid();
     let max_distance = vector::norm(grid.aabb().extent()).max(grid.lattice.resolution);
     let settings = EsdfSettings { max_distance, ..how.settings() };
-    Ok(Esdf::with_obstacles(tsdf, &obstacle_cells_2d(file, tsdf, how.thin)?, &settings))
+    let (cells, both) = obstacle_cells_2d(file, tsdf, how.thin)?;
+    let esdf = Esdf::with_obstacles(tsdf, &cells, &settings);
+    Ok(Field { esdf, agreement: both.then(|| cells.agreement()) })
 }
 
 /// The field of a 3-D map, likewise, up to a largest distance.
-pub(crate) fn esdf_3d(file: &MapFile<3>, tsdf: &TsdfBricks<3>, how: &FieldHow) -> anyhow::Result<Esdf<3>> {
+pub(crate) fn esdf_3d(file: &MapFile<3>, tsdf: &TsdfBricks<3>, how: &FieldHow) -> anyhow::Result<Field<3>> {
     let mut cells = ObstacleCells::default();
     if let Some(map) = file.occupancy_bricks.as_ref().filter(|_| how.thin > 0.0) {
         ensure!(map.store.lattice() == tsdf.store.lattice(), LATTICES);
         cells.follow_occupancy(&map.store);
     }
     follow_attenuation(&mut cells, file, tsdf.store.lattice(), how.thin)?;
-    Ok(Esdf::with_obstacles(tsdf, &cells, &how.settings()))
+    let both = how.thin > 0.0 && file.occupancy_bricks.is_some() && file.attenuation.is_some();
+    let esdf = Esdf::with_obstacles(tsdf, &cells, &how.settings());
+    Ok(Field { esdf, agreement: both.then(|| cells.agreement()) })
 }
 
 /// The field of a 3-D map of points without rays: distances to the centers of the cells that hold them, in at most `memory`
@@ -154,10 +166,11 @@ impl<const D: usize> ClearanceField<D> for PointsAlone<'_, D> {
 
 const LATTICES: &str = "the maps of the file have not the same cells";
 
-fn obstacle_cells_2d(file: &MapFile<2>, tsdf: &Tsdf2, thin: f64) -> anyhow::Result<ObstacleCells<2>> {
+/// With whether both kinds of map were asked.
+fn obstacle_cells_2d(file: &MapFile<2>, tsdf: &Tsdf2, thin: f64) -> anyhow::Result<(ObstacleCells<2>, bool)> {
     let mut cells = ObstacleCells::default();
     if thin == 0.0 {
-        return Ok(cells);
+        return Ok((cells, false));
     }
     let lattice = *tsdf.lattice();
     let on_lattice = |dense: &Dense<LogOdds8, 2>| Bricks::of_dense(dense, lattice).context(LATTICES);
@@ -171,7 +184,7 @@ fn obstacle_cells_2d(file: &MapFile<2>, tsdf: &Tsdf2, thin: f64) -> anyhow::Resu
     };
     occupancy.iter().for_each(|map| cells.follow_occupancy(map));
     follow_attenuation(&mut cells, file, &lattice, thin)?;
-    Ok(cells)
+    Ok((cells, occupancy.is_some() && file.attenuation.is_some()))
 }
 
 fn follow_attenuation<const D: usize>(
@@ -190,7 +203,7 @@ fn follow_attenuation<const D: usize>(
 /// A 2-D field around the surface alone, where nothing else is known.
 pub(crate) fn esdf_of_surface(tsdf: &Tsdf2) -> anyhow::Result<EsdfGrid<2>> {
     let how = FieldHow { thin: 0.0, ..FieldHow::of(&Settings::default()) };
-    Ok(esdf_2d(&MapFile::default(), tsdf, &how)?.dense(tsdf.grid()))
+    Ok(esdf_2d(&MapFile::default(), tsdf, &how)?.esdf.dense(tsdf.grid()))
 }
 
 /// The status plane of a file, where it holds more than NaN does.

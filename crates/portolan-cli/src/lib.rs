@@ -16,6 +16,7 @@ mod progress;
 mod saved;
 mod source;
 mod stale;
+mod unknown;
 
 use std::ffi::OsString;
 

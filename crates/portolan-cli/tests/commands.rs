@@ -527,3 +527,51 @@ fn distances_say_when_nothing_keeps_thin_things() {
     let thin = ["query", arg(&out), "--points", arg(&points), "--esdf", "seeded", "--thin", "0.2"];
     assert!(fail(2, thin).contains("--thin is only for --esdf accurate"));
 }
+
+/// Of cells that log odds call occupied and that were hit, and of cells that stop beams, the summary tells which both say.
+#[test]
+fn the_summary_counts_where_log_odds_and_counts_disagree() {
+    use portolan::store::Store;
+    let (folder, log) = room();
+    let out = folder.path().join("out");
+    let run = |options: &[&str]| {
+        let text = map(&log, &out, options);
+        let summary = std::fs::read_to_string(out.join("summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+        (text, summary)
+    };
+    let (text, summary) = run(&[]);
+    let file = portolan_io::MapFile::<2>::read(out.join("map.portolan")).unwrap();
+    let (occupancy, counts) = (file.grid.unwrap(), file.attenuation.unwrap().store);
+    let share = summary["settings"]["thin"].as_f64().unwrap();
+    let mut expected = [0; 3];
+    let grid = *occupancy.store().grid();
+    for i in 0..grid.len() {
+        let counted = counts.cell(counts.lattice().cell_of(grid.lattice.center(grid.cell(i))).unwrap());
+        let hit = counted.is_some_and(|c| c.hits > 0);
+        let log_odds = hit && occupancy.store().at(i).is_some_and(|v| v.0 > 0);
+        let stops = counted.is_some_and(|c| c.hits >= 3 && c.opacity::<2>() > share);
+        match (log_odds, stops) {
+            (true, false) => expected[0] += 1,
+            (false, true) => expected[1] += 1,
+            (true, true) => expected[2] += 1,
+            (false, false) => {}
+        }
+    }
+    let said = &summary["obstacles"]["occupied_by"];
+    let [log_odds, by_counts, both] = expected;
+    assert!(both > 100 && log_odds + by_counts > 0, "{expected:?}");
+    assert_eq!(
+        said,
+        &serde_json::json!({ "log_odds_alone": log_odds, "counts_alone": by_counts, "both": both })
+    );
+    let words =
+        format!("{both} by log odds and counts of hits, {log_odds} by log odds alone, {by_counts} by");
+    assert!(text.contains(&words), "{text}");
+    // Where one of them is not asked there is nothing to agree on.
+    for options in [&["--thin", "0"][..], &["--maps", "esdf,grid"], &["--maps", "esdf,attenuation"]] {
+        let (text, summary) = run(options);
+        assert!(summary["obstacles"]["occupied_by"].is_null(), "{options:?}");
+        assert!(!text.contains("by log odds alone"), "{text}");
+    }
+}

@@ -51,7 +51,7 @@ fn plain_arrays_are_indexed_x_y_in_both_orders() {
     let [nx, ny] = field.grid().shape;
     for (order, strides) in [("c", [ny, 1]), ("f", [1, nx])] {
         let npz = folder.path().join(format!("{order}.npz"));
-        succeed(["convert", arg(&out), arg(&npz), "--order", order]);
+        succeed(["convert", arg(&out), arg(&npz), "--order", order, "--unknown", "nan"]);
         let distance = array(&npz, "distance");
         assert_eq!((&distance.shape[..], distance.fortran), (&[nx, ny][..], order == "f"));
         let (values, status) = (numbers(&distance), numbers(&array(&npz, "status")));
@@ -80,11 +80,8 @@ fn layouts_are_those_of_their_consumers() {
         arguments.extend(more);
         succeed(arguments);
     };
-    let refused = fail(2, ["convert", arg(&file), arg(&npz), "--layout", "gpmp2"]);
-    assert!(
-        refused.contains("30 cells are unknown") && refused.contains("--unknown optimistic"),
-        "{refused}"
-    );
+    let refused = fail(2, ["convert", arg(&file), arg(&npz), "--layout", "gpmp2", "--unknown", "nan"]);
+    assert!(refused.contains("only for --layout plain"), "{refused}");
 
     of(&["--layout", "gpmp2", "--unknown", "optimistic"]);
     let data = array(&npz, "data");
@@ -96,10 +93,10 @@ fn layouts_are_those_of_their_consumers() {
         let known = if d.is_nan() { distances[i - 30] } else { *d };
         assert!(values[i] >= f64::from(known) - 1e-6 && (d.is_nan() || values[i] == f64::from(known)));
     }
-    of(&["--layout", "casadi", "--unknown", "pessimistic", "--bounds", "0,-1,0.5,3,1.5,2"]);
+    of(&["--layout", "casadi", "--bounds", "0,-1,0.5,3,1.5,2"]);
     assert_eq!(array(&npz, "values").shape, [6 * 5 * 3]);
     assert_eq!(numbers(&array(&npz, "z")), [0.75, 1.25, 1.75]);
-    of(&["--layout", "curobo", "--unknown", "pessimistic"]);
+    of(&["--layout", "curobo"]);
     let tensor = array(&npz, "feature_tensor");
     let NpyValues::F16(half) = tensor.values else { panic!() };
     assert_eq!(tensor.shape, grid.shape);
@@ -168,19 +165,77 @@ fn a_layer_of_a_3d_field_becomes_a_2d_map() {
     let yaml = folder.path().join("layer.yaml");
     let refused = fail(2, ["convert", arg(&file), arg(&yaml), "--inflate", "1"]);
     assert!(refused.contains("--z LOW:HIGH"), "{refused}");
-    let refused = fail(2, ["convert", arg(&file), arg(&yaml), "--z", "0.6:1.4"]);
-    assert!(refused.contains("--unknown"), "{refused}");
-    succeed(["convert", arg(&file), arg(&yaml), "--z", "0.6:1.4", "--unknown", "pessimistic"]);
+    let nan = fail(2, ["convert", arg(&file), arg(&yaml), "--z", "0.6:1.4", "--unknown", "nan"]);
+    assert!(nan.contains("only for plain arrays"), "{nan}");
+    succeed(["convert", arg(&file), arg(&yaml), "--z", "0.6:1.4"]);
     let map = MapServerMap::read(&yaml).unwrap();
     assert_eq!((map.grid.shape, map.grid.lattice.origin), ([6, 5], [0.0, -1.0]));
     let expected: Vec<_> =
         (0..30).map(|i| if i % 6 < 4 { MapCell::Free } else { MapCell::Occupied }).collect();
     assert_eq!(map.cells, expected);
     // Partly unknown columns are unknown, but where there is an obstacle.
-    succeed(["convert", arg(&file), arg(&yaml), "--z", "0.6:2.4", "--unknown", "pessimistic"]);
+    succeed(["convert", arg(&file), arg(&yaml), "--z", "0.6:2.4"]);
     let cells = MapServerMap::read(&yaml).unwrap().cells;
     assert!((0..30).all(|i| cells[i] == if i % 6 < 4 { MapCell::Unknown } else { MapCell::Occupied }));
     let none = ["convert", arg(&file), arg(&yaml), "--z", "5:6", "--unknown", "optimistic"];
     assert!(fail(1, none).contains("the height range"));
     assert_eq!(grid.shape, [6, 5, 4]);
+}
+
+/// The default of every file that has to say something of unknown space is an obstacle, and every file or line says what it is.
+#[test]
+fn unknown_space_is_an_obstacle_and_every_output_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, grid, distances) = space(folder.path());
+    let npz = folder.path().join("a.npz");
+    let convert = |out: &Path, more: &[&str]| {
+        let mut arguments = vec!["convert", arg(&file), arg(out), "--json"];
+        arguments.extend(more);
+        let document: serde_json::Value = serde_json::from_str(&succeed(arguments)).unwrap();
+        document["unknown_as"].as_str().map(str::to_owned)
+    };
+    let main = |layout: &str| if layout == "plain" { "distance" } else { "values" };
+    for layout in ["plain", "casadi"] {
+        let of = |more: &[&str]| {
+            let said = convert(&npz, &[&["--layout", layout], more].concat()).unwrap();
+            assert_eq!(array(&npz, "unknown_as"), NpyArray::text(&said));
+            (said, numbers(&array(&npz, main(layout))))
+        };
+        let (said, default) = of(&[]);
+        assert_eq!((said.as_str(), &default), ("obstacle", &of(&["--unknown", "pessimistic"]).1), "{layout}");
+        let (said, free) = of(&["--unknown", "optimistic"]);
+        assert!(said == "free" && free != default, "{layout}");
+        assert!(default.iter().zip(&free).all(|(obstacle, free)| obstacle <= free), "{layout}");
+        // Of the cells that nobody saw not one is free.
+        let unseen = distances.iter().filter(|d| d.is_nan()).count();
+        assert!(default.iter().filter(|d| **d <= 0.0).count() >= unseen, "{layout}");
+    }
+    let (out, yaml) = (folder.path().join("b.bin"), folder.path().join("a.yaml"));
+    assert_eq!(convert(&npz, &["--unknown", "nan"]).as_deref(), Some("unknown"));
+    assert!(numbers(&array(&npz, "distance")).iter().filter(|d| d.is_nan()).count() == 30);
+    // What holds unknown cells leaves them unknown, and refuses to be told otherwise.
+    assert_eq!(convert(&out, &[]).as_deref(), Some("unknown"));
+    assert!(fail(2, ["convert", arg(&file), arg(&out), "--unknown", "optimistic"]).contains("as NaN"));
+    let comment = || std::fs::read_to_string(&yaml).unwrap().lines().next().unwrap().to_owned();
+    assert_eq!(convert(&yaml, &["--z", "0.6:2.4"]).as_deref(), Some("obstacle"));
+    assert!(comment().starts_with("# columns with an unknown cell are unknown"), "{}", comment());
+    let cells = MapServerMap::read(&yaml).unwrap().cells;
+    assert_eq!(convert(&yaml, &["--z", "0.6:2.4", "--unknown", "optimistic"]).as_deref(), Some("free"));
+    assert!(comment().starts_with("# columns are free"), "{}", comment());
+    let optimistic = MapServerMap::read(&yaml).unwrap().cells;
+    assert!(cells.contains(&MapCell::Unknown) && !optimistic.contains(&MapCell::Unknown));
+    assert!(succeed(["convert", arg(&file), arg(&npz)]).contains("unknown cells are obstacles"));
+    assert_eq!(grid.shape, [6, 5, 4]);
+
+    let (folder, log) = room();
+    let (map_folder, yaml) = (folder.path().join("out"), folder.path().join("costs.yaml"));
+    map(&log, &map_folder, &[]);
+    let costs = ["convert", arg(&map_folder), arg(&yaml), "--inflate", "0.5"];
+    assert!(succeed(costs).contains("unknown cells are unknown"));
+    let refused = fail(2, [&costs[..], &["--unknown", "optimistic"]].concat());
+    assert!(refused.contains("unknown cells stay unknown"), "{refused}");
+    for command in ["query", "convert"] {
+        let help = succeed([command, "--help"]);
+        assert!(help.contains("[default: pessimistic]"), "{help}");
+    }
 }

@@ -25,6 +25,27 @@ fn summary(out: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap()
 }
 
+/// What the summary says of where log odds and counts agree, from the cells of the file.
+fn occupied_by(out: &Path) -> serde_json::Value {
+    use portolan::store::Store;
+    let file = portolan_io::MapFile::<3>::read(out.join("map.portolan")).unwrap();
+    let (occupancy, counts) = (file.occupancy_bricks.unwrap().store, file.attenuation.unwrap().store);
+    let share = summary(out)["settings"]["thin"].as_f64().unwrap();
+    let mut seen: std::collections::BTreeSet<_> = occupancy.keys().into_iter().collect();
+    seen.extend(counts.keys());
+    let mut found = [0; 3];
+    for cell in seen.iter().flat_map(|key| (0..512).map(|i| key.cell(i))) {
+        let Some(counted) = counts.cell(cell).filter(|c| c.hits > 0) else { continue };
+        let log_odds = occupancy.cell(cell).is_some_and(|v| v.0 > 0);
+        let stops = counted.hits >= 3 && counted.opacity::<3>() > share;
+        let said = [log_odds && !stops, stops && !log_odds, log_odds && stops];
+        found.iter_mut().zip(said).for_each(|(n, said)| *n += usize::from(said));
+    }
+    // Six scans are few for cells to have three hits.
+    assert!(found[0] > 0 && found[2] > 0, "{found:?}");
+    serde_json::json!({ "log_odds_alone": found[0], "counts_alone": found[1], "both": found[2] })
+}
+
 #[test]
 fn a_lidar_log_becomes_all_maps() {
     let (folder, log) = lidar_log();
@@ -50,6 +71,7 @@ fn a_lidar_log_becomes_all_maps() {
     assert!(summary["mesh"]["triangles"].as_u64().unwrap() > 5000);
     assert!(summary["mesh"]["area"].as_f64().unwrap() > 50.0);
     assert_eq!(summary["warnings"], serde_json::json!([]));
+    assert_eq!(summary["obstacles"]["occupied_by"], occupied_by(&out));
 
     // Where the sensor was is free. What it saw cannot be nearer than the truth, up to a cell and a half; what it did not
     // see, the floor right below, may be missing.

@@ -107,14 +107,6 @@ pub fn write_answer_header<const D: usize>(w: &mut impl Write) -> io::Result<()>
     writeln!(w, "x,y{z},status,occupancy,distance,lower,upper,gx,gy{gz},unknown_as")
 }
 
-/// What unknown space counts as, in one word.
-pub fn unknown_word(unknown: UnknownSpace) -> &'static str {
-    match unknown {
-        UnknownSpace::Pessimistic => "obstacle",
-        UnknownSpace::Optimistic => "free",
-    }
-}
-
 /// Writes one row: `x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz],unknown_as`. Numbers are written so that
 /// reading gives the same double.
 ///
@@ -132,7 +124,7 @@ pub fn write_answer<const D: usize>(w: &mut impl Write, row: &AnswerRow<D>) -> i
             None => write!(w, ",")?,
         }
     }
-    writeln!(w, ",{}", row.unknown.map_or("", unknown_word))
+    writeln!(w, ",{}", row.unknown.map_or("", UnknownSpace::word))
 }
 
 #[cfg(test)]

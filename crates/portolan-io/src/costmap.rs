@@ -21,12 +21,18 @@ use crate::map_server::write_pair;
 use crate::{IoError, MapMode, Result};
 
 /// Writes costs (one byte per cell, x fastest, y up: [`Inflation::costs`]) as a yaml file, and beside it the image under
-/// the same name with `.pgm`.
+/// the same name with `.pgm`. The note becomes a comment of the yaml file: what unknown space counts as, say.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] where the lengths differ, the resolution is not positive, or the mode cannot hold unknown
 /// cells that are there; else as [`crate::write_atomic`].
-pub fn write_costmap(yaml: impl AsRef<Path>, grid: &Grid<2>, costs: &[u8], mode: MapMode) -> Result<()> {
+pub fn write_costmap(
+    yaml: impl AsRef<Path>,
+    grid: &Grid<2>,
+    costs: &[u8],
+    mode: MapMode,
+    note: &str,
+) -> Result<()> {
     let yaml = yaml.as_ref();
     let unknown = costs.iter().filter(|c| **c == cost::NO_INFORMATION).count();
     if mode == MapMode::Scale && unknown > 0 {
@@ -52,7 +58,7 @@ pub fn write_costmap(yaml: impl AsRef<Path>, grid: &Grid<2>, costs: &[u8], mode:
         MapMode::Scale => (0.999, 0.001),
         MapMode::Raw => (0.985, 0.984),
     };
-    write_pair(yaml, grid, &pixels, mode, occupied, free)
+    write_pair(yaml, grid, &pixels, mode, occupied, free, note)
 }
 
 #[cfg(test)]
@@ -83,7 +89,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let yaml = folder.path().join("costs.yaml");
         let grid = Grid::new([-1.0, 2.0], 0.05, [costs.len() / 3, 3]);
-        write_costmap(&yaml, &grid, costs, mode).unwrap();
+        write_costmap(&yaml, &grid, costs, mode, "a\nnote").unwrap();
+        assert!(std::fs::read_to_string(&yaml).unwrap().starts_with("# a note\n"));
         let info = MapServerInfo::parse(open(&yaml).unwrap()).unwrap();
         assert_eq!(info.mode, mode);
         let image = Pgm::read(folder.path().join("costs.pgm")).unwrap();
@@ -117,7 +124,7 @@ mod tests {
     fn what_cannot_be_held_is_refused() {
         let grid = Grid::new([0.0; 2], 0.05, [2, 1]);
         let refused =
-            |costs: &[u8], mode| write_costmap("never.yaml", &grid, costs, mode).unwrap_err().to_string();
+            |costs: &[u8], mode| write_costmap("never.yaml", &grid, costs, mode, "").unwrap_err().to_string();
         assert!(refused(&[0, 255], MapMode::Scale).contains("unknown space is 1 cells"));
         assert!(refused(&[0], MapMode::Raw).contains("the map size"));
     }

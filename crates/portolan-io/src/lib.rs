@@ -73,9 +73,7 @@ mod svg;
 mod testing;
 mod xyz;
 
-pub use answer_row::{
-    AnswerRow, HELD_BACK, certified_reach, unknown_word, write_answer, write_answer_header,
-};
+pub use answer_row::{AnswerRow, HELD_BACK, certified_reach, write_answer, write_answer_header};
 pub use bytes::{Compression, Input, open, write_atomic};
 pub use carmen::{CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage};
 pub use container::{Chunk, Container, ContainerWriter};

@@ -204,10 +204,11 @@ pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell
         MapCell::Occupied => 0,
     };
     let pixels: Vec<u16> = cells.iter().map(gray).collect();
-    write_pair(yaml.as_ref(), grid, &pixels, MapMode::Trinary, 0.65, 0.196)
+    write_pair(yaml.as_ref(), grid, &pixels, MapMode::Trinary, 0.65, 0.196, "unknown cells are unknown")
 }
 
-/// Writes the yaml file and the image of pixels up to 255, one per cell of `grid`, x fastest, y up.
+/// Writes the yaml file and the image of pixels up to 255, one per cell of `grid`, x fastest, y up. The note is a comment of
+/// the yaml file.
 pub(crate) fn write_pair(
     yaml: &Path,
     grid: &Grid<2>,
@@ -215,6 +216,7 @@ pub(crate) fn write_pair(
     mode: MapMode,
     occupied_thresh: f64,
     free_thresh: f64,
+    note: &str,
 ) -> Result<()> {
     let [width, height] = grid.shape;
     let [x, y] = grid.lattice.origin;
@@ -240,7 +242,9 @@ pub(crate) fn write_pair(
         MapMode::Scale => "scale",
         MapMode::Raw => "raw",
     };
+    let note = note.replace(char::is_control, " ");
     write_atomic(yaml, |w| {
+        writeln!(w, "# {note}")?;
         writeln!(w, "image: '{name}'\nmode: {mode}\nresolution: {resolution}\norigin: [{x}, {y}, 0.0]")?;
         writeln!(w, "negate: 0\noccupied_thresh: {occupied_thresh}\nfree_thresh: {free_thresh}")
     })

@@ -19,7 +19,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let esdf = Esdf::of(tsdf, &EsdfSettings { max_distance: 3.0, unknown: true, ..Default::default() });
 
     let start = log[0].0.translation;
-    println!("clearance at the start: {:?}", esdf.clearance(start, UnknownSpace::Pessimistic));
+    let unknown = UnknownSpace::default();
+    println!("unknown space is: {}", unknown.word());
+    println!("clearance at the start: {:?}", esdf.clearance(start, unknown));
 
     let way: Vec<[f64; 2]> = log.iter().step_by(10).map(|(pose, _)| pose.translation).collect();
     for clearance in [0.1, 0.2, 2.0] {

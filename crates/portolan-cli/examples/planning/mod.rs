@@ -66,10 +66,10 @@ impl Place {
         Ok(Self { name, grid, field, contour, way })
     }
 
-    /// What is certified at a point, where unknown space is an obstacle: at least, and at most (meters).
+    /// What is certified at a point, with the library's default for unknown space, an obstacle: at least, and at most (meters).
     pub(crate) fn clearance(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         use portolan::Answer::{Known, Saturated};
-        match self.field.clearance(p, UnknownSpace::Pessimistic) {
+        match self.field.clearance(p, UnknownSpace::default()) {
             Known(c) | Saturated(c) if !c.inside => Some([c.lower, c.upper]),
             _ => None,
         }
@@ -247,11 +247,14 @@ pub(crate) fn picture(place: &Place, title: &str, words: &str, lines: &[Drawn], 
     }
     canvas.scale_bar(&view);
 
-    let mut below = Chart::new("Certified clearance along the way")
-        .x("way (m)")
-        .y("at least (m)")
-        .y_range(0.0, 1.2)
-        .horizontal(demanded, "demanded", color::MUTED);
+    let mut below = Chart::new(format!(
+        "Certified clearance along the way (unknown space: {})",
+        UnknownSpace::default().word()
+    ))
+    .x("way (m)")
+    .y("at least (m)")
+    .y_range(0.0, 1.2)
+    .horizontal(demanded, "demanded", color::MUTED);
     for drawn in lines {
         below = below.series(portolan_draw::Series::line(drawn.name, place.profile(drawn.line), drawn.color));
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::cell::{LogOdds8, LogOddsRule, LogOddsValue, OccupancyModel};
-use portolan::field::EsdfGrid;
+use portolan::field::{EsdfGrid, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map::OccupancyGrid;
 use portolan::store::Dense;
@@ -26,19 +26,18 @@ use crate::esdf::{EsdfArg, esdf_of_cells, status_plane, tsdf_of_samples};
 use crate::mapping::{Octree, cells_for_map_server, polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
+use crate::unknown::{STAYS, UnknownCells};
 
 mod arrays;
 mod costs;
 mod field;
 mod messages;
 
-pub(crate) use arrays::UnknownArg;
-
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  portolan convert depot.yaml depot.esdf.bin\n  \
-                  portolan convert intel intel.npz --layout casadi --unknown pessimistic\n  \
+                  portolan convert intel intel.npz --layout casadi\n  \
                   portolan convert intel costs.yaml --inflate 0.55 --inscribed 0.22\n  \
-                  portolan convert kitchen floor.yaml --z 0.1:1.2 --unknown pessimistic\n  \
+                  portolan convert kitchen floor.yaml --z 0.1:1.2 --unknown optimistic\n  \
                   portolan convert intel intel.mcap")]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -91,7 +90,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     source.check::<Args>(&args.given)?;
     args.check(target, &source)?;
     let done = match &source {
-        _ if args.takes_field(target, &source) => match Field::of(&source, args)? {
+        _ if args.takes_field(target, &source) => match Field::of(&source, target, args)? {
             Some(field) => write_field_as(&field, target, args)?,
             None => false,
         },
@@ -117,9 +116,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         "input": args.input.display().to_string(),
         "kind": source.describe(),
         "out": args.out.display().to_string(),
+        "unknown_as": args.unknown_as(target).map(|(word, _)| word),
         "warning": source.warning(),
     });
     let mut text = format!("{} -> {}\n", args.input.display(), args.out.display());
+    if let Some((_, said)) = args.unknown_as(target) {
+        text += &format!("{said}\n");
+    }
     if let Some(warning) = source.warning() {
         text += &format!("warning: {warning}\n");
     }
@@ -286,7 +289,8 @@ fn write_field_as(field: &Field, target: Target, args: &Args) -> anyhow::Result<
     match (target, field) {
         (Target::Arrays, _) => args.arrays.write(field, &args.out)?,
         (Target::MapServer, _) => {
-            args.costs.write(field, args.arrays.unknown.map(UnknownArg::space), &yaml(&args.out))?;
+            let note = args.unknown_as(target).map_or("", |(_, said)| said);
+            args.costs.write(field, args.arrays.unknown, note, &yaml(&args.out))?;
         }
         (_, Field::Two(field)) => write_dense(field, args)?,
         (_, Field::Three(field)) => write_dense(field, args)?,
@@ -319,6 +323,29 @@ impl Args {
         }
     }
 
+    /// What unknown space counts as in the file, in one word and in words for people; `None`: it says nothing of unknown
+    /// space.
+    fn unknown_as(&self, target: Target) -> Option<(&'static str, &'static str)> {
+        let given = self.arrays.unknown;
+        let layer = target == Target::MapServer && self.costs.is_layer();
+        let (word, space) = (UnknownCells::word(given), UnknownCells::space(given));
+        Some(match (target, space) {
+            (Target::Arrays, Some(UnknownSpace::Pessimistic)) => (word, "unknown cells are obstacles"),
+            (Target::Arrays, Some(UnknownSpace::Optimistic)) => (word, "unknown cells are free"),
+            (Target::MapServer, Some(UnknownSpace::Pessimistic)) if layer => {
+                (word, "columns with an unknown cell are unknown, but where there is an obstacle")
+            }
+            (Target::MapServer, Some(UnknownSpace::Optimistic)) if layer => {
+                (word, "columns are free where what is known of them is free")
+            }
+            (Target::Arrays | Target::Esdf, _) => (STAYS, "unknown cells are unknown: NaN"),
+            (Target::MapServer | Target::Messages | Target::OctomapBt | Target::OctomapOt, _) => {
+                (STAYS, "unknown cells are unknown")
+            }
+            (Target::Portolan | Target::Contour | Target::Mesh, _) => return None,
+        })
+    }
+
     /// Refuses options that would change nothing.
     fn check(&self, target: Target, source: &Source) -> anyhow::Result<()> {
         let out = self.out.display();
@@ -327,6 +354,11 @@ impl Args {
         }
         if self.costs.asked() && target != Target::MapServer {
             return Err(bad_call(format!("options of costmaps are only for .yaml, not for {out}")));
+        }
+        if target == Target::Esdf && self.arrays.unknown.is_some() {
+            return Err(bad_call(format!(
+                "--unknown is for arrays and layers: {out} holds unknown cells as NaN"
+            )));
         }
         if !self.takes_field(target, source) {
             let given = [

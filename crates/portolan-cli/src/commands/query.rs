@@ -11,11 +11,10 @@ use portolan::map;
 use portolan::store::Store;
 use portolan_io::{
     AnswerRow, EsdfFile, HELD_BACK, Input, MapFile, MapServerMap, OctomapTree, QueryPoints, certified_reach,
-    unknown_word, write_answer, write_answer_header,
+    write_answer, write_answer_header,
 };
 use serde_json::{Map, Value, json};
 
-use super::convert::UnknownArg;
 use crate::arguments::{length, thin};
 use crate::error::bad_call;
 use crate::esdf::{
@@ -25,6 +24,7 @@ use crate::esdf::{
 use crate::mapping::Settings;
 use crate::output::Output;
 use crate::source::{Source, open};
+use crate::unknown::UnknownArg;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  echo 1.5,2.0 | portolan query intel --points -")]
@@ -145,7 +145,7 @@ fn row_json<const D: usize>(row: &AnswerRow<D>) -> Value {
         "lower": row.lower,
         "upper": row.upper,
         "gradient": row.gradient.map(|g| g.to_vec()),
-        "unknown_as": row.unknown.map(unknown_word),
+        "unknown_as": row.unknown.map(UnknownSpace::word),
     })
 }
 
@@ -178,15 +178,19 @@ struct Certified<const D: usize> {
     of_points: bool,
 }
 
+/// What unknown space counts as.
+fn space(args: &Args) -> UnknownSpace {
+    UnknownArg::space(args.unknown)
+}
+
 /// What a field in bricks answers. Only the accurate method certifies.
 fn sparse<const D: usize>(field: Esdf<D>, limit: f64, args: &Args) -> (Distance<D>, Option<Certified<D>>) {
-    let unknown = args.unknown.map_or(UnknownSpace::default(), UnknownArg::space);
     let certifies = args.esdf.unwrap_or_default() == EsdfArg::Accurate;
     let reach = certified_reach(&field);
     // Bricks are shared.
     let certified = certifies.then(|| Certified {
         field: field.clone(),
-        unknown,
+        unknown: space(args),
         limit: limit.min(reach),
         of_points: false,
     });
@@ -221,7 +225,7 @@ fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
     FieldHow {
         method: args.esdf.unwrap_or_default(),
         // Only what is certified looks at unknown space.
-        unknown: args.unknown != Some(UnknownArg::Optimistic)
+        unknown: space(args) == UnknownSpace::Pessimistic
             && args.esdf.unwrap_or_default() == EsdfArg::Accurate,
         thin: args.thin.unwrap_or(saved.thin),
         max_distance: args.max_distance.unwrap_or(saved.max_distance),
@@ -230,7 +234,7 @@ fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
 
 fn of_map2(file: MapFile<2>, args: &Args) -> anyhow::Result<Field<2>> {
     let of_tsdf = file.tsdf.as_ref().map(|t| {
-        let field = esdf_2d(&file, t, &how(args, &file.header.settings))?;
+        let field = esdf_2d(&file, t, &how(args, &file.header.settings))?.esdf;
         let (distance, clearance) = sparse(field, f64::INFINITY, args);
         // A 2-D map is a box: what lies outside does not depend on where something was seen.
         let bounds = t.grid().aabb();
@@ -266,7 +270,7 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
         if how.method == EsdfArg::Accurate {
             how.max_distance += HELD_BACK * map.store.lattice().resolution;
         }
-        anyhow::Ok(sparse(esdf_3d(&file, map, &how)?, max_distance, args))
+        anyhow::Ok(sparse(esdf_3d(&file, map, &how)?.esdf, max_distance, args))
     });
     let of_points = file.occupancy_bricks.as_ref().filter(|_| is_of_points(&file.header.settings));
     let field = match (field, of_points) {

@@ -13,7 +13,7 @@ use portolan_io::{MapFile, TsdfBricks};
 
 use super::{MapKind, Octree, Settings};
 use crate::arguments::shown_bytes;
-use crate::esdf::{FieldHow, esdf_2d, esdf_3d, esdf_of_points};
+use crate::esdf::{Field, FieldHow, esdf_2d, esdf_3d, esdf_of_points};
 use crate::saved::SavedMap;
 
 /// Contours nearer to each other than this and facing the same way are one wall seen twice (meters).
@@ -30,6 +30,8 @@ pub(crate) struct Derived {
     pub(crate) mesh: Option<Mesh>,
     pub(crate) octree: Option<Octree>,
     pub(crate) esdf: Option<DistanceField>,
+    /// Of what the field is around: cells that log odds alone, counts alone, and both call occupied.
+    pub(crate) agreement: Option<[usize; 3]>,
     pub(crate) seconds: BTreeMap<&'static str, f64>,
     /// What was not made, and why.
     pub(crate) notes: Vec<String>,
@@ -68,7 +70,7 @@ impl Derived {
         }
         if settings.wants(MapKind::Esdf) {
             let made = derived.timed("esdf", |_| esdf_2d(file, tsdf, &FieldHow::of(settings)));
-            derived.hold_field(made.map(|field| DistanceField::two(tsdf, &field)));
+            derived.hold_field(made.map(|f| (DistanceField::two(tsdf, &f.esdf), f.agreement)));
         }
         derived
     }
@@ -95,7 +97,7 @@ impl Derived {
             let held = tsdf.store.memory_bytes()
                 + file.occupancy_bricks.as_ref().map_or(0, |o| o.store.memory_bytes());
             let made = derived.timed("esdf", |_| field_3d(file, tsdf, settings, memory.saturating_sub(held)));
-            derived.hold_field(made);
+            derived.hold_field(made.map(|f| (DistanceField::Three(f.esdf), f.agreement)));
         }
         derived
     }
@@ -109,13 +111,13 @@ impl Derived {
         let left = memory.saturating_sub(map.store.memory_bytes());
         // The cells, and as much again while the field is made.
         let made = self.timed("esdf", |_| esdf_of_points(map, &FieldHow::of(settings), left / 2));
-        self.hold_field(made.map(DistanceField::Three));
+        self.hold_field(made.map(|esdf| (DistanceField::Three(esdf), None)));
     }
 
     /// The field, or a note why there is none.
-    fn hold_field(&mut self, made: anyhow::Result<DistanceField>) {
+    fn hold_field(&mut self, made: anyhow::Result<(DistanceField, Option<[usize; 3]>)>) {
         match made {
-            Ok(field) => self.esdf = Some(field),
+            Ok((field, agreement)) => (self.esdf, self.agreement) = (Some(field), agreement),
             Err(why) => self.notes.push(format!("the esdf was not made: {why}")),
         }
     }
@@ -143,13 +145,13 @@ fn field_3d(
     tsdf: &TsdfBricks<3>,
     settings: &Settings,
     memory: usize,
-) -> anyhow::Result<DistanceField> {
+) -> anyhow::Result<Field<3>> {
     // The field, and as much again while it is made.
     let needed = 2 * tsdf.store.len() * 512 * size_of::<f32>();
     if needed > memory {
         bail!("it needs {} more than --memory leaves", shown_bytes(needed as f64));
     }
-    Ok(DistanceField::Three(esdf_3d(file, tsdf, &FieldHow::of(settings))?))
+    esdf_3d(file, tsdf, &FieldHow::of(settings))
 }
 
 /// The obstacles of a field that are no surface.

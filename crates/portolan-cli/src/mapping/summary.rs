@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use portolan::field::{PointKind, UnknownSpace};
-use portolan_io::unknown_word;
 use serde_json::{Value, json};
 
 use portolan::scan::{Way, WhyRays};
@@ -166,7 +165,11 @@ impl Summary<'_> {
         json!({
             "thin_cells": count(PointKind::Thin),
             "loose_cells": count(PointKind::Loose),
-            "unknown_as": unknown_word(UnknownSpace::default()),
+            // Null where a map was not asked: there is nothing to agree with.
+            "occupied_by": self.derived.agreement.map(|[log_odds, counts, both]| {
+                json!({ "log_odds_alone": log_odds, "counts_alone": counts, "both": both })
+            }),
+            "unknown_as": UnknownSpace::default().word(),
         })
     }
 
@@ -270,9 +273,19 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         let _ = match summary.settings.shape.points_only {
             true => writeln!(text, "distances to {points} cells that hold points"),
             false => {
-                writeln!(text, "distances to the surface and to {points} cells that stop beams without one")
+                writeln!(
+                    text,
+                    "distances to the surface and to {points} cells that stop beams without one; unknown space is {}",
+                    UnknownSpace::default().word()
+                )
             }
         };
+        if let Some([log_odds, counts, both]) = summary.derived.agreement {
+            let _ = writeln!(
+                text,
+                "occupied cells: {both} by log odds and counts of hits, {log_odds} by log odds alone, {counts} by counts alone"
+            );
+        }
     }
     if let Some(mesh) = &summary.derived.mesh {
         let _ = writeln!(text, "mesh of {} triangles, {:.2} m²", mesh.triangles.len(), mesh.area() + 0.0);

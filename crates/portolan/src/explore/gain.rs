@@ -1,13 +1,13 @@
 //! The information gain of a view: how many unknown cells a sensor would see from a pose.
 
 use super::cells::{Known, Reader};
+use super::follow::{End, follow};
 use crate::cell::SignedDistance;
 use crate::geom::vector::unit;
-use crate::geom::{Aabb, BlockKey, Pose, RayWalk};
+use crate::geom::{Aabb, BlockKey, Pose};
 use crate::map::DistanceMap;
 use crate::parallel;
 use crate::store::{Bricks, Store};
-use crate::sweep::clip;
 use rustc_hash::FxHashMap;
 
 /// Settings of [`expected_gain`].
@@ -57,14 +57,12 @@ pub struct ViewGain {
     pub refused: usize,
 }
 
-/// Longest ray (cells).
-const FARTHEST: f64 = 1e5;
-
 /// Casts rays (directions of any length in the sensor's frame) from a pose and counts the unknown cells that they cross
 /// *(after Bircher et al. 2016, who sum the volume in a frustum)*.
 ///
 /// A ray runs through free cells until it meets an occupied one. Unknown cells are counted, up to a total length of
-/// [`GainSettings::penetration`] in them. O(cells crossed).
+/// [`GainSettings::penetration`] in them. O(cells crossed). With a map of hits per meter at hand,
+/// [`expected_gain_through`](super::expected_gain_through) looks past what stops only a part of the beams.
 ///
 /// ```
 /// use portolan::cell::DistanceBrick;
@@ -123,13 +121,6 @@ pub fn expected_gains<const D: usize>(
     parallel::map(poses, 1, |pose| expected_gain(store, pose, directions_sensor, settings))
 }
 
-enum End {
-    Hit,
-    Unknown,
-    Outside,
-    Free,
-}
-
 /// All rays of one pose.
 struct View<'a, const D: usize> {
     origin: [f64; D],
@@ -141,46 +132,21 @@ struct View<'a, const D: usize> {
 
 impl<const D: usize> View<'_, D> {
     fn cast(&mut self, direction: [f64; D]) -> End {
-        let lattice = self.store.lattice();
-        // Where one of the two is NaN, `min` returns the other.
-        let range = self.settings.max_range.min(FARTHEST * lattice.resolution);
-        let part = match &self.settings.bounds {
-            Some(bounds) => clip(bounds, self.origin, direction, f64::INFINITY),
-            None => Some((0.0, f64::INFINITY)),
-        };
-        let (Some((enter, leave)), Some(mut walk)) = (part, RayWalk::new(lattice, self.origin, direction))
-        else {
-            return End::Outside;
-        };
-        let end = range.min(leave);
-        let (mut at, mut passed) = (0.0, 0.0);
-        loop {
-            let exit = walk.exit().min(end);
-            let inside = exit - f64::max(at, enter);
-            // A cell that a ray only touches, at a corner or beyond the bounds by rounding, is not counted.
-            let crossed = exit - at > 1e-9 * lattice.resolution;
-            let found = if crossed { self.reader.at(walk.cell()) } else { Known::Free };
+        let mut passed = 0.0;
+        follow(self.store.lattice(), self.origin, direction, self.settings, |cell, stretch| {
+            let found = self.reader.at(cell);
             if found == Known::Occupied {
-                return End::Hit;
+                return Err(End::Hit);
             }
-            if found == Known::Unknown && inside > 1e-9 * lattice.resolution {
+            if found == Known::Unknown && stretch.counts {
                 if passed >= self.settings.penetration {
-                    return End::Unknown;
+                    return Err(End::Unknown);
                 }
-                self.seen.insert(walk.cell());
-                passed += inside;
+                self.seen.insert(cell);
+                passed += stretch.inside;
             }
-            // False only for what is not a number.
-            if !(exit < end) {
-                return match found {
-                    _ if leave < range => End::Outside,
-                    Known::Unknown => End::Unknown,
-                    _ => End::Free,
-                };
-            }
-            at = exit;
-            walk.advance();
-        }
+            Ok(found)
+        })
     }
 }
 
@@ -222,7 +188,7 @@ impl<const D: usize> CellSet<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explore::testing::{Edit, edits, put};
+    use crate::explore::testing::{Edit, Stretch, cells_in_range, edits, put, stretches};
     use crate::explore::{fan, spherical};
     use crate::geom::Lattice;
     use proptest::prelude::*;
@@ -241,33 +207,13 @@ mod tests {
         directions: &[[f64; D]],
         settings: &GainSettings<D>,
     ) -> (BTreeSet<[i32; D]>, [usize; 4]) {
-        let (lattice, size) = (store.lattice(), store.lattice().resolution);
-        let from = lattice.cell_of(pose.translation).unwrap();
-        let reach = (settings.max_range / size).ceil() as i32 + 1;
-        let side = (2 * reach + 1) as usize;
-        let cells: Vec<[i32; D]> = (0..side.pow(D as u32))
-            .map(|i| std::array::from_fn(|a| from[a] + (i / side.pow(a as u32) % side) as i32 - reach))
-            .collect();
+        let lattice = store.lattice();
+        let cells = cells_in_range(lattice, pose, settings.max_range);
         let (mut seen, mut ends) = (BTreeSet::new(), [0; 4]);
         for d in directions {
-            let d = unit(pose.rotate(*d)).unwrap();
-            let (enter, leave) = match &settings.bounds {
-                Some(b) => clip(b, pose.translation, d, f64::INFINITY).unwrap(),
-                None => (0.0, f64::INFINITY),
-            };
-            let end = settings.max_range.min(leave);
-            let mut crossed: Vec<_> = cells
-                .iter()
-                .filter_map(|cell| {
-                    let min: [f64; D] = std::array::from_fn(|a| lattice.center(*cell)[a] - 0.5 * size);
-                    let of_cell = Aabb::new(min, min.map(|v| v + size));
-                    let (a, b) = clip(&of_cell, pose.translation, d, f64::INFINITY)?;
-                    (b.min(end) - a > 1e-9 * size).then_some((a, b.min(end), *cell))
-                })
-                .collect();
-            crossed.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let (crossed, leave) = stretches(lattice, &cells, pose, *d, settings);
             let (mut how, mut in_unknown) = (None, false);
-            for (a, b, cell) in crossed {
+            for Stretch { counts, cell, .. } in crossed {
                 match store.cell(cell).filter(|c| Some(c.weight) >= settings.min_weight) {
                     Some(c) if c.distance <= 0.0 => {
                         how = Some(0);
@@ -276,7 +222,7 @@ mod tests {
                     Some(_) => in_unknown = false,
                     None => {
                         in_unknown = true;
-                        if b - a.max(enter) > 1e-9 * size {
+                        if counts {
                             seen.insert(cell);
                         }
                     }

@@ -14,7 +14,8 @@ pub struct Clearance {
     pub inside: bool,
 }
 
-/// What space that was never observed means to the one who asks.
+/// What space that was never observed means to the one who asks. Its default is that of all that takes one: demands of paths,
+/// the command line and what it writes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UnknownSpace {
     /// An obstacle: clearance is the distance to the nearest surface or the nearest unknown cell, whichever is nearer, and
@@ -23,6 +24,16 @@ pub enum UnknownSpace {
     Pessimistic,
     /// No obstacle: only the surface counts, also where the point itself is in unknown space.
     Optimistic,
+}
+
+impl UnknownSpace {
+    /// What it counts as, in one word: `obstacle` or `free`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pessimistic => "obstacle",
+            Self::Optimistic => "free",
+        }
+    }
 }
 
 /// A field that certifies clearance: what path checks and planners need of a map.

@@ -21,7 +21,7 @@ pub struct Demand {
 impl Demand {
     /// This clearance (meters), unknown space an obstacle, a tolerance of 1 mm, at most a million queries.
     pub fn new(clearance: f64) -> Self {
-        Self { clearance, unknown: UnknownSpace::Pessimistic, tolerance: 1e-3, max_queries: 1_000_000 }
+        Self { clearance, unknown: UnknownSpace::default(), tolerance: 1e-3, max_queries: 1_000_000 }
     }
 
     /// The same demand, with unknown space as free ([`UnknownSpace::Optimistic`]).

@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use anyhow::bail;
-use portolan::field::{EsdfGrid, UnknownSpace};
+use portolan::field::EsdfGrid;
 use portolan::handover::{CuroboGrid, CuroboVersion, Filled, Gpmp2Field, KnotGrid, c_order, f16_from_f32};
 use portolan_io::{NpyArray, NpyValues, write_npy, write_npz};
 
 use super::field::Field;
 use crate::arguments::length;
 use crate::error::bad_call;
+use crate::unknown::UnknownCells;
 
 /// Layout of the arrays: whose they are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -37,25 +38,6 @@ pub(crate) enum Order {
     F,
 }
 
-/// What unknown space counts as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum UnknownArg {
-    /// Free
-    Optimistic,
-    /// An obstacle
-    Pessimistic,
-}
-
-impl UnknownArg {
-    /// As the library has it.
-    pub(crate) fn space(self) -> UnknownSpace {
-        match self {
-            Self::Optimistic => UnknownSpace::Optimistic,
-            Self::Pessimistic => UnknownSpace::Pessimistic,
-        }
-    }
-}
-
 /// Precision of distances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Precision {
@@ -74,10 +56,10 @@ pub(crate) struct ArrayArgs {
     /// Order in memory, for --layout plain [default: c]
     #[arg(long, value_enum)]
     order: Option<Order>,
-    /// What unknown cells count as, without a step of the distance at their border. Without this option plain arrays hold
-    /// NaN there; the other layouts cannot hold unknown cells
+    /// What unknown cells count as, without a step of the distance at their border. In layers of 3-D maps (--z) pessimistic
+    /// makes a column unknown that is so in part; optimistic looks only at its known part [default: pessimistic]
     #[arg(long, value_enum)]
-    pub(super) unknown: Option<UnknownArg>,
+    pub(super) unknown: Option<UnknownCells>,
     /// Largest distance to write (meters); larger ones are cut to it [default: the largest of the field]
     #[arg(long, value_name = "M", value_parser = length)]
     far: Option<f64>,
@@ -147,11 +129,11 @@ impl ArrayArgs {
 
     fn plain<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Vec<(&'static str, NpyArray)>> {
         let distances = match self.unknown {
-            None => {
+            Some(UnknownCells::Nan) => {
                 let far = self.far.map_or(f32::INFINITY, |far| far as f32);
                 field.samples().iter().map(|d| d.clamp(-far, far)).collect()
             }
-            Some(_) => self.filled(field)?.values,
+            _ => self.filled(field)?.values,
         };
         let shape = field.grid().shape;
         let as_doubles = |values: &[f32]| values.iter().map(|d| f64::from(*d)).collect::<Vec<_>>();
@@ -192,7 +174,7 @@ impl ArrayArgs {
         arrays
     }
 
-    /// Names of the layout and of what unknown cells became, as arrays.
+    /// Names of the layout and of what unknown cells count as, as arrays.
     fn labels(&self) -> [(&'static str, NpyArray); 2] {
         let layout = match self.layout {
             Layout::Plain => "plain",
@@ -201,26 +183,14 @@ impl ArrayArgs {
             Layout::Curobo => "curobo",
             Layout::Curobo07 => "curobo07",
         };
-        let unknown = match self.unknown {
-            None => "nan",
-            Some(UnknownArg::Optimistic) => "optimistic",
-            Some(UnknownArg::Pessimistic) => "pessimistic",
-        };
-        [("layout", NpyArray::text(layout)), ("unknown", NpyArray::text(unknown))]
+        let unknown = UnknownCells::word(self.unknown);
+        [("layout", NpyArray::text(layout)), ("unknown_as", NpyArray::text(unknown))]
     }
 
-    /// The field without unknown. What unknown is has to be said where there is any.
+    /// The field without unknown.
     fn filled<const D: usize>(&self, field: &EsdfGrid<D>) -> anyhow::Result<Filled<D>> {
-        let unknown = field.samples().iter().filter(|d| d.is_nan()).count();
-        let space = match self.unknown {
-            Some(unknown) => unknown.space(),
-            None if unknown == 0 => UnknownSpace::Pessimistic,
-            None => {
-                return Err(bad_call(format!(
-                    "{unknown} cells are unknown, which this layout cannot hold; give --unknown optimistic (free) or \
-                     --unknown pessimistic (an obstacle)"
-                )));
-            }
+        let Some(space) = UnknownCells::space(self.unknown) else {
+            return Err(bad_call("--unknown nan is only for --layout plain: planners take no NaN"));
         };
         let largest = field.samples().iter().filter(|d| d.is_finite()).fold(0.0f32, |m, d| m.max(d.abs()));
         let far = self.far.unwrap_or(f64::from(largest).max(field.grid().lattice.resolution));

@@ -10,6 +10,7 @@ use super::field::Field;
 use crate::arguments::{heights, length_or_zero};
 use crate::error::bad_call;
 use crate::esdf::{esdf_of_surface, tsdf_of_samples};
+use crate::unknown::UnknownCells;
 
 /// How costs become pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -44,16 +45,22 @@ pub(crate) struct CostArgs {
 }
 
 impl CostArgs {
+    /// Whether a layer of a 3-D field is wanted.
+    pub(super) fn is_layer(&self) -> bool {
+        self.z.is_some()
+    }
+
     /// Whether a costmap is wanted.
     pub(super) fn asked(&self) -> bool {
         self.inflate.is_some() || self.mode.is_some() || self.z.is_some()
     }
 
-    /// Writes the costs of a 2-D field, or of a layer of a 3-D field.
+    /// Writes the costs of a 2-D field, or of a layer of a 3-D field, with a note in the yaml file.
     pub(super) fn write(
         &self,
         field: &Field,
-        unknown: Option<UnknownSpace>,
+        unknown: Option<UnknownCells>,
+        note: &str,
         yaml: &Path,
     ) -> anyhow::Result<()> {
         let how = Inflation {
@@ -67,13 +74,15 @@ impl CostArgs {
             (Field::Three(_), None) => {
                 return Err(bad_call("a costmap is 2-D: give the heights that count with --z LOW:HIGH"));
             }
+            (Field::Two(_), None) if unknown.is_some() => {
+                return Err(bad_call(
+                    "--unknown is for arrays and layers (--z): in a 2-D costmap unknown cells stay unknown",
+                ));
+            }
             (Field::Two(field), None) => (*field.grid(), how.costs(field.samples())),
             (Field::Three(field), Some(heights)) => {
-                let Some(unknown) = unknown else {
-                    return Err(bad_call(
-                        "some columns are partly unknown: give --unknown optimistic (only their known part counts) or \
-                         --unknown pessimistic (such a column is unknown)",
-                    ));
+                let Some(unknown) = UnknownCells::space(unknown) else {
+                    return Err(bad_call("--unknown nan is only for plain arrays (.npz, .npy)"));
                 };
                 let layer = in_2d(field, heights, unknown)?;
                 (*layer.grid(), how.costs(layer.samples()))
@@ -86,7 +95,7 @@ impl CostArgs {
             None if self.inflate.is_some() => MapMode::Raw,
             None => MapMode::Trinary,
         };
-        Ok(write_costmap(yaml, &grid, &costs, mode)?)
+        Ok(write_costmap(yaml, &grid, &costs, mode, note)?)
     }
 }
 

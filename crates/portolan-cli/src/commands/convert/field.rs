@@ -1,15 +1,16 @@
 //! The distance field of anything that has one, as arrays.
 
 use anyhow::bail;
-use portolan::field::EsdfGrid;
+use portolan::field::{EsdfGrid, UnknownSpace};
 use portolan::geom::{Aabb, Grid};
 use portolan_io::EsdfFile;
 use serde_json::{Map, Value};
 
-use super::{Args, UnknownArg};
+use super::{Args, Target};
 use crate::esdf::{FieldHow, check_thin, esdf_2d, esdf_3d, esdf_of_cells, esdf_of_points, is_of_points};
 use crate::mapping::{Settings, cells_for_map_server, dense_esdf};
 use crate::source::Source;
+use crate::unknown::UnknownCells;
 
 /// A field of either dimension.
 pub(super) enum Field {
@@ -19,11 +20,11 @@ pub(super) enum Field {
 
 impl Field {
     /// The field of a source, or the box of it that is wanted; `None`: the source has no distances.
-    pub(super) fn of(source: &Source, args: &Args) -> anyhow::Result<Option<Self>> {
+    pub(super) fn of(source: &Source, target: Target, args: &Args) -> anyhow::Result<Option<Self>> {
         Ok(Some(match source {
             Source::Map2(file) => match &file.tsdf {
                 Some(tsdf) => {
-                    let field = esdf_2d(file, tsdf, &how(args, &file.header.settings)?)?;
+                    let field = esdf_2d(file, tsdf, &how(args, &file.header.settings)?)?.esdf;
                     Self::Two(in_2d(field.dense(tsdf.grid()), args)?)
                 }
                 None => {
@@ -53,12 +54,14 @@ impl Field {
             Source::Map3(file) => {
                 let how = how(args, &file.header.settings)?;
                 let field = match (&file.tsdf_bricks, &file.occupancy_bricks) {
-                    (Some(map), _) => esdf_3d(file, map, &how)?,
+                    (Some(map), _) => esdf_3d(file, map, &how)?.esdf,
                     (None, Some(map)) if is_of_points(&file.header.settings) => {
-                        if args.arrays.unknown == Some(UnknownArg::Pessimistic) {
+                        // Files that hold distances alone say nothing of free space.
+                        let filled = UnknownCells::space(args.arrays.unknown);
+                        if target != Target::Esdf && filled == Some(UnknownSpace::Pessimistic) {
                             bail!(
-                                "{}: the map is of points without rays, and nothing is known to be free: with --unknown \
-                                 pessimistic all of it is an obstacle; give --unknown optimistic",
+                                "{}: the map is of points without rays, and nothing is known to be free: with unknown \
+                                 space as an obstacle (the default) all of it is one; give --unknown optimistic",
                                 args.input.display()
                             );
                         }
