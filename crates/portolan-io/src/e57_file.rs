@@ -7,7 +7,7 @@
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
-use e57::{CartesianCoordinate, E57Reader, PointCloud};
+use e57::{CartesianCoordinate, E57Reader, PointCloud, RecordName};
 
 use crate::bytes::{Compression, Input, open_file, u64_at};
 use crate::points::{CloudBuilder, CloudGrid, PosedCloud, most_bytes};
@@ -41,6 +41,13 @@ pub struct E57About {
     pub scans: usize,
     /// Pictures, which are not read.
     pub images: usize,
+    /// Scans that say when they were taken, or when each point was. Times are not used: a scan is of one place, whatever is between
+    /// two of them is no motion of the scanner, and their clock is that of GPS, which poses are not in.
+    pub with_times: usize,
+    /// Scans with colors.
+    pub with_colors: usize,
+    /// Scans with colors that call those of some points invalid: these points are black.
+    pub with_invalid_colors: usize,
 }
 
 impl E57File {
@@ -86,7 +93,16 @@ impl E57File {
     }
 
     pub(crate) fn about(&self) -> E57About {
-        E57About { scans: self.scans.len(), images: self.reader.images().len() }
+        let count = |is: &dyn Fn(&PointCloud) -> bool| self.scans.iter().filter(|scan| is(scan)).count();
+        let has_invalid =
+            |scan: &PointCloud| scan.prototype.iter().any(|r| r.name == RecordName::IsColorInvalid);
+        E57About {
+            scans: self.scans.len(),
+            images: self.reader.images().len(),
+            with_times: count(&|scan| scan.has_timestamp() || scan.acquisition_start.is_some()),
+            with_colors: count(&PointCloud::has_color),
+            with_invalid_colors: count(&|scan| scan.has_color() && has_invalid(scan)),
+        }
     }
 
     /// Number of scans.
@@ -235,9 +251,7 @@ pub fn e57_about(path: impl AsRef<Path>) -> Result<E57About> {
 mod tests {
     use super::*;
     use crate::testing::{bad_bytes, real_data, says};
-    use e57::{
-        E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform, Translation,
-    };
+    use e57::{DateTime, E57Writer, Quaternion, Record, RecordDataType, RecordValue, Transform, Translation};
 
     const DOUBLE: RecordDataType = RecordDataType::Double { min: None, max: None };
 
@@ -303,6 +317,57 @@ mod tests {
         let p = moved.position(1);
         let want = [500_000.0 - 2.0 * 0.1f64.sin(), 20.0 + 2.0 * 0.1f64.cos(), 3.0];
         assert!((0..3).all(|k| (p[k] - want[k]).abs() < 1e-6), "{p:?}");
+    }
+
+    #[test]
+    fn colors_are_read_and_what_is_not_used_is_counted() {
+        let mut file = Cursor::new(Vec::new());
+        let mut writer = E57Writer::new(&mut file, "file").unwrap();
+        let whole = |max| RecordDataType::Integer { min: 0, max };
+        for times in [false, true] {
+            let xyz = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+            let rgb = [RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue];
+            let mut prototype: Vec<_> = xyz.map(|name| Record { name, data_type: DOUBLE }).into();
+            prototype.extend(rgb.map(|name| Record { name, data_type: whole(255) }));
+            if times {
+                prototype.push(Record { name: RecordName::IsColorInvalid, data_type: whole(1) });
+                prototype.push(Record { name: RecordName::TimeStamp, data_type: DOUBLE });
+            }
+            let mut scan = writer.add_pointcloud("scan", prototype).unwrap();
+            // Eight: the library cannot read a packet in which a column of single bits ends no byte.
+            for i in 0..8i64 {
+                let mut values = [1.0 + i as f64, 2.0, 3.0].map(RecordValue::Double).to_vec();
+                values.extend([255 - i, 7, 9].map(RecordValue::Integer));
+                if times {
+                    let invalid = i64::from(i == 2);
+                    values.extend([RecordValue::Integer(invalid), RecordValue::Double(i as f64)]);
+                }
+                scan.add_point(values).unwrap();
+            }
+            if times {
+                scan.set_acquisition_start(Some(DateTime { gps_time: 1e9, atomic_reference: false }));
+            }
+            scan.finalize().unwrap();
+        }
+        writer.finalize().unwrap();
+        drop(writer);
+        let (_folder, path) = crate::testing::temporary("a.e57");
+        std::fs::write(&path, file.into_inner()).unwrap();
+        let about = e57_about(&path).unwrap();
+        assert_eq!(
+            (about.scans, about.with_times, about.with_colors, about.with_invalid_colors),
+            (2, 1, 2, 1)
+        );
+        let log = crate::scan_log::ScanLog::open(&path, &Default::default()).unwrap();
+        let colors = |i: usize| match log.frame(i).unwrap() {
+            portolan::scan::Frame::Points(scan) => scan.colors,
+            portolan::scan::Frame::Image(_) => panic!("points"),
+        };
+        assert_eq!(colors(0)[..3], [[255, 7, 9], [254, 7, 9], [253, 7, 9]]);
+        assert_eq!(colors(1)[..4], [[255, 7, 9], [254, 7, 9], [0; 3], [252, 7, 9]]);
+        let warnings = log.stats().warnings.join("\n");
+        assert!(warnings.contains("1 of 2 scans in") && warnings.contains("have times, which are not used"));
+        assert!(warnings.contains("1 of 2 scans with colors in"), "{warnings}");
     }
 
     #[test]

@@ -71,10 +71,7 @@ pub(super) fn open(
             places.push(Place { file: file.clone(), number, base, origin });
         }
         if format == PointFormat::E57 {
-            let pictures = crate::e57_about(file)?.images;
-            if pictures > 0 {
-                notes.push(format!("{pictures} pictures in {} are not read", file.display()));
-            }
+            notes.extend(told(file, &crate::e57_about(file)?));
         }
     }
     let mut posed_from_sensor = None;
@@ -87,6 +84,29 @@ pub(super) fn open(
     notes.dedup();
     let parts = Parts::new(path, ScannerFrames { places, format }, scans, LayoutPoses::PerScan(poses));
     Ok(Parts { posed_from_sensor, stats: super::ScanLogStats { warnings: notes, ..parts.stats }, ..parts })
+}
+
+/// What of a file is not used.
+fn told(file: &Path, about: &crate::E57About) -> Vec<String> {
+    let (shown, scans) = (file.display(), about.scans);
+    let mut notes = Vec::new();
+    if about.images > 0 {
+        notes.push(format!("{} pictures in {shown} are not read", about.images));
+    }
+    if about.with_times > 0 {
+        notes.push(format!(
+            "{} of {scans} scans in {shown} have times, which are not used: each scan is of one place",
+            about.with_times
+        ));
+    }
+    if about.with_invalid_colors > 0 {
+        let (some, all) = (about.with_invalid_colors, about.with_colors);
+        notes.push(format!(
+            "{some} of {all} scans with colors in {shown} have points without one, which count as black (--no-color leaves \
+             colors out)"
+        ));
+    }
+    notes
 }
 
 fn unmoved() -> RawPose {
