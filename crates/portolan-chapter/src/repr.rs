@@ -1,8 +1,10 @@
 //! The text's thesis as an interface: a map is what it can answer cheaply.
 
-use portolan::cell::{LogOdds8, SignedDistance};
+use portolan::cell::{HitLength, LogOdds8, SignedDistance};
+use portolan::field::LEAST_HITS;
 use portolan::geom::Pose;
-use portolan::map::{Cloud, MapError, Occupancy, Tsdf};
+use portolan::map::{Attenuation, Cloud, MapError, Occupancy, Tsdf};
+use portolan::mapper::THIN;
 use portolan::scan::{Scan, ScanStats};
 use portolan::store::Store;
 
@@ -70,6 +72,31 @@ impl<const D: usize, S: Store<SignedDistance, D>> MapRepr<D> for Tsdf<D, S> {
     /// The sign of the estimate: 1 behind the surface, 0 in front of it.
     fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
         self.occupancy(p_world)
+    }
+
+    fn distance(&self, _: [f64; D]) -> Option<f64> {
+        None
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.memory_bytes()
+    }
+
+    fn abilities(&self) -> Abilities {
+        Abilities { occupancy: true, distance: false }
+    }
+}
+
+impl<const D: usize, S: Store<HitLength, D>> MapRepr<D> for Attenuation<D, S> {
+    fn integrate_scan(&mut self, world_from_sensor: &Pose<D>, scan: &Scan<D>) -> Result<ScanStats, MapError> {
+        self.integrate(world_from_sensor, scan)
+    }
+
+    /// 1 where a cell stops beams as an obstacle of the distance field does, 0 where it does not.
+    fn occupancy(&self, p_world: [f64; D]) -> Option<f64> {
+        let cell = self.store().lattice().cell_of(p_world)?;
+        let stops = self.stops_beams(cell, THIN, LEAST_HITS);
+        self.store().cell(cell).map(|_| if stops { 1.0 } else { 0.0 })
     }
 
     fn distance(&self, _: [f64; D]) -> Option<f64> {

@@ -18,6 +18,7 @@ pub(super) fn hold_against_truth(gallery: &mut Gallery, asker: &Asker<'_>) {
         asker.occupancy_wrong(&gallery.chapter_tree),
         asker.occupancy_wrong(&gallery.tsdf),
         asker.occupancy_wrong(&gallery.marched),
+        asker.occupancy_wrong(&gallery.hits),
         asker.wrong(|p| sign_of(distance, p)),
         asker.wrong(inside),
         None,
@@ -26,13 +27,14 @@ pub(super) fn hold_against_truth(gallery: &mut Gallery, asker: &Asker<'_>) {
     let read = asker.distance_error(|p| distance.distance(p).known());
     let nearest = asker.distance_error(|p| contour.nearest_distance(p));
     let cloud = asker.distance_error(|p| gallery.cloud.nearest_distance(p));
-    let distances = [rings, None, None, None, None, read, nearest, cloud];
+    let distances = [rings, None, None, None, None, None, read, nearest, cloud];
     let surfaces = [
         asker.surface_error(&contour_of_grid(occupancy)),
         asker.surface_error(&contour_of_tree(&gallery.tree)),
         asker.surface_error(&contour_of_tree(&gallery.chapter_tree)),
         asker.surface_error(contour),
         asker.surface_error(&marching_squares(&gallery.marched, &gallery.contour_settings)),
+        None,
         asker.surface_error(&zero_of(distance)),
         asker.surface_error(contour),
         None,

@@ -2,13 +2,13 @@
 
 use super::crossover::{CHAPTER_NODE, CloudCrossover, OUR_NODE, Plane, TreeCrossover};
 use super::fields::{MeasuredField, fields_of};
-use super::measured::{Gallery, GallerySettings};
+use super::measured::{Gallery, GallerySettings, HitGrid};
 use super::probes::{Clock, seconds_of};
 use super::row::{Cost, Row};
 use crate::memory::inner_only_node_bytes;
-use portolan::cell::OccupancyModel;
+use portolan::cell::{AttenuationRule, OccupancyModel};
 use portolan::geom::{Grid, Lattice, Pose};
-use portolan::map::{BeamSweep, Cloud, MapError, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
+use portolan::map::{Attenuation, BeamSweep, Cloud, MapError, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
 use portolan::scan::{Scan, ScanStats};
 use portolan::store::Store;
 use portolan::surface::{Contour, marching_squares};
@@ -48,6 +48,7 @@ struct Maps {
     /// Without carving.
     banded: Fused<Tsdf2>,
     marched: Fused<Tsdf2>,
+    hits: Fused<HitGrid>,
     cloud: Fused<Cloud<2>>,
     /// Seconds that the cloud's tree took.
     cloud_build: f64,
@@ -73,9 +74,11 @@ impl Maps {
         let tsdf = Fused::new(clock, log, Tsdf2::covering(&grid, carving)?, in_tsdf)?;
         let banded = Fused::new(clock, log, Tsdf2::covering(&grid, banded)?, in_tsdf)?;
         let marched = Fused::new(clock, log, Tsdf2::covering(&grid, march)?, in_tsdf)?;
+        let hits = Attenuation::covering(&grid, AttenuationRule::NEVER)?;
+        let hits = Fused::new(clock, log, hits, |map, at, scan| map.integrate(at, scan))?;
         let mut cloud = Fused::new(clock, log, Cloud::new(), |map, at, scan| Ok(map.integrate(at, scan)))?;
         let (cloud_build, ()) = seconds_of(clock, || cloud.map.rebuild());
-        Ok(Self { occupancy, tree, chapter_tree, tsdf, banded, marched, cloud, cloud_build })
+        Ok(Self { occupancy, tree, chapter_tree, tsdf, banded, marched, hits, cloud, cloud_build })
     }
 
     /// The rows of the maps themselves; what a workload costs comes in the same order: `costs.rs`.
@@ -92,6 +95,7 @@ impl Maps {
             segments(&self.banded.map)
         );
         let marched = format!("{} segments", segments(&self.marched.map));
+        let passed = format!("{} cells that beams ended in or passed", self.hits.map.observed_cells());
         let points = self.cloud.map.points().len();
         let built = format!("{points} points, tree built in {} ms", format_ms(self.cloud_build));
         vec![
@@ -100,6 +104,7 @@ impl Maps {
             tree("quadtree, 6.25 cm leaves, 16 m root", &self.chapter_tree),
             self.tsdf.row("TSDF, f32 D and W", Tsdf2::memory_bytes, banded),
             self.marched.row("TSDF, the chapter's march", Tsdf2::memory_bytes, marched),
+            self.hits.row("hits per meter, counts and lengths", HitGrid::memory_bytes, passed),
             self.cloud.row("point cloud, k-d tree", Cloud::memory_bytes, built),
         ]
     }
@@ -130,6 +135,7 @@ pub(super) fn build(
         tree: maps.tree.map,
         tsdf: maps.tsdf.map,
         contour,
+        hits: maps.hits.map,
         cloud: maps.cloud.map,
         chapter_tree: maps.chapter_tree.map,
         marched: maps.marched.map,
@@ -161,7 +167,7 @@ fn row(name: &str, memory_bytes: usize, update: Option<Cost>, note: String) -> R
 }
 
 /// The chapter's tree: leaves a 256th of a root of 16 m, or of as many doublings of it as the map needs.
-fn chapter_tree(grid: &Grid<2>, model: OccupancyModel) -> Result<Quadtree, MapError> {
+pub(super) fn chapter_tree(grid: &Grid<2>, model: OccupancyModel) -> Result<Quadtree, MapError> {
     let extent = grid.aabb().extent().into_iter().fold(0.0, f64::max);
     let doublings = (extent / 16.0).log2().ceil().max(0.0) as u32;
     Quadtree::with_depth(Lattice::new(grid.lattice.origin, 0.0625), 8 + doublings, model)

@@ -15,7 +15,7 @@ use portolan::surface::{Ambiguity, Contour, level_set, marching_squares};
 pub(super) const FEWER: usize = 50;
 
 /// What a workload costs each row, in their order.
-type Costs = [Option<Cost>; 8];
+type Costs = [Option<Cost>; 9];
 
 impl Gallery {
     /// Asks every representation one of the questions anew, with `probes` points (searches get a fiftieth); updates who
@@ -49,8 +49,9 @@ impl Gallery {
         let esdf = seconds_per_probe(clock, everywhere, |p| sign_of(distance, p).unwrap_or(0.0));
         let inside = |p| f64::from(u8::from(self.contour.is_inside(p) == Some(true)));
         let contour = seconds_per_probe(clock, few, inside);
+        let hits = Cost::by(time_occupancy(clock, everywhere, &self.hits), "share that ends");
         let derived = [Cost::by(esdf, "sign of d"), Cost::by(contour, "crossing count")];
-        [grid, trees[0], trees[1], signs[0], signs[1], derived[0], derived[1], None]
+        [grid, trees[0], trees[1], signs[0], signs[1], hits, derived[0], derived[1], None]
     }
 
     fn distance_costs(&self, clock: &mut Clock<'_>, everywhere: &[[f64; 2]], few: &[[f64; 2]]) -> Costs {
@@ -64,7 +65,7 @@ impl Gallery {
         let contour = Cost::by(seconds_per_probe(clock, few, nearest), "brute force");
         let nearest = |p| self.cloud.nearest_distance(p).unwrap_or(0.0);
         let cloud = Cost::direct(seconds_per_probe(clock, few, nearest));
-        [grid, None, None, None, None, esdf, contour, cloud]
+        [grid, None, None, None, None, None, esdf, contour, cloud]
     }
 
     fn surface_costs(&self, clock: &mut Clock<'_>) -> Costs {
@@ -77,6 +78,7 @@ impl Gallery {
             squares(&|| contour_of_tree(&self.chapter_tree)),
             squares(&|| of_tsdf(&self.tsdf)),
             squares(&|| of_tsdf(&self.marched)),
+            None,
             squares(&|| zero_of(self.distance())),
             Cost::direct(0.0),
             None,

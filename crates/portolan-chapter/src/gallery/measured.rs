@@ -4,11 +4,15 @@ use super::crossover::{CloudCrossover, TreeCrossover};
 use super::fields::MeasuredField;
 use super::row::{Row, Winner};
 use super::turned::{Accuracy, Turned};
-use portolan::cell::OccupancyModel;
+use portolan::cell::{HitLength, OccupancyModel};
 use portolan::field::{EsdfGrid, EsdfSettings};
 use portolan::geom::Grid;
-use portolan::map::{Cloud, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
+use portolan::map::{Attenuation, Cloud, OccupancyGrid, Quadtree, Tsdf2, TsdfConfig};
+use portolan::store::Dense;
 use portolan::surface::{Contour, ContourSettings};
+
+/// Hits per meter in an array.
+pub type HitGrid = Attenuation<2, Dense<HitLength, 2>>;
 
 /// What to build and how hard to ask.
 #[derive(Clone, Debug)]
@@ -70,6 +74,8 @@ pub struct Gallery {
     pub tsdf: Tsdf2,
     /// The contour, for pictures.
     pub contour: Contour,
+    /// Hits per meter, for pictures.
+    pub hits: HitGrid,
     /// The cloud, for pictures.
     pub cloud: Cloud<2>,
     /// The tree with the textbook's leaves.

@@ -1,5 +1,6 @@
 //! What is measured of one representation.
 
+use super::Foretold;
 use portolan_sim::ErrorSummary;
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +47,8 @@ pub struct Row {
     pub distance_error: Option<ErrorSummary>,
     /// Distance of the extracted surface from the true one (meters).
     pub surface_error: Option<ErrorSummary>,
+    /// How well ranges of scans that were held out are foretold; `None` also where there were too few scans to hold any out.
+    pub foretold: Option<Foretold>,
     /// A number worth telling: nodes, segments, points.
     pub note: String,
 }

@@ -3,6 +3,7 @@
 use super::against_truth::hold_against_truth;
 use super::asker::{Asker, candidates, observed_free};
 use super::build::build;
+use super::foretold::foretold;
 use super::measured::{Gallery, GallerySettings};
 use super::probes::{Clock, points};
 use super::row::Workload;
@@ -23,6 +24,10 @@ pub fn run(
 ) -> Result<Gallery, MapError> {
     let grid = settings.grid;
     let mut gallery = build(log, settings, clock)?;
+    if let Some(foretold) = foretold(log, settings)? {
+        // The first rows are those of the maps that foretell.
+        gallery.rows.iter_mut().zip(foretold).for_each(|(row, told)| row.foretold = Some(told));
+    }
     let everywhere = points(&grid.aabb(), settings.probes);
     let min_weight = settings.esdf.min_weight.unwrap_or(gallery.tsdf.min_weight());
     let free = observed_free(&gallery.tsdf, candidates(&grid), min_weight, truth);

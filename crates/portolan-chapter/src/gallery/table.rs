@@ -75,6 +75,8 @@ fn rows(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
         "error mm",
         "surface",
         "error mm",
+        "foretold",
+        "nats",
     ];
     let mut lines = vec![header.map(String::from)];
     let beside = Beside::of(gallery);
@@ -89,6 +91,8 @@ fn rows(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
             beside.told(|a| millimetres(a.rows[i].distance_error)),
             time(row.surface),
             beside.told(|a| millimetres(a.rows[i].surface_error)),
+            row.foretold.map_or("-".into(), |f| format!("{:.1} %", 100.0 * f.within_10_cm)),
+            row.foretold.map_or("-".into(), |f| format!("{:.2}", f.log_density)),
         ]
     }));
     aligned(f, &lines)?;
@@ -97,6 +101,14 @@ fn rows(gallery: &Gallery, f: &mut Formatter<'_>) -> fmt::Result {
         "\n\"+\": on top of the TSDF it is derived from; its update is a full rebuild. \"-\": cannot answer."
     )?;
     writeln!(f, "Errors are medians against the true world; distances at observed free points.")?;
+    if let Some(told) = gallery.rows.iter().find_map(|row| row.foretold) {
+        writeln!(
+            f,
+            "Foretold: of {} ranges of every tenth scan, by maps without these, the share within 10 cm, and the mean log density \
+             (nats a beam).",
+            told.rays
+        )?;
+    }
     match &gallery.turned {
         Some(turned) => writeln!(f, "{}\n", worlds(turned)),
         None => writeln!(f),

@@ -29,6 +29,8 @@ pub enum Layer {
     EsdfError,
     /// The extracted contour.
     Contour,
+    /// The share of beams through each cell that end in it, by hits per meter.
+    Hits,
     /// The end points of all beams.
     Cloud,
     /// A few cells of the truncated field, with contour, truth and end points.
@@ -56,6 +58,7 @@ impl Layer {
             Self::Esdf => esdf(canvas, view, scene),
             Self::EsdfError => esdf_error(canvas, view, scene),
             Self::Contour => contour(canvas, view, scene),
+            Self::Hits => hits(canvas, view, scene),
             Self::Cloud => cloud(canvas, view, scene),
             Self::CloseUp => close_up(canvas, view, scene),
         }
@@ -100,6 +103,12 @@ fn grid(canvas: &mut Canvas, view: &View, scene: &Scene) {
     let map = &scene.gallery.occupancy;
     let cells = *map.store().grid();
     cell_raster(canvas, view, &cells, |i| Some(color::occupancy(map.store().at(i)?.probability(map.rule()))));
+}
+
+fn hits(canvas: &mut Canvas, view: &View, scene: &Scene) {
+    let map = &scene.gallery.hits;
+    let cells = *map.store().grid();
+    cell_raster(canvas, view, &cells, |i| Some(color::occupancy(map.store().at(i)?.opacity::<2>())));
 }
 
 fn tree(canvas: &mut Canvas, view: &View, scene: &Scene) {

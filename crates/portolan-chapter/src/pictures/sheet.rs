@@ -19,10 +19,11 @@ pub fn sheet(scene: &Scene, title: &str, subtitle: &str) -> Vec<u8> {
         Layer::Weight,
         Layer::Esdf,
         Layer::Contour,
+        Layer::Hits,
         Layer::Cloud,
         Layer::CloseUp,
     ];
-    let mut panels = Panels::new(title).subtitle(subtitle).columns(3).large().legend(legend(scene));
+    let mut panels = Panels::new(title).subtitle(subtitle).columns(5).large().legend(legend(scene));
     for layer in layers {
         panels = panels.panel(heading(layer, scene), lines(layer, scene));
     }
@@ -75,6 +76,7 @@ fn heading(layer: Layer, scene: &Scene) -> &'static str {
         Layer::Esdf => "ESDF, a ring every 25 cm",
         Layer::EsdfError => "error of the ESDF",
         Layer::Contour => "extracted contour",
+        Layer::Hits => "hits per meter: share of beams that end",
         Layer::Cloud => "point cloud",
         Layer::CloseUp if scene.world.is_some() => "the chair, enlarged: TSDF cells",
         Layer::CloseUp => "enlarged: TSDF cells",
@@ -104,6 +106,15 @@ fn lines(layer: Layer, scene: &Scene) -> [String; 2] {
             format!("{}{}{error}", asked("probe", row.distance), if error.is_empty() { "" } else { ", " })
         }),
         Layer::Contour => of("extracted contour", |row| row.note.clone()),
+        Layer::Hits => of("hits per meter", |row| {
+            row.foretold.map_or(String::new(), |f| {
+                format!(
+                    "{:.1} % of ranges foretold within 10 cm, {:.2} nats",
+                    100.0 * f.within_10_cm,
+                    f.log_density
+                )
+            })
+        }),
         Layer::Cloud => of("point cloud", |row| asked("distance probe", row.distance)),
         Layer::CloseUp => {
             let r = scene.gallery.tsdf.config().resolution;

@@ -42,9 +42,15 @@ fn worlds(gallery: &Gallery) -> String {
 pub(super) fn section(facts: &Facts) -> Option<Section> {
     facts.scene.world?;
     let gallery = facts.scene.gallery;
-    let body =
-        [worlds(gallery), distances(gallery), fields(gallery), surfaces(gallery), gradients(&facts.scene)]
-            .concat();
+    let body = [
+        worlds(gallery),
+        distances(gallery),
+        fields(gallery),
+        surfaces(gallery),
+        foretold(gallery),
+        gradients(&facts.scene),
+    ]
+    .concat();
     Some(Section {
         title: "How true the answers are",
         body,
@@ -119,6 +125,32 @@ fn surfaces(gallery: &Gallery) -> String {
          <p>Thin walls come out too thick. Each side's claim reaches the truncation deep and meets the other side's there, \
          where it is thinner than τ; walls between τ and 2 τ keep their faces. A smaller truncation is the remedy, as far as \
          the noise of the range allows.</p>",
+        table(&header, &rows, &[])
+    )
+}
+
+/// What maps say of ranges that they were not told; nothing where no scans were held out.
+fn foretold(gallery: &Gallery) -> String {
+    let header = ["representation", "within 10 cm", "median error, mm", "nats a beam"];
+    let told: Vec<_> = gallery.rows.iter().filter_map(|row| Some((row, row.foretold?))).collect();
+    let Some((_, first)) = told.first() else { return String::new() };
+    let rows: Vec<_> = told
+        .iter()
+        .map(|(row, f)| {
+            vec![
+                escaped(&row.name),
+                format!("{:.1} %", 100.0 * f.within_10_cm),
+                format!("{:.1}", 1e3 * f.median_error),
+                format!("{:.2}", f.log_density),
+            ]
+        })
+        .collect();
+    format!(
+        "<p>A map is also a claim about what the sensor will read next. Every tenth scan, {} hits, was kept out of a second set \
+         of maps, which foretell its ranges: hits per meter by their distribution along each beam, the others by the surface or \
+         the first occupied cell that the beam meets, taken as the middle of a normal distribution of half a cell. All share \
+         5 % of outliers.</p>{}",
+        first.rays,
         table(&header, &rows, &[])
     )
 }

@@ -11,7 +11,7 @@ const LEGEND: &str = "<p class=legend>\
     #7c858e 0 4px,#fff 4px 7px)\"></i>truth</span></p>";
 
 pub(super) fn section(facts: &Facts) -> Section {
-    const SHOWN: [(Layer, &str, &str); 9] = [
+    const SHOWN: [(Layer, &str, &str); 10] = [
         (
             Layer::Log,
             "The world and the lap.",
@@ -46,6 +46,11 @@ pub(super) fn section(facts: &Facts) -> Section {
             Layer::Contour,
             "Extracted contour.",
             "Where the sign changes. It ends where nothing was observed instead of inventing geometry.",
+        ),
+        (
+            Layer::Hits,
+            "Hits per meter.",
+            "The share of beams through each cell that end in it: white lets all pass. Thin things stay as the part that they stop.",
         ),
         (Layer::Cloud, "Point cloud.", "The log itself: every end point, free space nowhere."),
         (

@@ -67,7 +67,7 @@ pub(crate) struct Args {
 }
 
 /// A gallery holds about so many times what the maps of one run hold.
-const COPIES: u64 = 3;
+const COPIES: u64 = 4;
 
 /// Builds and measures all of them.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
@@ -94,11 +94,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             grid_over(seen(&scans), &settings, None, &name).map_err(|error| with_outlier(error, &scans))?;
         (None, scans, grid, name)
     };
-    // Three truncated fields and two trees are built, to compare ways of fusing.
+    // Three truncated fields and two trees are built, to compare ways of fusing, and most of them again without the scans that
+    // they foretell.
     check_memory(&grid, &settings, &scans, args.memory / COPIES, &name)
         .map_err(|error| with_outlier(error, &scans))
         .map_err(|error| {
-            anyhow!("{error} (a gallery holds {COPIES} times that, so a {COPIES}rd of --memory counts)")
+            anyhow!("{error} (a gallery holds {COPIES} times that, so a {COPIES}th of --memory counts)")
         })?;
     if scans.iter().all(|(_, scan)| scan.counts().hit == 0) {
         anyhow::bail!("{name}: no beam of {} scans hit anything; there is nothing to compare", scans.len());
@@ -211,7 +212,7 @@ fn gallery_settings(
 pub(crate) fn title(name: &str, resolution: f64, scans: usize) -> String {
     let name = Path::new(name).file_name().map_or(name.into(), |n| n.to_string_lossy());
     let cells = (resolution * 1000.0).round() / 10.0;
-    format!("One log, nine views: {name}, {scans} scans, cells of {cells} cm")
+    format!("One log, ten views: {name}, {scans} scans, cells of {cells} cm")
 }
 
 /// Makes the folder for results.

@@ -11,6 +11,7 @@ import { drawRings } from "./rings_layer.js";
  * @property {import("./map.js").FieldImage | undefined} image
  * @property {Float32Array} contour
  * @property {Uint32Array} lines
+ * @property {Float32Array} obstacles centers of cells that are obstacles without a surface
  * @property {any} truth faces, of the simulated world
  * @property {Rings | undefined} rings
  * @property {Arrows | undefined} arrows
@@ -31,6 +32,7 @@ export function newScene() {
     image: undefined,
     contour: new Float32Array(),
     lines: new Uint32Array([0]),
+    obstacles: new Float32Array(),
     truth: null,
     rings: undefined,
     arrows: undefined,
@@ -66,8 +68,26 @@ export function stillLayers(s) {
       g.lineWidth = 1.8;
       g.lineJoin = "round";
       strokeLines(g, camera, s.contour, s.lines);
+      if (s.image) fillCells(g, camera, s.obstacles, s.image.grid.resolution);
     },
   ];
+}
+
+/**
+ * Whole cells, as large as they are, and no smaller than can be seen.
+ * @param {CanvasRenderingContext2D} g
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
+ * @param {Float32Array} centers x, y pairs
+ * @param {number} size (metres)
+ */
+function fillCells(g, camera, centers, size) {
+  g.fillStyle = colors().contour;
+  for (let i = 0; i < centers.length; i += 2) {
+    const [x0, y0] = camera.toScreen(centers[i] - 0.5 * size, centers[i + 1] + 0.5 * size);
+    const [x1, y1] = camera.toScreen(centers[i] + 0.5 * size, centers[i + 1] - 0.5 * size);
+    const [w, h] = [Math.max(x1 - x0, 2), Math.max(y1 - y0, 2)];
+    g.fillRect(0.5 * (x0 + x1 - w), 0.5 * (y0 + y1 - h), w, h);
+  }
 }
 
 /** What moves, over it. @param {Scene} s @returns {import("../canvas2d/canvas2d.js").Layer[]} */

@@ -68,7 +68,7 @@ export class ShownPanel {
 
   #legend() {
     const lines = legend([
-      { color: "contour", text: "contour" },
+      { color: "contour", text: "contour, and cells that stop beams without one" },
       { color: "accent", text: "nothing is nearer" },
       { color: "good", text: "certified" },
       { color: "bad", text: "violated", dashed: true },

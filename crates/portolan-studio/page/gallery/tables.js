@@ -49,12 +49,13 @@ export function errorTable(costs) {
   return table(
     "gallery-errors",
     "How wrong the answers are",
-    ["", "wrong", "distance", "surface"],
+    ["", "wrong", "distance", "surface", "foretold"],
     costs.rows.map((/** @type {any} */ r) => [
       r.name,
       r.occupancy_wrong === null ? "–" : `${(100 * r.occupancy_wrong).toFixed(2)} %`,
       both(r.distance_error),
       both(r.surface_error),
+      r.foretold === null ? "–" : `${(100 * r.foretold.within_10_cm).toFixed(1)} %`,
     ]),
   );
 }

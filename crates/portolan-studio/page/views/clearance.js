@@ -143,6 +143,7 @@ export class Clearance {
     image.paint();
     scene.image = image;
     [scene.contour, scene.lines, scene.truth] = [arrays.contour, arrays.lines, body.truth];
+    scene.obstacles = arrays.obstacles;
     if (JSON.stringify(before) !== JSON.stringify(body.grid)) this.canvas2d.setHome(image.box());
     scene.probe ??= body.start ?? undefined;
     this.path.follow();

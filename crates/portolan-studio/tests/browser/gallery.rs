@@ -27,7 +27,8 @@ fn costs(page: &Page) -> Value {
 }
 
 fn panels_of(rows: &Value, indices: &[Value]) -> Vec<String> {
-    let panel = |i: &Value| rows[i.as_u64().unwrap() as usize]["panel"].as_str().unwrap().to_owned();
+    let panel =
+        |i: &Value| rows[i.as_u64().unwrap() as usize]["panel"].as_str().unwrap_or_default().to_owned();
     indices.iter().map(panel).collect()
 }
 

@@ -22,7 +22,9 @@ mod on_nodes;
 mod smooth;
 
 pub use clearance::{Clearance, ClearanceField, UnknownSpace};
-pub use esdf::{Esdf, EsdfMethod, EsdfSettings, EsdfUpdate, ObstacleCells, PointKind, SurfaceNoise};
+pub use esdf::{
+    Esdf, EsdfMethod, EsdfSettings, EsdfUpdate, LEAST_HITS, ObstacleCells, PointKind, SurfaceNoise,
+};
 pub use grid::{EsdfError, EsdfGrid, esdf_from_tsdf, squared_distance_transform};
 pub use mask::{Label, MaskCell, MaskError, MaskTransform};
 pub use smooth::{FieldSlots, Interpolation, Smooth};

@@ -1,6 +1,6 @@
 //! The two fields of one map.
 
-use portolan::field::{Esdf, EsdfError, EsdfGrid, FieldSlots, Interpolation};
+use portolan::field::{Esdf, EsdfError, EsdfGrid, FieldSlots, Interpolation, ObstacleCells};
 use portolan::geom::vector::norm;
 use portolan::geom::{Aabb, Grid};
 use portolan::map::Tsdf2;
@@ -26,8 +26,8 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    pub(super) fn of(tsdf: &Tsdf2) -> Result<Self, EsdfError> {
-        let euclidean = exports::field(tsdf, true);
+    pub(super) fn of(tsdf: &Tsdf2, cells: &ObstacleCells<2>) -> Result<Self, EsdfError> {
+        let euclidean = exports::field(tsdf, cells, true);
         // A probe must not wait for bricks that were not read yet.
         euclidean.measure();
         let dense = euclidean.dense(tsdf.grid());
@@ -58,6 +58,13 @@ impl Fields {
             Which::Truncated => self.truncated.samples(),
             Which::Euclidean => self.dense.samples(),
         }
+    }
+
+    /// Centers of the cells that are obstacles without a surface: x, y pairs.
+    pub(super) fn obstacles(&self) -> Vec<f32> {
+        let lattice = self.euclidean.lattice();
+        let centers = self.euclidean.point_obstacles().map(|(cell, _)| lattice.center(cell));
+        centers.flatten().map(|v| v as f32).collect()
     }
 
     /// Whether a cell's sample is a distance, and not what a distance is at least.

@@ -8,15 +8,17 @@ use serde_json::{Value, json};
 
 use super::fields::{Fields, Sample, length};
 use crate::engine::Refusal;
+use crate::engine::fusion::Beside;
 
 /// The answer for the page: numbers of both fields, and the row of `query`.
 pub(super) fn answer(
     tsdf: &Tsdf2,
+    beside: &Beside,
     fields: &Fields,
     p: [f64; 2],
     unknown: UnknownSpace,
 ) -> Result<Value, Refusal> {
-    let row = row(tsdf, &fields.euclidean, p, unknown);
+    let row = row(tsdf, beside, &fields.euclidean, p, unknown);
     let mut line = Vec::new();
     write_answer(&mut line, &row).map_err(Refusal::new)?;
     let kept = fields.truncated(p);
@@ -45,8 +47,14 @@ pub(super) fn answer(
 }
 
 /// The row that `query` prints for a `map.portolan` of this map, with `--unknown` as given.
-pub(super) fn row(tsdf: &Tsdf2, field: &Esdf<2>, p: [f64; 2], unknown: UnknownSpace) -> AnswerRow<2> {
-    let mut row = AnswerRow::of(p, tsdf.occupancy(p), in_box(tsdf, field, p));
+pub(super) fn row(
+    tsdf: &Tsdf2,
+    beside: &Beside,
+    field: &Esdf<2>,
+    p: [f64; 2],
+    unknown: UnknownSpace,
+) -> AnswerRow<2> {
+    let mut row = AnswerRow::of(p, beside.occupancy(p), in_box(tsdf, field, p));
     row.certify(field, p, unknown, certified_reach(field));
     row
 }

@@ -1,5 +1,6 @@
 //! The fields of the map that fusion is at.
 
+use portolan::field::ObstacleCells;
 use portolan::map::Tsdf2;
 use serde_json::json;
 
@@ -47,7 +48,8 @@ impl Clearance {
             Ask::Rings { field, spacing } => rings::rings(fields, field, spacing),
             Ask::Arrows { field, bounds, spacing } => arrows::arrows(fields, field, bounds, spacing),
             Ask::Probe { at, unknown } => {
-                Reply::of(probe::answer(fusion.tsdf()?, fields, at, unknown.space())?)
+                let (tsdf, beside) = fusion.with_beside()?;
+                Reply::of(probe::answer(tsdf, beside, fields, at, unknown.space())?)
             }
             Ask::Path { points, clearance, unknown } => {
                 check(&fields.euclidean, points, clearance, unknown.space())
@@ -65,7 +67,10 @@ impl Clearance {
         let revision = fusion.revision();
         let made = match self.made.take().filter(|m| m.revision == revision) {
             Some(made) => made,
-            None => MapFields::of(fusion.tsdf()?, revision, &self.limits, &clock)?,
+            None => {
+                let (tsdf, beside) = fusion.with_beside()?;
+                MapFields::of(tsdf, beside.cells(), revision, &self.limits, &clock)?
+            }
         };
         Ok(self.made.insert(made))
     }
@@ -81,7 +86,13 @@ impl Clearance {
 }
 
 impl MapFields {
-    fn of(tsdf: &Tsdf2, revision: u64, limits: &Limits, clock: &Clock) -> Result<Self, Refusal> {
+    fn of(
+        tsdf: &Tsdf2,
+        cells: &ObstacleCells<2>,
+        revision: u64,
+        limits: &Limits,
+        clock: &Clock,
+    ) -> Result<Self, Refusal> {
         let wanted = BYTES_PER_CELL.saturating_mul(tsdf.grid().len());
         if wanted > limits.memory {
             return Err(Refusal::new(format!(
@@ -90,7 +101,7 @@ impl MapFields {
                 limits.memory >> 20
             )));
         }
-        let (fields, seconds) = clock.time(|| Fields::of(tsdf));
+        let (fields, seconds) = clock.time(|| Fields::of(tsdf, cells));
         let fields = fields.map_err(Refusal::new)?;
         Ok(Self { revision, meter: meter(&fields), fields, seconds })
     }
@@ -118,7 +129,8 @@ impl MapFields {
             .with("truncated", self.fields.samples(Which::Truncated).to_vec())
             .with("euclidean", self.fields.samples(Which::Euclidean).to_vec())
             .with("contour", contour.points)
-            .with("lines", contour.starts))
+            .with("lines", contour.starts)
+            .with("obstacles", self.fields.obstacles()))
     }
 }
 

@@ -10,6 +10,7 @@ use portolan::map::Tsdf2;
 use portolan::plan::{Cause, PathCheck, Waypoints, check_path};
 use portolan::scan::{Beam, BeamKind, Scan};
 use portolan::surface::{ContourSettings, marching_squares};
+use portolan::{Mapper, MapperSettings};
 use portolan_io::AnswerRow;
 use serde_json::{Value, json};
 
@@ -17,7 +18,7 @@ use super::ask::{Ask, Which};
 use super::fields::Fields;
 use super::meter::meter;
 use super::{Clearance as View, path, probe};
-use crate::engine::fusion::Fusion;
+use crate::engine::fusion::{Beside, Fusion};
 use crate::engine::protocol::Values;
 use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Source2d};
 
@@ -46,8 +47,18 @@ impl Studio {
     }
 
     fn tsdf(&mut self) -> Tsdf2 {
+        self.maps().0
+    }
+
+    fn maps(&mut self) -> (Tsdf2, Beside) {
         self.fusion.finish_if_new().unwrap();
-        self.fusion.tsdf().unwrap().clone()
+        let (tsdf, beside) = self.fusion.with_beside().unwrap();
+        (tsdf.clone(), beside.clone())
+    }
+
+    fn fields(&mut self) -> Fields {
+        let (tsdf, mut beside) = self.maps();
+        Fields::of(&tsdf, beside.cells()).unwrap()
     }
 }
 
@@ -86,23 +97,23 @@ fn points(tsdf: &Tsdf2, n: usize) -> Vec<[f64; 2]> {
 }
 
 /// The field that `query` makes of a `map.portolan`.
-fn field_of_query(tsdf: &Tsdf2, unknown: bool) -> Esdf<2> {
+fn field_of_query(tsdf: &Tsdf2, beside: &mut Beside, unknown: bool) -> Esdf<2> {
     let settings = EsdfSettings {
         max_distance: vector::norm(tsdf.grid().aabb().extent()).max(tsdf.grid().lattice.resolution),
         unknown,
         ..EsdfSettings::default()
     };
-    Esdf::of(tsdf, &settings)
+    Esdf::with_obstacles(tsdf, beside.cells(), &settings)
 }
 
 /// The probe against the library's own answers, through the page's JSON; which statuses there were.
 fn agrees(studio: &mut Studio, n: usize) -> Vec<String> {
-    let tsdf = studio.tsdf();
+    let (tsdf, mut beside) = studio.maps();
     let mut seen = Vec::new();
     for (word, unknown) in
         [("optimistic", UnknownSpace::Optimistic), ("pessimistic", UnknownSpace::Pessimistic)]
     {
-        let field = field_of_query(&tsdf, unknown == UnknownSpace::Pessimistic);
+        let field = field_of_query(&tsdf, &mut beside, unknown == UnknownSpace::Pessimistic);
         let limit = f64::from(field.max_distance()) - 2.0 * tsdf.grid().lattice.resolution;
         for p in points(&tsdf, n) {
             let body = studio.ask(json!({ "op": "probe", "at": p, "unknown": word })).body;
@@ -112,7 +123,7 @@ fn agrees(studio: &mut Studio, n: usize) -> Vec<String> {
             let inside = tsdf.grid().aabb().contains(p);
             let answer = if inside { field.distance_and_gradient(p) } else { Answer::Outside };
             let answer = if inside && answer == Answer::Outside { Answer::Unknown } else { answer };
-            let mut row = AnswerRow::of(p, tsdf.occupancy(p), answer);
+            let mut row = AnswerRow::of(p, beside.occupancy(p), answer);
             row.certify(&field, p, unknown, limit);
             let status = row.status.word();
             assert_eq!(told["status"], status, "{p:?}");
@@ -122,7 +133,7 @@ fn agrees(studio: &mut Studio, n: usize) -> Vec<String> {
             let gradient = told["gradient"].as_array().map(|g| [0, 1].map(|k| g[k].as_f64().unwrap()));
             assert_eq!(gradient, row.gradient, "{p:?}");
             assert_eq!(told["norm"].as_f64(), row.gradient.map(vector::norm));
-            assert_eq!(told["occupancy"].as_f64(), tsdf.occupancy(p));
+            assert_eq!(told["occupancy"].as_f64(), beside.occupancy(p));
             seen.push(status.to_owned());
         }
     }
@@ -182,7 +193,7 @@ fn the_truncated_field_is_a_constant_beyond_its_truncation() {
 #[test]
 fn rings_lie_where_the_field_has_their_distance() {
     let mut studio = apartment();
-    let fields = Fields::of(&studio.tsdf()).unwrap();
+    let fields = studio.fields();
     for (word, which) in [("euclidean", Which::Euclidean), ("truncated", Which::Truncated)] {
         let reply = studio.ask(json!({ "op": "rings", "field": word, "spacing": 0.1 }));
         let [points, starts, levels] = [0, 1, 2].map(|i| &reply.arrays[i].values);
@@ -212,7 +223,7 @@ fn rings_lie_where_the_field_has_their_distance() {
 #[test]
 fn arrows_are_the_gradients_of_single_questions() {
     let mut studio = apartment();
-    let fields = Fields::of(&studio.tsdf()).unwrap();
+    let fields = studio.fields();
     let question =
         json!({ "op": "arrows", "field": "euclidean", "bounds": [[2.0, 1.0], [5.0, 4.0]], "spacing": 0.2 });
     let reply = studio.ask(question);
@@ -231,7 +242,7 @@ fn arrows_are_the_gradients_of_single_questions() {
 
 #[test]
 fn the_meter_tells_a_distance_field_from_a_truncated_one() {
-    let meter = meter(&Fields::of(&apartment().tsdf()).unwrap());
+    let meter = meter(&apartment().fields());
     let [truncated, euclidean] = [&meter.truncated, &meter.euclidean].map(|n| n.median.unwrap());
     assert!((0.95..1.02).contains(&euclidean), "{euclidean}");
     assert!(truncated < 0.05, "{truncated}");
@@ -242,8 +253,8 @@ fn the_meter_tells_a_distance_field_from_a_truncated_one() {
 
 #[test]
 fn all_of_a_path_has_a_verdict_and_what_is_certified_is_free() {
-    let tsdf = apartment().tsdf();
-    let fields = Fields::of(&tsdf).unwrap();
+    let (tsdf, mut beside) = apartment().maps();
+    let fields = Fields::of(&tsdf, beside.cells()).unwrap();
     let contour = marching_squares(&tsdf, &ContourSettings::of(&tsdf));
     let corners =
         vec![[0.8, 5.4], [2.0, 4.5], [6.6, 4.5], [7.8, 6.2], [8.6, 5.5], [6.6, 0.7], [-1.0, 0.5], [1.2, 2.0]];
@@ -357,10 +368,63 @@ fn hostile_questions_are_refused_or_answered() {
 
 #[test]
 fn the_row_of_a_cell_is_the_same_with_and_without_distances_to_unknown_cells() {
-    let tsdf = apartment().tsdf();
-    let (with, without) = (field_of_query(&tsdf, true), field_of_query(&tsdf, false));
+    let (tsdf, mut beside) = apartment().maps();
+    let [with, without] = [true, false].map(|unknown| field_of_query(&tsdf, &mut beside, unknown));
     for p in points(&tsdf, 500) {
-        let rows = [&with, &without].map(|f| probe::row(&tsdf, f, p, UnknownSpace::Optimistic));
+        let rows = [&with, &without].map(|f| probe::row(&tsdf, &beside, f, p, UnknownSpace::Optimistic));
         assert_eq!(rows[0], rows[1]);
     }
+}
+
+/// Beams to a wall at 4 m, past a pole at 2 m that stops one in four of those near it, from several places.
+fn pole() -> Studio {
+    let scan = |k: usize| {
+        let beam = |i: i32| {
+            let angle = 0.01 * f64::from(i) + 1e-4 * k as f64;
+            let stopped = i.abs() <= 2 && (i + k as i32) % 4 == 0;
+            let range = if stopped { 2.0 } else { 4.0 / angle.cos() };
+            (angle, Beam { direction: [angle.cos(), angle.sin()], range, kind: BeamKind::Hit })
+        };
+        let (bearings, beams): (Vec<_>, Vec<_>) = (-60..=60).map(beam).unzip();
+        (Pose::<2>::new(0.0, 0.01 * (k % 5) as f64, 0.0), Scan::from_fan(&bearings, beams))
+    };
+    Studio::of(Source2d::Recorded { name: "pole".into(), scans: (0..60).map(scan).collect() })
+}
+
+/// Obstacles that the surface does not show are those of the library's default recipe, wherever the map came from.
+#[test]
+fn what_stops_beams_without_a_surface_is_an_obstacle() {
+    let mut studio = pole();
+    let sent = |reply: &Reply| match &reply.arrays.iter().find(|a| a.name == "obstacles").unwrap().values {
+        Values::F32(values) => values.clone(),
+        _ => panic!("other arrays"),
+    };
+    let reply = studio.ask(json!({ "op": "open" }));
+    let obstacles = sent(&reply);
+    // By a mapper that makes all maps itself.
+    let (tsdf, _) = studio.maps();
+    let mut mapper = Mapper::with(MapperSettings::<2> {
+        origin: Some(tsdf.grid().lattice.origin),
+        max_distance: vector::norm(tsdf.grid().aabb().extent()),
+        ..MapperSettings::new(tsdf.config().resolution)
+    });
+    for (pose, scan) in studio.fusion.scans().first(60) {
+        mapper.integrate(pose, scan).unwrap();
+    }
+    let field = mapper.esdf().unwrap();
+    let centers = field.point_obstacles().map(|(cell, _)| field.lattice().center(cell));
+    let expected: Vec<f32> = centers.flatten().map(|v| v as f32).collect();
+    assert!(!expected.is_empty() && obstacles == expected, "{obstacles:?} {expected:?}");
+    assert!(obstacles.chunks(2).any(|p| (p[0] - 2.0).abs() < 0.1 && p[1].abs() < 0.1));
+    let at = json!({ "op": "probe", "at": [1.8, 0.02], "unknown": "optimistic" });
+    let near = studio.ask(at.clone()).body["euclidean"]["upper"].as_f64().unwrap();
+    assert!(near < 0.3, "{near}");
+    // Back to a time before it was hit, and on again.
+    let seek = |studio: &mut Studio, scan: usize| {
+        studio.fusion.ask(serde_json::from_value(json!({ "op": "seek", "scan": scan })).unwrap()).unwrap();
+    };
+    seek(&mut studio, 1);
+    assert_ne!(sent(&studio.ask(json!({ "op": "open" }))), expected);
+    seek(&mut studio, 60);
+    assert_eq!(sent(&studio.ask(json!({ "op": "open" }))), expected);
 }

@@ -9,6 +9,7 @@ use portolan::scan::ScanStats;
 use serde_json::json;
 
 use super::ask::{Ask, ExportFile};
+use super::beside::Beside;
 use super::chair::Ghost;
 use super::frame;
 use super::inspect::Inspected;
@@ -22,8 +23,8 @@ use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Source2d};
 const MOST_STEPS: usize = 256;
 /// Cells around everything that was seen, besides the truncation.
 const MARGIN_CELLS: f64 = 4.0;
-/// Bytes of a cell: the map, the page's copy, what is derived from them for a picture or a file.
-const BYTES_PER_CELL: f64 = 64.0;
+/// Bytes of a cell: the map and what is fused beside it, the page's copy, what is derived from them for a picture or a file.
+const BYTES_PER_CELL: f64 = 80.0;
 
 /// The view of fusion.
 pub(in crate::engine) struct Fusion {
@@ -40,6 +41,8 @@ pub(in crate::engine) struct Fusion {
 struct Fused {
     at: usize,
     tsdf: Tsdf2,
+    /// Made when it is asked for; never ahead of the map.
+    beside: Option<Beside>,
     page: PageCopy,
     ghost: Option<Ghost>,
     stats: ScanStats,
@@ -102,6 +105,19 @@ impl Fusion {
         Ok(&self.fused()?.tsdf)
     }
 
+    /// The map as it is, and what the default recipe fuses beside it, of the same scans.
+    pub(in crate::engine) fn with_beside(&mut self) -> Result<(&Tsdf2, &mut Beside), Refusal> {
+        self.fused()?;
+        let Some(fused) = &mut self.fused else { return Err(Refusal::new("there is no map")) };
+        let beside = match fused.beside.take() {
+            Some(beside) => beside,
+            None => Beside::new(fused.tsdf.grid(), fused.tsdf.config())?,
+        };
+        let beside = fused.beside.insert(beside);
+        beside.drive_to(&mut self.scans, fused.at)?;
+        Ok((&fused.tsdf, beside))
+    }
+
     /// Another number whenever the map is another.
     pub(in crate::engine) fn revision(&self) -> u64 {
         self.revision
@@ -147,7 +163,7 @@ impl Fusion {
         }
         let tsdf = Tsdf2::covering(&grid, config).map_err(Refusal::new)?;
         let page = PageCopy::nothing(grid.shape);
-        Ok(Fused { at: 0, tsdf, page, ghost: None, stats: ScanStats::default() })
+        Ok(Fused { at: 0, tsdf, beside: None, page, ghost: None, stats: ScanStats::default() })
     }
 
     /// The Apartment's box, or what the log saw, free ends of beams included.
@@ -304,18 +320,26 @@ impl Fusion {
     }
 
     fn export(&mut self, file: ExportFile) -> Result<Reply, Refusal> {
-        self.fused()?;
-        let Some(fused) = &self.fused else { return Err(Refusal::new("there is no map")) };
+        let (at, name, settings) = (self.at(), self.scans.name().to_owned(), json!(self.settings));
         match file {
-            ExportFile::Esdf => exports::esdf(&fused.tsdf),
-            ExportFile::Contour => exports::contour(&fused.tsdf),
-            ExportFile::Map => exports::map(&fused.tsdf, self.scans.name(), fused.at, &json!(self.settings)),
+            ExportFile::Esdf => {
+                let (tsdf, beside) = self.with_beside()?;
+                exports::esdf(tsdf, beside.cells())
+            }
+            ExportFile::Contour => exports::contour(self.tsdf()?),
+            ExportFile::Map => {
+                let (tsdf, beside) = self.with_beside()?;
+                exports::map(tsdf, beside, &name, at, &settings)
+            }
         }
     }
 
     pub(in crate::engine) fn memory_bytes(&self) -> usize {
-        let map = self.fused.as_ref().map_or(0, |m| m.tsdf.memory_bytes() + m.page.memory_bytes());
-        map + self.scans.memory_bytes()
+        let of = |m: &Fused| {
+            let beside = m.beside.as_ref().map_or(0, Beside::memory_bytes);
+            m.tsdf.memory_bytes() + m.page.memory_bytes() + beside
+        };
+        self.fused.as_ref().map_or(0, of) + self.scans.memory_bytes()
     }
 
     /// Gives the map up.

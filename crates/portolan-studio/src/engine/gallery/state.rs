@@ -17,7 +17,7 @@ const FIRST_PROBES: usize = 10_000;
 /// Points that a workload can be run with.
 const PROBES: std::ops::RangeInclusive<usize> = 100..=300_000;
 /// Bytes of a cell in all maps together, with what deriving and sending them takes on top.
-const BYTES_PER_CELL: f64 = 160.0;
+const BYTES_PER_CELL: f64 = 200.0;
 /// Bytes of a beam in the cloud and its tree, while they are built.
 const BYTES_PER_BEAM: f64 = 120.0;
 /// Edges of the leaves that trees are fused with to follow the formula (meters).

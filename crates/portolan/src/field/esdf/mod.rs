@@ -41,7 +41,7 @@ mod unknown;
 
 pub use clearance::SurfaceNoise;
 pub use field::Esdf;
-pub use obstacles::{ObstacleCells, PointKind};
+pub use obstacles::{LEAST_HITS, ObstacleCells, PointKind};
 pub use settings::{EsdfMethod, EsdfSettings, EsdfUpdate};
 
 /// Bricks in one task of those that take microseconds each.

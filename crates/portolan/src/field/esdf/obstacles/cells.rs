@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 const TOGETHER: usize = 64;
 
 /// Hits that a cell must have had for its share of stopped beams to mean something.
-const LEAST_HITS: u32 = 3;
+pub const LEAST_HITS: u32 = 3;
 
 /// Cells of which a map says that something is there: obstacles of a distance field, where no surface explains them
 /// ([`Esdf::with_obstacles`](crate::field::Esdf::with_obstacles)).

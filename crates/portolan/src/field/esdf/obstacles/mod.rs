@@ -22,6 +22,6 @@ mod cells;
 mod distances;
 mod find;
 
-pub use cells::ObstacleCells;
+pub use cells::{LEAST_HITS, ObstacleCells};
 pub use find::PointKind;
 pub(super) use find::with_neighbors;
