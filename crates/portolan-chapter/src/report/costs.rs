@@ -38,8 +38,7 @@ pub(super) fn table(facts: &Facts) -> Section {
     let header =
         ["representation", "memory", "update per scan", "occupancy probe", "distance probe", "surface"];
     let body = format!(
-        "<p>Measured: bytes allocated, seconds of one core; of the cloud's tree the bytes of its leaves (its inner levels, \
-         which it does not tell, come on top). A dash says that the representation cannot \
+        "<p>Measured: bytes held, seconds of one core. A dash says that the representation cannot \
          answer; nothing is faked. <b>+</b> is memory on top of the TSDF that a field is derived from, and its update is a \
          full rebuild. The cheapest in each column, and what is level with it, is set in bold.</p>{}\
          <p>No row wins all columns, and none was ever going to.</p>",

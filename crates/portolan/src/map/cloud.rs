@@ -2,7 +2,8 @@
 
 use crate::geom::Pose;
 use crate::scan::{Scan, ScanStats};
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use kiddo::kd_tree::KdTreeAccessor;
+use kiddo::{Eytzinger, ImmutableKdTree, LeafStrategy, SquaredEuclidean, VecOfArenas};
 
 /// All end points of all scans, and a k-d tree over them: the log made searchable, not a map. It grows without
 /// bound, cannot be carved, and knows nothing of free space.
@@ -62,12 +63,25 @@ impl<const D: usize> Cloud<D> {
         Some(tree.query(&p).nearest_one::<SquaredEuclidean<f64>>().execute().distance.sqrt())
     }
 
-    /// The points twice: as they came, and in the tree's leaves with their index of 4 bytes. The tree does not give
-    /// its own size: its inner levels, some 3 % more, are not counted.
+    /// Bytes of the points as they came and of the tree over them, which holds them again: measured, not estimated. What
+    /// allocations are larger than what they hold is counted for the points, not for the tree, which does not tell. O(leaves).
     pub fn memory_bytes(&self) -> usize {
-        let in_tree = if self.tree.is_some() { self.points.len() * (size_of::<[f64; D]>() + 4) } else { 0 };
-        self.points.capacity() * size_of::<[f64; D]>() + in_tree
+        self.points.capacity() * size_of::<[f64; D]>() + self.tree.as_ref().map_or(0, tree_bytes)
     }
+}
+
+/// Bytes of a tree's planes between points, of where its leaves begin and end, and of the leaves: points with their index,
+/// each leaf aligned to a coordinate.
+fn tree_bytes<const D: usize>(tree: &ImmutableKdTree<f64, D>) -> usize {
+    let (planes, leaves) = (tree.stems(), tree.leaves());
+    let of_leaf = |i: usize| leaf_len(leaves, i) * (size_of::<[f64; D]>() + size_of::<u32>());
+    let held = (0..tree.leaf_count()).map(|i| of_leaf(i).next_multiple_of(align_of::<f64>()));
+    size_of_val(planes) + tree.leaf_count() * size_of::<(usize, usize)>() + held.sum::<usize>()
+}
+
+/// Points in a leaf.
+fn leaf_len<const D: usize>(leaves: &VecOfArenas<f64, u32, D, 32>, leaf: usize) -> usize {
+    LeafStrategy::<f64, u32, Eytzinger, D, 32>::leaf_len(leaves, leaf)
 }
 
 #[cfg(test)]
@@ -112,5 +126,38 @@ mod tests {
         matches_brute_force(&points, &[[1.0, 2.0], [4.2, 6.0], [100.0, 0.0]]);
         let cloud = Cloud::from_points([[f64::NAN, 0.0]]);
         assert_eq!(cloud.nearest_distance([0.0, 0.0]), None);
+    }
+
+    /// Against what the tree says of its leaves, and what its planes and leaves must at least be.
+    fn memory_is_what_is_held<const D: usize>() {
+        for n in [0, 1, 31, 33, 1000, 5003] {
+            let points = (0..n).map(|i| {
+                std::array::from_fn(|k| (f64::from(i) * [0.618_034, 0.414_214, 0.302_776][k]).fract())
+            });
+            let cloud = Cloud::<D>::from_points(points);
+            let own = cloud.points.capacity() * 8 * D;
+            let Some(tree) = &cloud.tree else {
+                assert_eq!((n, cloud.memory_bytes()), (0, own));
+                continue;
+            };
+            // "VecOfArenas { .., arena_bytes: 20 }"
+            let said = format!("{:?}", tree.leaves());
+            let arena: usize =
+                said.rsplit("arena_bytes: ").next().unwrap().trim_end_matches(" }").parse().unwrap();
+            // Behind the last leaf nothing is aligned.
+            let leaves = arena.next_multiple_of(8);
+            assert!(arena >= n as usize * (8 * D + 4), "{said}");
+            let rest = tree.stems().len() * 8 + tree.leaf_count() * 16;
+            assert_eq!(cloud.memory_bytes(), own + leaves + rest, "{n}");
+            assert!(
+                n < 33 || tree.leaf_count() * 32 >= n as usize && tree.stems().len() + 1 >= tree.leaf_count()
+            );
+        }
+    }
+
+    #[test]
+    fn memory_is_what_is_held_2d_and_3d() {
+        memory_is_what_is_held::<2>();
+        memory_is_what_is_held::<3>();
     }
 }
