@@ -451,10 +451,7 @@ mod tests {
         let set: Vec<bool> = one.iter().map(|l| *l == 0).collect();
         let (distance, nearest) = plain.nearest_background(&one).unwrap();
         assert_eq!(distance, plain.distances(&set).unwrap());
-        assert_eq!((plain.squared_distances(&set).unwrap(), &nearest), {
-            let (squared, nearest) = plain.nearest(&set).unwrap();
-            (squared, &nearest.clone())
-        });
+        assert_eq!((plain.squared_distances(&set).unwrap(), nearest), plain.nearest(&set).unwrap());
         let bound = 3.1 * spacing[0];
         let bounded = plain.within(bound).unwrap().label_distances(labels).unwrap();
         for (b, d) in bounded.iter().zip(plain.label_distances(labels).unwrap()) {
