@@ -163,14 +163,14 @@ fn labels<'py>(array: Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntyp
     Ok(numpy.call_method1("add", (&array, 0))?.call_method1("view", (bits,))?.cast_into()?)
 }
 
-/// Distances, and where they were asked for the indices of the nearest cells.
-type Transformed<'py> = (Bound<'py, PyArrayDyn<f32>>, Option<Bound<'py, PyArrayDyn<i32>>>);
+/// Distances, and indices where they are asked for.
+type Answer<'py> = (Bound<'py, PyArrayDyn<f32>>, Option<Bound<'py, PyArrayDyn<i32>>>);
 
 fn answer<'py>(
     mask: &Bound<'py, PyAny>,
     sampling: Option<&Bound<'py, PyAny>>,
     asked: Question,
-) -> PyResult<Transformed<'py>> {
+) -> PyResult<Answer<'py>> {
     let py = mask.py();
     let array = dense(mask, "mask")?;
     if !(1..=3).contains(&array.ndim()) {
