@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One workload by one peer: prints one JSON line. `compare.py` calls it; by hand: peers.py WORKLOAD PEER --data DIR.
+"""One workload by portolan's wheel or by one of its peers: prints one JSON line. `compare.py` calls it; by hand: peers.py WORKLOAD PEER --data DIR.
 
 Only the peer's own library calls are inside the clock, and its constructors and what they allocate beforehand are not. What it reads is what portolan reads: KITTI folders, 7-Scenes
 folders, npy volumes.
@@ -31,6 +31,7 @@ def arguments():
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--carve", action="store_true")
+    parser.add_argument("--sweep", choices=["auto", "exact"], default="auto")
     return parser.parse_args()
 
 
@@ -53,6 +54,30 @@ def seven_scenes(folder, scans):
         yield cv2.imread(str(depth), cv2.IMREAD_UNCHANGED), pose
 
 
+def posed(folder, scans):
+    """Points in the sensor's frame and poses, which is what portolan takes."""
+    import numpy as np
+
+    rows = np.loadtxt(folder / "poses.txt")[:scans]
+    for i, row in enumerate(rows):
+        points = np.fromfile(folder / "velodyne" / f"{i:06d}.bin", "<f4").reshape(-1, 4)[:, :3].astype(np.float64)
+        yield np.ascontiguousarray(points), np.vstack([row.reshape(3, 4), [0, 0, 0, 1]])
+
+
+def mapper_of(args, **maps):
+    import portolan
+
+    kinds = {"occupancy": False, "attenuation": False, "distances": False, "color": False} | maps
+    sweep = "exact" if args.sweep == "exact" else "auto"
+    return lambda: portolan.Mapper(args.resolution, sweep=sweep, carve=args.carve, **kinds)
+
+
+def fuse(mapper, scans):
+    for points, pose in scans:
+        mapper.integrate(points, pose)
+    return mapper
+
+
 def octomap_tree(args):
     import octomap
 
@@ -66,13 +91,24 @@ def insert(tree, scans, discretize):
 
 
 def occupancy(args):
+    if args.peer == "portolan":
+        scans = list(posed(args.data / "lidar_building", args.scans))
+        return len(scans), mapper_of(args, occupancy=True), lambda m: fuse(m, scans), size_of
     scans = list(kitti(args.data / "lidar_building", args.scans))
     run = lambda tree: insert(tree, scans, args.peer == "octomap-discretized")
     return len(scans), lambda: octomap_tree(args), run, lambda tree: {"nodes": tree.size(), "bytes": tree.memoryUsage()}
 
 
+def size_of(mapper):
+    return {"bytes": mapper.memory_bytes}
+
+
 def lidar_tsdf(args):
     import numpy as np
+
+    if args.peer == "portolan":
+        scans = list(posed(args.data / "lidar_building", args.scans))
+        return len(scans), mapper_of(args, distances=True), lambda m: fuse(m, scans), size_of
     import vdbfusion
 
     scans = list(kitti(args.data / "lidar_building", args.scans))
@@ -95,6 +131,17 @@ def lidar_tsdf(args):
 
 def depth_tsdf(args):
     import numpy as np
+
+    if args.peer == "portolan":
+        frames = list(seven_scenes(args.data / "rgbd_building", args.scans))
+        camera = np.loadtxt(args.data / "rgbd_building" / "camera-intrinsics.txt")
+
+        def run(mapper):
+            for depth, pose in frames:
+                mapper.integrate(depth=depth, depth_scale=1000, intrinsics=camera, pose=pose, max_range=8.0)
+            return mapper
+
+        return len(frames), mapper_of(args, distances=True), run, size_of
     import open3d as o3d
 
     core, folder = o3d.core, args.data / "rgbd_building"
@@ -123,7 +170,12 @@ def surface(args):
     import numpy as np
 
     volume = np.load(args.data / "grids" / "w4_gyroid_256_f32.npy")
-    if args.peer == "scikit-image":
+    if args.peer == "portolan":
+        import portolan
+
+        make, run = lambda: None, lambda _: portolan.marching_cubes(volume, 0.0)
+        count = lambda r: len(r[1])
+    elif args.peer == "scikit-image":
         from skimage import measure
 
         make, run = lambda: None, lambda _: measure.marching_cubes(volume, 0.0)[:2]
@@ -164,9 +216,23 @@ def surface(args):
 def query(args):
     import numpy as np
 
-    tree = insert(octomap_tree(args), kitti(args.data / "lidar_building", args.scans), True)
     points = np.fromfile(args.data / "grids" / "w5_queries_1e6x3.f32", "<f4").reshape(-1, 3).astype(np.float64)
+    if args.peer == "portolan":
+        map = fuse(mapper_of(args, occupancy=True)(), posed(args.data / "lidar_building", args.scans)).occupancy
+        known = lambda result: {"known": int((result[1] == 1).sum())}
+        return len(points), lambda: None, lambda _: map.occupancy(points), known
+    tree = insert(octomap_tree(args), kitti(args.data / "lidar_building", args.scans), True)
     return len(points), lambda: None, lambda _: tree.getLabels(points), lambda labels: {"known": int((np.asarray(labels) >= 0).sum())}
+
+
+def version(peer):
+    from importlib import metadata
+
+    package = {"octomap": "octomap-python", "flying": "vtk"}.get(peer.split("-")[0], peer)
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def main():
@@ -175,6 +241,7 @@ def main():
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
         for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR"):
             os.environ[f"{name}_NUM_THREADS"] = "1"
+    os.environ["RAYON_NUM_THREADS"] = str(args.threads)
     try:
         per, make, run, describe = globals()[args.workload.replace("-", "_")](args)
     except ImportError as missing:
@@ -188,7 +255,7 @@ def main():
         result = run(made)
         seconds.append(time.perf_counter() - start)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    print(json.dumps({"seconds": seconds, "per": per, "peak": peak, **describe(result)}))
+    print(json.dumps({"seconds": seconds, "per": per, "peak": peak, "version": version(args.peer), **describe(result)}))
 
 
 if __name__ == "__main__":
