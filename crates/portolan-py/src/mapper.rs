@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use numpy::PyArrayDyn;
 use portolan::geom::Pose;
 use portolan::map::MapError;
-use portolan::scan::{Frame, Projection, RangeImage, ScanStats};
+use portolan::scan::{Frame, Origin, Projection, RangeImage, ScanStats};
 use portolan_cli::library::{MapperOfFile, picture_2d, picture_of_mesh, read_mapper, save_2d, save_3d};
 use portolan_io::MapFile;
 use pyo3::exceptions::PyRuntimeError;
@@ -102,6 +102,13 @@ impl Mapper {
             let fused: Result<_, MapError> = match (maps, &pose, scan) {
                 (Either::Two(held), Either::Two(pose), Either::Two(scan)) => fuse_one(held, pose, scan),
                 (Either::Three(held), Either::Three(pose), Either::Three(frame)) => {
+                    let how = held.mapper.settings();
+                    if frame_without_rays(frame) && (how.distances || how.attenuation.is_some()) {
+                        return Err(value_error(
+                            "the points do not say where they were seen from, and so make an occupancy map alone: give the log an \
+                             origin or poses, or the mapper distances=False and attenuation=False",
+                        ));
+                    }
                     let is_depth = |image: &RangeImage| matches!(image.projection, Projection::Pinhole(_));
                     held.camera |= matches!(frame, Frame::Image(image) if is_depth(image));
                     fuse_one(held, pose, frame)
@@ -116,6 +123,11 @@ impl Mapper {
     fn nothing<T>() -> PyResult<T> {
         Err(value_error("nothing was fused yet"))
     }
+}
+
+/// Whether a scan is of points that nothing looked at.
+fn frame_without_rays(frame: &Frame) -> bool {
+    matches!(frame, Frame::Points(scan) if scan.origin == Origin::Unknown)
 }
 
 fn fuse_one<const D: usize>(

@@ -103,6 +103,16 @@ def test_bags_are_logs():
     assert len(log) > 0 and log.remarks and log[0].pose.shape in [(3, 3), (4, 4)]
 
 
+def test_points_without_rays_make_occupancy_alone():
+    surveys = sorted(data("e57_las_ptx").glob("*.la[sz]"))
+    log = portolan.open(surveys[0])
+    assert log.points_only
+    with pytest.raises(ValueError, match="occupancy map alone"):
+        portolan.Mapper(1.0).map(log)
+    mapper = portolan.Mapper(1.0, distances=False, attenuation=False)
+    assert mapper.map(log)["hits"] > 0 and len(mapper.occupancy.cells()[0]) > 0
+
+
 def test_an_interrupt_keeps_what_was_fused():
     log = portolan.open(data("lidar2d_carmen/intel-corrected.log.gz"))
     mapper = portolan.Mapper(0.1)
