@@ -128,10 +128,10 @@ fn a_recorded_log_is_shown_and_makes_the_map_that_map_makes() {
     page.export("fusion", "map", &exported);
 
     let made = folder.path().join("made");
-    map(&log, &made, &["--every", "2", "--maps", "tsdf"]);
+    map(&log, &made, &["--every", "2"]);
     let points: String =
         (0..400).map(|i| format!("{},{}\n", 0.3 * f64::from(i % 20), 0.2 * f64::from(i / 20))).collect();
-    // Everything but the occupancy, which only the map of `map` could have.
+    // Everything: occupancy, distances to surface and obstacles, and their bounds.
     assert_eq!(query(&exported, &points), query(&made.join("map.portolan"), &points));
 }
 

@@ -91,4 +91,8 @@ fn people_who_walked_by_leave_no_more_than_they_did() {
     println!("  nobody there  {:.5?}", without.map(share));
     println!("  two walk      {:.5?}", with.map(share));
     println!("  because of it {ghosts:.5?}");
+    // Something is there to be measured: beams fell on people, and they are seen in the maps between whiles.
+    assert!(on_people > 500 && ghosts[2] > 0.0 && without.iter().all(|n| *n == 0));
+    // Obstacles are what either map says is there, and so no more than both together; a point in a thousand at most.
+    assert!(ghosts[0] <= ghosts[1] + ghosts[2] && ghosts[0] < 1e-3, "{ghosts:?}");
 }
