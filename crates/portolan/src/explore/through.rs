@@ -47,24 +47,31 @@ pub struct GainThrough {
 /// Where the two maps have not one lattice.
 ///
 /// ```
+/// use portolan::cell::{DistanceBrick, HitLength, HitLengthBrick, LENGTH_UNITS, Planes};
 /// use portolan::explore::{GainSettings, expected_gain, expected_gain_through, fan};
-/// use portolan::geom::Pose;
-/// use portolan::scan::{RangeLimits, Scan};
-/// use portolan::{Mapper, MapperSettings};
+/// use portolan::geom::{BlockKey, Lattice, Pose};
+/// use portolan::store::Bricks;
 ///
-/// // A hedge at 1 m stops two beams in three; the others go 1.5 m farther.
-/// let mut mapper = Mapper::with(MapperSettings::<2>::new(0.1));
-/// let bearings: Vec<f64> = (0..400).map(|i| 1e-4 * f64::from(i)).collect();
-/// let ranges: Vec<f64> = (0..400).map(|i| if i % 3 > 0 { 1.02 } else { 2.52 }).collect();
-/// let pose = Pose::<2>::new(0.05, 0.05, 0.0);
-/// mapper.integrate(&pose, &Scan::from_laser(&bearings, &ranges, &RangeLimits::default()))?;
-/// let (Some(tsdf), Some(hits)) = (mapper.tsdf(), mapper.attenuation()) else { panic!("both are made") };
+/// // 8 x 8 cells of 10 cm, free but for a hedge on the right, in which a beam ends per cell's length.
+/// let lattice = Lattice::new([0.0, 0.0], 0.1);
+/// let (mut distances, mut hits) = (Bricks::new(lattice), Bricks::new(lattice));
+/// let hedge = |i: usize| i % 8 == 7;
+/// let known: Vec<f32> = (0..64).map(|i| if hedge(i) { -0.1 } else { 0.3 }).collect();
+/// distances.insert(BlockKey([0, 0]), DistanceBrick::from_parts(&known, &[1.0; 64]).expect("sane"))?;
+/// let mut counts = HitLengthBrick::unobserved(64);
+/// let count = |i| HitLength { hits: if hedge(i) { 40 } else { 0 }, length: 40 * LENGTH_UNITS, looks: 40 };
+/// (0..64).for_each(|i| counts.set(i, Some(count(i))));
+/// hits.insert(BlockKey([0, 0]), counts)?;
 ///
-/// let (rays, settings) = (fan(0.0, 0.04, 50), GainSettings::of(tsdf));
-/// let sign = expected_gain(tsdf.store(), &pose, &rays, &settings);
-/// let through = expected_gain_through(tsdf.store(), hits.store(), &pose, &rays, &settings);
-/// println!("by the sign {} m2, through the hedge {} m2", sign.volume, through.volume);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// // A single ray to the right ends at the hedge by the sign. A beam in e gets through, to 2 unknown cells in 15 cm.
+/// let pose = Pose::<2>::new(0.45, 0.45, 0.0);
+/// let (ray, settings) = (fan(0.0, 0.0, 1), GainSettings { penetration: 0.15, ..Default::default() });
+/// let sign = expected_gain(&distances, &pose, &ray, &settings);
+/// let through = expected_gain_through(&distances, &hits, &pose, &ray, &settings);
+/// let passed = (-1.0_f64).exp();
+/// assert_eq!((sign.hit, sign.cells), (1, 0));
+/// assert!((through.unknown - passed).abs() < 1e-9 && (through.cells - 2.0 * passed).abs() < 1e-9);
+/// # Ok::<(), portolan::store::StoreFull>(())
 /// ```
 pub fn expected_gain_through<const D: usize>(
     store: &Bricks<SignedDistance, D>,
