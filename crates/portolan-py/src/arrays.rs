@@ -250,3 +250,19 @@ pub(crate) fn answers<'py>(
     let statuses = all.iter().map(|a| a.status().byte()).collect();
     Ok((array(py, values, leading)?, array(py, statuses, leading)?))
 }
+
+/// What a map of either dimension says at each of the points, which are of its dimension.
+macro_rules! at_points {
+    ($py:expr, $of:expr, $points:expr, |$map:ident, $p:ident| $answer:expr) => {
+        match ($of, $points.chunks()?) {
+            ($crate::dimension::Either::Two($map), $crate::dimension::Either::Two(all)) => {
+                $crate::arrays::each($py, all, |&$p| $answer)?
+            }
+            ($crate::dimension::Either::Three($map), $crate::dimension::Either::Three(all)) => {
+                $crate::arrays::each($py, all, |&$p| $answer)?
+            }
+            _ => return Err($crate::fault::value_error("points and map are of different dimensions")),
+        }
+    };
+}
+pub(crate) use at_points;

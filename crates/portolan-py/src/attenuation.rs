@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use numpy::PyArrayDyn;
-use portolan::Answer;
 use portolan::beam_model::RangeDistribution;
 use portolan::geom::vector::unit;
 use portolan::store::Store;
 use pyo3::prelude::*;
 
-use crate::arrays::{Answers, Points, answers, array, each};
+use crate::arrays::{Answers, Points, answers, array, at_points, each};
 use crate::dimension::{Either, either};
 use crate::fault::value_error;
 use crate::tsdf::{check_range, check_rays};
@@ -52,11 +51,7 @@ impl Attenuation {
     /// Hits per meter of the cells that hold the points (1/m).
     fn attenuation<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Answers<'py>> {
         let points = Points::in_dimension(points, "points", self.0.dimension())?;
-        let found: Vec<Answer<f64>> = match (&*self.0, points.chunks()?) {
-            (Either::Two(map), Either::Two(points)) => each(py, points, |p| map.attenuation(*p))?,
-            (Either::Three(map), Either::Three(points)) => each(py, points, |p| map.attenuation(*p))?,
-            _ => Vec::new(),
-        };
+        let found = at_points!(py, &*self.0, points, |map, p| map.attenuation(p));
         answers(py, found, points.leading())
     }
 

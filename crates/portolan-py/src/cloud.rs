@@ -1,10 +1,9 @@
 //! Points under a k-d tree.
 
 use numpy::PyArrayDyn;
-use portolan::Answer;
 use pyo3::prelude::*;
 
-use crate::arrays::{Points, array, each, rows};
+use crate::arrays::{Points, array, at_points, rows};
 use crate::dimension::{Either, either};
 use crate::fault::{value_error, work};
 
@@ -40,16 +39,8 @@ impl Cloud {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let points = Points::in_dimension(points, "points", self.0.dimension())?;
-        let found: Vec<Answer<f64>> = match (&self.0, points.chunks()?) {
-            (Either::Two(cloud), Either::Two(points)) => {
-                each(py, points, |p| cloud.nearest_distance(*p).map_or(Answer::Unknown, Answer::Known))?
-            }
-            (Either::Three(cloud), Either::Three(points)) => {
-                each(py, points, |p| cloud.nearest_distance(*p).map_or(Answer::Unknown, Answer::Known))?
-            }
-            _ => Vec::new(),
-        };
-        let distances = found.into_iter().map(|a| a.value().unwrap_or(f64::NAN)).collect();
+        let distances =
+            at_points!(py, &self.0, points, |cloud, p| cloud.nearest_distance(p).unwrap_or(f64::NAN));
         array(py, distances, points.leading())
     }
 

@@ -10,7 +10,7 @@ use portolan::plan::{Demand, Waypoints, check_path};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Answers, Numbers, Points, answers, array, each, rows};
+use crate::arrays::{Answers, Numbers, Points, answers, array, at_points, each, rows};
 use crate::dimension::{Either, either};
 use crate::fault::{value_error, work};
 use crate::path::PathCheck;
@@ -91,11 +91,7 @@ impl Esdf {
     /// Distances at the points.
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Answers<'py>> {
         let points = Points::in_dimension(points, "points", self.0.dimension())?;
-        let found: Vec<Answer<f64>> = match (&*self.0, points.chunks()?) {
-            (Either::Two(field), Either::Two(points)) => each(py, points, |p| field.distance(*p))?,
-            (Either::Three(field), Either::Three(points)) => each(py, points, |p| field.distance(*p))?,
-            _ => Vec::new(),
-        };
+        let found = at_points!(py, &*self.0, points, |field, p| field.distance(p));
         answers(py, found, points.leading())
     }
 
@@ -129,13 +125,8 @@ impl Esdf {
     {
         let unknown = unknown_of(unknown)?;
         let points = Points::in_dimension(points, "points", self.0.dimension())?;
-        let found: Vec<Answer<Clearance>> = match (&*self.0, points.chunks()?) {
-            (Either::Two(field), Either::Two(points)) => each(py, points, |p| field.clearance(*p, unknown))?,
-            (Either::Three(field), Either::Three(points)) => {
-                each(py, points, |p| field.clearance(*p, unknown))?
-            }
-            _ => Vec::new(),
-        };
+        let found: Vec<Answer<Clearance>> =
+            at_points!(py, &*self.0, points, |field, p| field.clearance(p, unknown));
         // The side is in the sign, as that of distances is: inside of an obstacle the bounds change places.
         let bounds = |a: &Answer<Clearance>| match a.value() {
             Some(c) if c.inside => [-c.upper, -c.lower],

@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use numpy::PyArrayDyn;
-use portolan::Answer;
 use portolan::cell::LogOddsValue;
 use portolan::store::Store;
 use pyo3::prelude::*;
 
-use crate::arrays::{Answers, Points, answers, array, each, rows};
+use crate::arrays::{Answers, Points, answers, array, at_points, rows};
 use crate::dimension::{Either, either};
 use crate::fault::work;
 
@@ -47,11 +46,7 @@ impl Occupancy {
     /// Probability of being occupied of the cells that hold the points.
     fn occupancy<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Answers<'py>> {
         let points = Points::in_dimension(points, "points", self.0.dimension())?;
-        let found: Vec<Answer<f64>> = match (&*self.0, points.chunks()?) {
-            (Either::Two(map), Either::Two(points)) => each(py, points, |p| map.probability(*p))?,
-            (Either::Three(map), Either::Three(points)) => each(py, points, |p| map.probability(*p))?,
-            _ => Vec::new(),
-        };
+        let found = at_points!(py, &*self.0, points, |map, p| map.probability(p));
         answers(py, found, points.leading())
     }
 

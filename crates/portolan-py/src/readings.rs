@@ -11,6 +11,9 @@ use crate::fault::value_error;
 /// A scan of either dimension.
 pub(crate) type AnyScan = Either<Scan<2>, Frame>;
 
+/// Depth cameras do not see so far (meters): such readings are in another unit, unless it is said.
+const FAR: f32 = 100.0;
+
 /// The arguments of `integrate` that are about readings.
 pub(crate) struct Readings<'a, 'py> {
     pub(crate) points: Option<&'a Bound<'py, PyAny>>,
@@ -166,6 +169,13 @@ impl<'py> Readings<'_, 'py> {
         if let Some(i) = angles.iter().position(|v| !v.is_finite()) {
             return Err(value_error(format!("bearings: number {i} is {}", angles[i])));
         }
+        let (least, most) = angles.iter().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
+        // A seam that is named twice is a little more than a turn.
+        if most - least > 1.05 * std::f64::consts::TAU {
+            return Err(value_error(format!(
+                "bearings: from {least} to {most} is more than a turn; they are radians, not degrees"
+            )));
+        }
         let one_each = |n: usize| match bearings.shape() == [n] {
             true => Ok(()),
             false => Err(bearings.wrong(bearings.shape(), &format!("{n} bearings, one for each range,"))),
@@ -224,6 +234,16 @@ impl<'py> Readings<'_, 'py> {
             true => depth.as_slice()?.to_vec(),
             false => depth.as_slice()?.iter().map(|d| (f64::from(*d) / scale) as f32).collect(),
         };
+        if self.depth_scale.is_none() {
+            let mut seen: Vec<f32> = depths.iter().copied().filter(|d| *d > 0.0).collect();
+            let middle = seen.len() / 2;
+            if !seen.is_empty() && *seen.select_nth_unstable_by(middle, f32::total_cmp).1 > FAR {
+                return Err(value_error(format!(
+                    "depth: half of the readings are beyond {FAR} m; give depth_scale, 1000 where they are millimeters, 1 where they \
+                     are meters"
+                )));
+            }
+        }
         let mut image = RangeImage::from_depth(camera, columns, rows, depths);
         if let Some(colors) = self.colors {
             image = image.with_colors(colors_of(colors, &[rows, columns, 3], "depth")?);

@@ -1,8 +1,8 @@
 //! Meshes and contours.
 
 use numpy::PyArrayDyn;
-use portolan_cli::library::picture_of_mesh;
-use portolan_io::{Polyline, SvgStyle, svg_text};
+use portolan_cli::library::{picture_of_mesh, polylines};
+use portolan_io::{SvgStyle, svg_text};
 use pyo3::prelude::*;
 
 use crate::arrays::rows;
@@ -15,18 +15,6 @@ pub(crate) struct Mesh(pub(crate) portolan::surface::Mesh);
 /// Segments with shared vertices; free space lies on the left of every segment.
 #[pyclass(frozen, module = "portolan")]
 pub(crate) struct Contour(portolan::surface::Contour);
-
-/// The lines of a contour; closed ones repeat their first point.
-fn lines(contour: &portolan::surface::Contour) -> Vec<Polyline> {
-    let closed = |line: portolan::surface::Polyline| {
-        let mut points = line.vertices;
-        if line.closed {
-            points.extend(points.first().copied());
-        }
-        points
-    };
-    contour.polylines().into_iter().map(closed).collect()
-}
 
 impl Mesh {
     pub(crate) fn new(mesh: portolan::surface::Mesh) -> Self {
@@ -104,12 +92,13 @@ impl Contour {
     }
 
     /// The lines that the segments make, an array of points each; closed ones repeat their first point.
-    fn polylines<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArrayDyn<f64>>>> {
+    #[pyo3(name = "polylines")]
+    fn lines<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArrayDyn<f64>>>> {
         let array = |points: Vec<_>| {
             let n = points.len();
             rows(py, points, &[n])
         };
-        lines(&self.0).into_iter().map(array).collect()
+        polylines(&self.0).into_iter().map(array).collect()
     }
 
     /// Length of all segments (meters).
@@ -121,7 +110,7 @@ impl Contour {
     /// What notebooks show: the lines, one unit a meter.
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
         let text =
-            work(py, || svg_text(&lines(&self.0), &SvgStyle { size_px: 600.0, ..SvgStyle::default() }))?;
+            work(py, || svg_text(&polylines(&self.0), &SvgStyle { size_px: 600.0, ..SvgStyle::default() }))?;
         text.map_err(|error| value_error(error.to_string()))
     }
 

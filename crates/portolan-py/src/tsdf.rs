@@ -9,7 +9,7 @@ use portolan::surface::{RayCast, RayCastSettings, RayCaster};
 use portolan::{Answer, Status};
 use pyo3::prelude::*;
 
-use crate::arrays::{Answers, Points, answers, array, each, rows, shown};
+use crate::arrays::{Answers, Points, answers, array, at_points, each, rows, shown};
 use crate::dimension::{Either, either};
 use crate::fault::{value_error, work};
 
@@ -87,11 +87,7 @@ impl Tsdf {
     /// The estimates of the cells that hold the points.
     fn distance<'py>(&self, py: Python<'py>, points: &Bound<'py, PyAny>) -> PyResult<Answers<'py>> {
         let points = Points::in_dimension(points, "points", self.0.dimension())?;
-        let found: Vec<Answer<f64>> = match (&*self.0, points.chunks()?) {
-            (Either::Two(map), Either::Two(points)) => each(py, points, |p| map.signed_distance(*p))?,
-            (Either::Three(map), Either::Three(points)) => each(py, points, |p| map.signed_distance(*p))?,
-            _ => Vec::new(),
-        };
+        let found = at_points!(py, &*self.0, points, |map, p| map.signed_distance(p));
         answers(py, found, points.leading())
     }
 
@@ -132,11 +128,7 @@ impl Tsdf {
         points: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyArrayDyn<u8>>, Bound<'py, PyArrayDyn<u8>>)> {
         let points = Points::in_dimension(points, "points", self.0.dimension())?;
-        let found: Vec<Option<portolan::cell::Color>> = match (&*self.0, points.chunks()?) {
-            (Either::Two(map), Either::Two(points)) => each(py, points, |p| map.color(*p))?,
-            (Either::Three(map), Either::Three(points)) => each(py, points, |p| map.color(*p))?,
-            _ => Vec::new(),
-        };
+        let found = at_points!(py, &*self.0, points, |map, p| map.color(p));
         let status = |there: bool| (if there { Status::Known } else { Status::Unknown }).byte();
         let statuses = found.iter().map(|color| status(color.is_some())).collect();
         let colors: Vec<_> = found.iter().map(|color| color.map_or([0; 3], |color| color.rgb8())).collect();

@@ -83,6 +83,8 @@ def test_poses(pose, words):
         (dict(depth=np.ones((4, 4)), intrinsics=[1, 1, 1, 1], depth_scale=0), "depth_scale.*0"),
         (dict(depth=np.ones((4, 4)), intrinsics=[0, 1, 1, 1]), "depth: "),
         (dict(depth=np.ones((4, 4)), intrinsics=[[1, 2, 0], [0, 1, 0], [0, 0, 1]]), "intrinsics: .*skew"),
+        (dict(depth=np.full((4, 4), 1500.0), intrinsics=[1, 1, 1, 1]), "depth: .*depth_scale"),
+        (dict(ranges=np.ones(360), bearings=np.arange(360)), "bearings: .*more than a turn.*degrees"),
         (dict(depth=np.ones(4), intrinsics=[1, 1, 1, 1]), r"depth: .*\(4,\)"),
         (dict(depth=np.ones((0, 4)), intrinsics=[1, 1, 1, 1]), "depth: "),
     ],

@@ -1,5 +1,6 @@
 """Logs: scans as arrays, and the same map as the command line makes, bit for bit."""
 
+import json
 import subprocess
 import sys
 
@@ -58,6 +59,17 @@ def test_a_3d_log_is_the_map_of_the_command_line(tmp_path):
     same_cells(ours, theirs, centers)
     assert np.array_equal(ours.mesh().vertices, theirs.mesh().vertices)
     assert np.array_equal(ours.mesh().colors, theirs.mesh().colors)
+
+
+def test_what_a_mapper_does_not_say_stays_in_the_file(tmp_path):
+    path = data("lidar2d_carmen/intel-corrected.log.gz")
+    command_line("map", path, "--resolution", 0.1, "--every", 50, "--max-range", 7, "--out", tmp_path)
+    first = command_line("info", tmp_path, "--json")
+    portolan.load(tmp_path).save(tmp_path / "again.portolan")
+    again = command_line("info", tmp_path / "again.portolan", "--json")
+    settings = [json.loads(text)["settings"] for text in (first, again)]
+    assert settings[0]["max_range"] == settings[1]["max_range"] == 7
+    assert settings[0]["truncation"] == settings[1]["truncation"] and settings[0]["maps"] == settings[1]["maps"]
 
 
 def test_scans_are_arrays():

@@ -76,7 +76,8 @@ pub fn save_2d(mapper: Mapper<2>, rest: MapFile<2>, path: &Path) -> anyhow::Resu
 
 /// The maps put into the rest of a file.
 pub(super) fn in_file_2d(mapper: Mapper<2>, mut rest: MapFile<2>, path: &Path) -> anyhow::Result<MapFile<2>> {
-    let settings = Settings::of_mapper(mapper.settings(), Dimension::Two);
+    let before = Settings::of_saved(&rest.header.settings);
+    let settings = Settings::of_mapper(mapper.settings(), Dimension::Two, before);
     describe(&mapper, &settings, &mut rest.header);
     let grid = grid(&mapper, path)?;
     let kinds = OccupancyKinds::of(&settings, &rest);
@@ -89,7 +90,8 @@ pub(super) fn in_file_2d(mapper: Mapper<2>, mut rest: MapFile<2>, path: &Path) -
 /// # Errors
 /// A map without scans; a file that cannot be written.
 pub fn save_3d(mapper: Mapper<3>, mut rest: MapFile<3>, path: &Path) -> anyhow::Result<()> {
-    let settings = Settings::of_mapper(mapper.settings(), Dimension::Three);
+    let before = Settings::of_saved(&rest.header.settings);
+    let settings = Settings::of_mapper(mapper.settings(), Dimension::Three, before);
     describe(&mapper, &settings, &mut rest.header);
     ensure!(!bricks(&mapper).is_empty(), "{}: nothing was fused, there is no map to write", path.display());
     mapping::store_3d(mapper, &mut rest);

@@ -13,7 +13,7 @@ const LARGEST_DENSE: usize = 256 << 20;
 const DENSE_CELL: usize = 5;
 
 /// The lines of a contour as files hold them: closed ones repeat their first point.
-pub(crate) fn polylines(contour: &Contour) -> Vec<Polyline> {
+pub fn polylines(contour: &Contour) -> Vec<Polyline> {
     let closed = |line: portolan::surface::Polyline| {
         let mut points = line.vertices;
         if line.closed {

@@ -30,7 +30,8 @@ pub(crate) use artifacts::{Artifacts, title};
 pub(crate) use choices::MapKind;
 pub(crate) use derived::{Derived, DistanceField};
 pub(crate) use extent::{brick_extent, check_memory, grid_over, seen, with_outlier};
-pub(crate) use files::{dense_esdf, polylines, write_contour, write_mesh};
+pub use files::polylines;
+pub(crate) use files::{dense_esdf, write_contour, write_mesh};
 pub(crate) use fuse::{FusionReport, fuse_2d};
 pub(crate) use map_server::{cells_for_map_server, grid_of};
 pub(crate) use mapper::{

@@ -44,8 +44,13 @@ pub(super) fn mapper_settings<const D: usize>(
 }
 
 impl Settings {
-    /// The inverse: what a file says of maps that were made by this recipe.
-    pub(crate) fn of_mapper<const D: usize>(how: &MapperSettings<D>, dimension: Dimension) -> Self {
+    /// The inverse: what a file says of maps that were made by this recipe. What a recipe does not say, as the limits of range,
+    /// stays as it was.
+    pub(crate) fn of_mapper<const D: usize>(
+        how: &MapperSettings<D>,
+        dimension: Dimension,
+        before: Self,
+    ) -> Self {
         let sweep = match dimension {
             Dimension::Two if how.beams == BeamSweep::March => SweepArg::March,
             Dimension::Two => SweepArg::CellCentre,
@@ -62,11 +67,12 @@ impl Settings {
                 carve: how.carve,
                 carve_weight: how.carve_weight,
                 color: how.color,
-                ..Shape::default()
+                ..before.shape
             },
             max_distance: how.max_distance,
             thin: how.thin,
-            ..Self::default()
+            maps: Vec::new(),
+            ..before
         }
         .resolved(dimension);
         settings.keep(&[
