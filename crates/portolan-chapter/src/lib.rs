@@ -33,7 +33,7 @@
 //! let settings = GallerySettings::new(grid, 1000, Some(world.wall_length()));
 //! let start = std::time::Instant::now();
 //! let gallery = run(&log, &settings, Some(&world as &dyn Truth<2>), &mut || start.elapsed().as_secs_f64())?;
-//! assert_eq!(gallery.rows.len(), 8);
+//! assert_eq!(gallery.rows.len(), 9);
 //! # Ok::<(), portolan::map::MapError>(())
 //! ```
 

@@ -16,6 +16,15 @@ fn number_that(text: &str, fits: impl Fn(f64) -> bool, must_be: &str) -> Result<
     number(text).and_then(|v| if fits(v) { Ok(v) } else { Err(format!("must be {must_be}")) })
 }
 
+/// A part of a number of parts, as 3/8.
+pub(crate) fn shard(text: &str) -> Result<(usize, usize), String> {
+    let numbers = text.split_once('/').map(|(part, parts)| (part.trim().parse(), parts.trim().parse()));
+    match numbers {
+        Some((Ok(part), Ok(parts))) if (1..=parts).contains(&part) && parts <= 1_000_000 => Ok((part, parts)),
+        _ => Err("must be a part and a number of parts, like 3/8, counted from 1".to_owned()),
+    }
+}
+
 /// A length above zero.
 pub(crate) fn length(text: &str) -> Result<f64, String> {
     number_that(text, |v| v > 0.0 && v.is_finite(), "a positive, finite length in meters, like 0.05")

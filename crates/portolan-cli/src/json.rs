@@ -72,6 +72,19 @@ pub(crate) fn add_counts(sum: &mut Map<String, Value>, other: &Map<String, Value
     }
 }
 
+/// Takes the numbers of `other` from those of `sum`, field by field.
+pub(crate) fn take_counts(sum: &mut Map<String, Value>, other: &Map<String, Value>) {
+    for (key, value) in other {
+        match (sum.get_mut(key), value) {
+            (Some(Value::Object(a)), Value::Object(b)) => take_counts(a, b),
+            (Some(a), b) if a.is_u64() && b.is_u64() => {
+                *a = json!(a.as_u64().unwrap_or(0).saturating_sub(b.as_u64().unwrap_or(0)));
+            }
+            _ => {}
+        }
+    }
+}
+
 /// What else was found in a 2-D log.
 pub(crate) fn log_stats(stats: &CarmenStats) -> Value {
     let by_cause: Map<_, _> =

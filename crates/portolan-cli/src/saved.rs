@@ -9,6 +9,7 @@ use portolan_io::{Container, IoError, MapFile, MapHeader, map_dimension};
 
 use crate::dimension::Dimension;
 use crate::esdf::is_of_points;
+use crate::mapping::{Settings, in_file_2d, in_file_3d};
 
 /// A saved map.
 pub(crate) enum SavedMap {
@@ -27,6 +28,8 @@ impl SavedMap {
             3 => Self::Three(Box::new(MapFile::from_container(&container, memory)?)),
             _ => Self::Two(Box::new(MapFile::from_container(&container, memory)?)),
         };
+        drop(container);
+        let map = map.with_maps_of_sums()?;
         let (held, has, wanted) = match &map {
             Self::Two(file) => ("2-D", file.has_bricks(), "an array (Dense::of_bricks)"),
             Self::Three(file) => ("3-D", file.has_arrays(), "bricks (Bricks::of_dense)"),
@@ -38,6 +41,31 @@ impl SavedMap {
             );
         }
         Ok(map)
+    }
+
+    /// With the maps that follow from sums, where it holds sums.
+    pub(crate) fn with_maps_of_sums(self) -> anyhow::Result<Self> {
+        Ok(match self {
+            Self::Two(mut file) => match file.ledger.take() {
+                Some(ledger) => {
+                    let settings = Settings::of_saved(&file.header.settings).resolved(Dimension::Two);
+                    in_file_2d(ledger, file, &settings)?.0
+                }
+                None => Self::Two(file),
+            },
+            Self::Three(mut file) => match file.ledger.take() {
+                Some(ledger) => in_file_3d(ledger, file)?.0,
+                None => Self::Three(file),
+            },
+        })
+    }
+
+    /// Whether it holds sums.
+    pub(crate) fn is_ledger(&self) -> bool {
+        match self {
+            Self::Two(file) => file.ledger.is_some(),
+            Self::Three(file) => file.ledger.is_some(),
+        }
     }
 
     /// Reads a map to go on with.
@@ -100,7 +128,11 @@ impl SavedMap {
                 ]
             }
         };
-        named.into_iter().filter_map(|(name, bytes)| Some((name, bytes?))).collect()
+        let sums = match self {
+            Self::Two(file) => file.ledger.as_ref().map(|ledger| ledger.memory_bytes()),
+            Self::Three(file) => file.ledger.as_ref().map(|ledger| ledger.memory_bytes()),
+        };
+        named.into_iter().chain([("sums", sums)]).filter_map(|(name, bytes)| Some((name, bytes?))).collect()
     }
 }
 

@@ -56,6 +56,14 @@ pub enum IoError {
         /// What to do.
         advice: String,
     },
+    /// A map of sums does not fit those that it is to be added to, or taken out of.
+    #[error("{}: {cause}", shown_path(path))]
+    Ledger {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: portolan::ledger::LedgerError,
+    },
     /// A field of a binary file is wrong.
     #[error("{}: byte {offset}: {field} is {value}; {advice}", shown_path(path))]
     Binary {
@@ -192,6 +200,7 @@ impl IoError {
             | Self::Compression { path, .. }
             | Self::Text { path, .. }
             | Self::Binary { path, .. }
+            | Self::Ledger { path, .. }
             | Self::NoScans { path, .. }
             | Self::Layout { path, .. }
             | Self::Bag { path, .. }

@@ -87,8 +87,8 @@ pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use laser_log::{LaserLog, LaserLogStats, RawLaserScan, TimeOrder, detect_no_return};
 pub use log_writer::{LogLayout, LogWriter};
 pub use map_file::{
-    AttenuationBricks, ColorBricks, MapFile, MapHeader, OccupancyBricks, TsdfBricks, map_dimension, sweep_of,
-    sweep_word, weights_of, weights_word,
+    AttenuationBricks, ColorBricks, LedgerFile, MapFile, MapHeader, OccupancyBricks, TsdfBricks,
+    add_ledger_files, map_dimension, scans_of_sum, sweep_of, sweep_word, weights_of, weights_word,
 };
 pub use map_messages::{MapMessages, write_map_mcap};
 pub use map_server::{MapCell, MapMode, MapServerInfo, MapServerMap, write_map_server};

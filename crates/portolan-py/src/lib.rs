@@ -13,6 +13,7 @@ mod esdf;
 mod events;
 mod fault;
 mod isosurface;
+mod ledger;
 mod log;
 mod mapper;
 mod occupancy;
@@ -41,6 +42,8 @@ mod _portolan {
     use crate::fault::MapFull;
     #[pymodule_export]
     use crate::isosurface::marching_cubes;
+    #[pymodule_export]
+    use crate::ledger::Ledger;
     #[pymodule_export]
     use crate::log::{Log, Scan, open};
     #[pymodule_export]

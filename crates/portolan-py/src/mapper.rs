@@ -51,6 +51,28 @@ fn other_dimension(scan: usize, map: usize) -> PyErr {
 }
 
 impl Mapper {
+    /// A mapper that goes on with these maps.
+    pub(crate) fn of_maps(
+        options: Options,
+        maps: Either<portolan::Mapper<2>, portolan::Mapper<3>>,
+        poses: Either<Vec<Pose<2>>, Vec<Pose<3>>>,
+    ) -> Self {
+        let mut held = match maps {
+            Either::Two(mapper) => {
+                Either::Two(Box::new(Held { mapper, rest: MapFile::default(), camera: false }))
+            }
+            Either::Three(mapper) => {
+                Either::Three(Box::new(Held { mapper, rest: MapFile::default(), camera: false }))
+            }
+        };
+        match (&mut held, poses) {
+            (Either::Two(held), Either::Two(poses)) => held.rest.poses = poses,
+            (Either::Three(held), Either::Three(poses)) => held.rest.poses = poses,
+            _ => {}
+        }
+        Self { options, held: Mutex::new(Some(held)) }
+    }
+
     /// Works on the maps with the interpreter released.
     fn with<T: Send>(&self, py: Python<'_>, f: impl FnOnce(&mut Maps) -> T + Send) -> PyResult<T> {
         let done = work(py, || {

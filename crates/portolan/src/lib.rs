@@ -36,6 +36,7 @@
 //! | is this path free, this pose of a robot, and where would it be? | [`plan`] over a field | steps of the clearance |
 //! | what share of beams does a cell stop, and what would a sensor read along a ray? | [`map::Attenuation`], [`beam_model::RangeDistribution`] | one look-up; one walk |
 //! | where does the known end, and what would be seen from there? | [`explore`] over a map | changed bricks |
+//! | what of many maps together, or without a scan, or with it elsewhere? | [`Ledger`], whose evidence adds up | a pass over the cells of the difference |
 //! | how near is the nearest measurement? | [`map::Cloud`] | a k-d tree |
 
 mod answer;
@@ -45,6 +46,7 @@ pub mod explore;
 pub mod field;
 pub mod geom;
 pub mod handover;
+pub mod ledger;
 pub mod map;
 pub mod mapper;
 mod parallel;
@@ -58,6 +60,7 @@ pub mod sweep;
 mod testing;
 
 pub use answer::{Answer, Status};
+pub use ledger::Ledger;
 pub use mapper::{Mapper, MapperSettings};
 
 /// The code of the front page of the project is compiled as it is printed.

@@ -1,4 +1,4 @@
-//! Exercise 7: reflectance beside depth, on named seeds. The behaviours are tested in `tests/radiance.rs`.
+//! Exercise 7: reflectance beside depth, on named seeds. The behaviours are tested in `tests/all/radiance.rs`.
 
 use crate::page::check;
 use portolan_chapter::radiance::{Channels, Experiment, NamedSeed, Outcome, PARKED, TWO_NOT_ENOUGH, Terms};

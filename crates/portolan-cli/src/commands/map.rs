@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
@@ -10,18 +10,21 @@ use portolan::geom::Aabb;
 use portolan::scan::ScanStats;
 use portolan_io::{detect_no_return, write_atomic};
 
-use crate::arguments::{box3, bytes};
+use crate::arguments::{box3, bytes, length_or_zero, shard};
 use crate::dimension::{Dimension, Given, ONLY_3D};
 use crate::error::bad_call;
 use crate::esdf::check_thin;
 use crate::json;
 use crate::log::{self, Log, LogArgs, Wanted};
-use crate::mapping::{Artifacts, Derived, Limits, MapKind, Run, Settings, Summary, report, title};
+use crate::mapping::{
+    Artifacts, Derived, FusionReport, Limits, MapKind, Run, Settings, Summary, TOO_LARGE, Written, report,
+    title,
+};
 use crate::output::Output;
 use crate::progress::Progress;
 use crate::saved::SavedMap;
 
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 #[command(after_help = "Examples:\n  portolan map intel-corrected.log.gz --resolution 0.05 --out intel\n  \
                   portolan map rgbd_redkitchen --resolution 0.02 --out kitchen")]
 pub(crate) struct Args {
@@ -38,6 +41,18 @@ pub(crate) struct Args {
     /// Add the log to the map in DIR. Settings that are not given are those of the map, except --bounds
     #[arg(long)]
     append: bool,
+    /// Map only part I of N of the log's scans, as sums (--ledger): `merge` adds the parts up to the map of the whole log,
+    /// the same bytes. Writes the map alone
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<(usize, usize)>,
+    /// Move the scans of the map in DIR, which was made with --ledger, to these poses of the same log: the map becomes that
+    /// of the log with these poses, the same bytes. --poses and the like are those that it was made with
+    #[arg(long, value_name = "POSES", conflicts_with_all = ["append", "shard"])]
+    repose: Option<PathBuf>,
+    /// Leave scans where they are whose sensor, and whatever it sees 10 m away, moves by no more than this (meters) [default:
+    /// 0]
+    #[arg(long, value_name = "M", value_parser = length_or_zero, requires = "repose", allow_negative_numbers = true)]
+    tolerance: Option<f64>,
     /// Number of threads [default: one per core]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), allow_negative_numbers = true)]
     threads: Option<u16>,
@@ -62,37 +77,48 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     stages.end("read");
 
     let (fused, held_out) = settings.selection().split(log.len());
+    let fused = args.part(fused);
     let (log_name, map_name) = (args.log.display().to_string(), args.map_path().display().to_string());
     let memory = usize::try_from(args.memory).unwrap_or(usize::MAX);
     let limits = Limits { memory, log: &log_name, map: &map_name };
     let mut run = Run::new(&log, &fused, &settings, before, &limits)?;
     stages.end("prepare");
 
-    let progress = Progress::new(run.scans(), "fusing", args.output);
-    let fusion = run.fuse(threads, &progress);
-    drop(progress);
+    let (fusion, taken) = match &args.repose {
+        Some(poses) => args.repose(poses, &mut run, &log, &settings)?,
+        None => {
+            let progress = Progress::new(run.scans(), "fusing", args.output);
+            (run.fuse(threads, &progress), ScanStats::default())
+        }
+    };
     stages.end("fuse");
-    if let (0, (_, Some(error))) = (fusion.stats.scans, &fusion.unreadable) {
+    if let (0, None, (_, Some(error))) = (fusion.stats.scans, &args.repose, &fusion.unreadable) {
         // Not one scan could be used: the first error is of more use than an empty map.
         bail!("{error}");
     }
-    let (mut file, extent) = run.finish()?;
+    let (mut file, extent, aside) = run.finish(&settings)?;
     stages.end("store");
     let mut bytes = file.bytes();
-    describe(&mut file, &settings, &log, &fusion.stats);
+    describe(&mut file, &settings, &log, &fusion.stats, &taken);
     args.make_folder()?;
     // Before anything is derived from it: whatever happens then, what was fused is saved.
-    file.write(&args.map_path())?;
+    match &aside {
+        Some(parts) => parts.add_up(&mut file, &args.map_path(), args.memory)?,
+        None => file.write(&args.map_path())?,
+    }
     stages.end("save");
+    let alone = args.shard.is_some() || aside.is_some();
 
-    let derived = Derived::of(&file, &settings, memory);
+    let derived =
+        if args.shard.is_some() { Derived::default() } else { Derived::of(&file, &settings, memory) };
     bytes.extend(derived.bytes());
     let header = file.header();
     let title = title(&header.logs, settings.resolution(), header.scans);
     let (dense, camera) = (args.dense, log.is_of_camera());
-    let written =
-        Artifacts { file: &file, derived: &derived, dense, edge: settings.resolution(), camera, title }
-            .write(&args.out)?;
+    let artifacts =
+        Artifacts { file: &file, derived: &derived, dense, edge: settings.resolution(), camera, title };
+    let mut written = if alone { Written::of_map_alone(&args.out)? } else { artifacts.write(&args.out)? };
+    written.notes.extend(aside.as_ref().filter(|_| args.shard.is_none()).map(|_| TOO_LARGE.to_owned()));
     let mut seconds = stages.total();
     seconds.extend(fusion.seconds.iter().chain(&derived.seconds).chain(&written.seconds));
     let mut files = written.files;
@@ -124,11 +150,15 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the log, the settings and the counts into the header.
-fn describe(file: &mut SavedMap, settings: &Settings, log: &Log, stats: &ScanStats) {
+/// Writes the log, the settings and the counts into the header: of scans that were added, and of those that were taken out.
+fn describe(file: &mut SavedMap, settings: &Settings, log: &Log, stats: &ScanStats, taken: &ScanStats) {
     let header = file.header_mut();
-    header.logs.push(log.name());
-    header.scans += stats.scans;
+    // A ledger knows its scans.
+    if !settings.shape.ledger {
+        header.logs.push(log.name());
+        header.scans += stats.scans;
+    }
+    json::take_counts(&mut header.statistics, &json::object(json::stats(taken)));
     header.every = settings.every;
     header.hold_out = settings.shape.hold_out;
     header.settings = settings.to_json();
@@ -140,10 +170,45 @@ impl Args {
         self.out.join("map.portolan")
     }
 
+    /// Those of the scans that are of this part.
+    fn part(&self, scans: Vec<usize>) -> Vec<usize> {
+        match self.shard {
+            Some((part, parts)) => {
+                let [from, to] = [part - 1, part].map(|i| scans.len() * i / parts);
+                scans[from..to].to_vec()
+            }
+            None => scans,
+        }
+    }
+
+    /// Moves scans to other poses. Returns what is to be said of those that moved, and what taking them away did.
+    fn repose(
+        &self,
+        poses: &Path,
+        run: &mut Run,
+        log: &Log,
+        settings: &Settings,
+    ) -> anyhow::Result<(FusionReport, ScanStats)> {
+        let Run::Sums(run) = run else { bail!("{}: holds no sums", self.map_path().display()) };
+        let source = LogArgs { poses: Some(poses.to_owned()), ..self.source.clone() };
+        let moved = Self { source, ..self.clone() }.open(&mut settings.clone())?;
+        let progress = Progress::new(log.len(), "moving", self.output);
+        let done = run.repose(&moved, settings, self.tolerance.unwrap_or(0.0), &progress)?;
+        let moved = Some([done.moved, done.held]);
+        Ok((FusionReport { stats: done.added, moved, ..FusionReport::default() }, done.taken))
+    }
+
     /// The map to go on with. Without one, a folder that cannot be written to is found out before the work.
     fn saved_map(&self, dimension: Dimension) -> anyhow::Result<Option<SavedMap>> {
-        if self.append {
-            return SavedMap::read_to_append(&self.map_path(), self.memory, dimension).map(Some);
+        if self.append || self.repose.is_some() {
+            let file = SavedMap::read_to_append(&self.map_path(), self.memory, dimension)?;
+            if self.repose.is_some() && !file.is_ledger() {
+                bail!(
+                    "{}: scans can be moved in maps made with --ledger only; clamped cells do not give them back",
+                    self.map_path().display()
+                );
+            }
+            return Ok(Some(file));
         }
         super::check_is_folder(&self.out)?;
         if let (Ok(out), Ok(log)) = (self.out.canonicalize(), self.log.canonicalize())
@@ -159,7 +224,16 @@ impl Args {
         let map = self.map_path().display().to_string();
         let saved = before.map(|file| &file.header().settings);
         let base = saved.map(Settings::of_saved).unwrap_or_default();
-        let settings = self.settings.over(base)?.resolved(dimension);
+        let mut settings = self.settings.over(base)?;
+        if self.shard.is_some() {
+            if self.settings.has("w_max") || self.settings.has("half_life") {
+                return Err(bad_call(
+                    "--shard makes a map of sums, which do not forget: leave out --w-max and --half-life",
+                ));
+            }
+            settings.shape.ledger = true;
+        }
+        let settings = settings.resolved(dimension);
         settings.check(dimension)?;
         check_thin(self.settings.has("thin"), settings.esdf)?;
         if let Some(saved) = saved {

@@ -6,6 +6,7 @@ mod eval;
 mod gallery;
 mod info;
 mod map;
+mod merge;
 mod mesh;
 mod query;
 mod radiance;
@@ -19,6 +20,8 @@ pub(crate) enum Command {
     Gallery(gallery::Args),
     /// Fuse a log of range scans into maps, 2-D or 3-D
     Map(Box<map::Args>),
+    /// Add up maps of sums, made of parts of a log or of several logs, or take one out of another
+    Merge(merge::Args),
     /// Occupancy, distance and gradient of a map at given points
     Query(query::Args),
     /// What a file is and what it holds
@@ -41,6 +44,7 @@ impl Command {
             Self::Demo(args) => demo::run(args),
             Self::Gallery(args) => gallery::run(args),
             Self::Map(args) => map::run(args),
+            Self::Merge(args) => merge::run(args),
             Self::Query(args) => query::run(args),
             Self::Info(args) => info::run(args),
             Self::Convert(args) => convert::run(args),

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{bail, ensure};
+use portolan::Ledger;
 use portolan::geom::{BLOCK_EDGE, Grid, Pose};
 use portolan::mapper::Mapper;
 use portolan::store::Store;
@@ -79,7 +80,9 @@ pub(super) fn in_file_2d(mapper: Mapper<2>, mut rest: MapFile<2>, path: &Path) -
     let before = Settings::of_saved(&rest.header.settings);
     let settings = Settings::of_mapper(mapper.settings(), Dimension::Two, before);
     describe(&mapper, &settings, &mut rest.header);
-    let grid = grid(&mapper, path)?;
+    let grid = grid(&mapper, &path.display().to_string())?;
+    // A clamped map from here on.
+    rest.ledger = None;
     let kinds = OccupancyKinds::of(&settings, &rest);
     mapping::store_2d(mapper, kinds, &grid, &mut rest)?;
     Ok(rest)
@@ -95,7 +98,22 @@ pub fn save_3d(mapper: Mapper<3>, mut rest: MapFile<3>, path: &Path) -> anyhow::
     describe(&mapper, &settings, &mut rest.header);
     ensure!(!bricks(&mapper).is_empty(), "{}: nothing was fused, there is no map to write", path.display());
     mapping::store_3d(mapper, &mut rest);
+    // A clamped map from here on.
+    rest.ledger = None;
     Ok(rest.write(path)?)
+}
+
+/// The file of a ledger, as `portolan map --ledger` would describe it; without counts of beams.
+pub fn ledger_file<const D: usize>(ledger: Ledger<D>) -> MapFile<D> {
+    let dimension = if D == 2 { Dimension::Two } else { Dimension::Three };
+    let mut file = MapFile::default();
+    let mut settings = Settings::of_mapper(ledger.settings(), dimension, Settings::default());
+    settings.shape.ledger = true;
+    file.header.settings = settings.to_json();
+    file.header.logs = ledger.scans().logs().map(str::to_owned).collect();
+    file.header.scans = ledger.scans().len() as u64;
+    file.ledger = Some(ledger);
+    file
 }
 
 /// The first cells of all bricks.
@@ -108,8 +126,8 @@ fn bricks<const D: usize>(mapper: &Mapper<D>) -> Vec<[i32; D]> {
 }
 
 /// The array for all bricks, on the lattice of the maps.
-fn grid(mapper: &Mapper<2>, path: &Path) -> anyhow::Result<Grid<2>> {
-    let (shown, bricks) = (path.display(), bricks(mapper));
+pub(crate) fn grid(mapper: &Mapper<2>, shown: &str) -> anyhow::Result<Grid<2>> {
+    let bricks = bricks(mapper);
     let lattice = mapper.tsdf().map(|map| *map.lattice());
     let lattice = lattice.or_else(|| mapper.occupancy().map(|map| *map.store().lattice()));
     let lattice = lattice.or_else(|| mapper.attenuation().map(|map| *map.store().lattice()));

@@ -5,6 +5,7 @@ mod pictures;
 mod scans;
 
 pub use crate::mapping::polylines;
-pub use maps::{MapperOfFile, read_mapper, save_2d, save_3d};
+pub(crate) use maps::grid;
+pub use maps::{MapperOfFile, ledger_file, read_mapper, save_2d, save_3d};
 pub use pictures::{picture_2d, picture_of_mesh};
 pub use scans::{OpenLog, StampedFrame, StampedScan};

@@ -119,6 +119,11 @@ impl OpenLog {
         self.log.name()
     }
 
+    /// The number of a scan in the log: another one with the option `--every`.
+    pub fn number(&self, i: usize) -> usize {
+        self.indices.get(i).copied().unwrap_or(i)
+    }
+
     /// The word for its format.
     pub fn format(&self) -> &'static str {
         self.log.format()

@@ -41,6 +41,15 @@ pub(crate) struct Written {
     pub(crate) notes: Vec<String>,
 }
 
+impl Written {
+    /// Of a folder with the map alone: what an earlier run left beside it is removed.
+    pub(crate) fn of_map_alone(folder: &Path) -> anyhow::Result<Self> {
+        let written = Self { files: vec!["map.portolan"], ..Self::default() };
+        remove_stale(folder, &written.files)?;
+        Ok(written)
+    }
+}
+
 impl Artifacts<'_> {
     /// Writes all files but `map.portolan`, which was saved before anything was derived from it, and `summary.json`. What
     /// an earlier run left in the folder and this one does not make is removed: it would belong to another map.

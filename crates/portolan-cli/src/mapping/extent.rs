@@ -23,6 +23,8 @@ pub(crate) enum Extent {
     Two(Grid<2>),
     /// The box of all bricks.
     Three(Aabb<3>),
+    /// Of a map that is larger than memory.
+    OnDisk,
 }
 
 impl Extent {
@@ -39,6 +41,7 @@ impl Extent {
         match self {
             Self::Two(grid) => json::grid(grid),
             Self::Three(bounds) => json::aabb(bounds),
+            Self::OnDisk => Value::Null,
         }
     }
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use portolan::Mapper;
 use portolan::geom::Pose;
+use portolan::ledger::LedgerError;
 use portolan::map::MapError;
 use portolan::mapper::Fused;
 use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
@@ -35,6 +36,8 @@ pub(crate) struct FusionReport {
     pub(crate) unreadable: (u64, Option<String>),
     /// Why fusing ended early: the maps hold what was fused up to there.
     pub(crate) full: Option<String>,
+    /// Scans that were moved, and scans of the log in the map, where scans were to be moved.
+    pub(crate) moved: Option<[u64; 2]>,
 }
 
 impl FusionReport {
@@ -52,9 +55,26 @@ impl FusionReport {
         fused.stats()
     }
 
+    /// What became of a scan. `false` where a map is full and fusing ends.
+    pub(super) fn note<const D: usize>(
+        &mut self,
+        fused: Result<Fused, LedgerError>,
+        log: &str,
+        scan: usize,
+    ) -> bool {
+        match fused {
+            Ok(fused) => {
+                let stats = self.add::<D>(&fused);
+                self.stats += stats;
+                true
+            }
+            Err(error) => self.refuse(&error, log, scan),
+        }
+    }
+
     /// The maps did not take a scan; why. `false` where a map is full and fusing ends.
-    fn refuse(&mut self, error: &MapError, log: &str, scan: usize) -> bool {
-        if let MapError::Full(_) = error {
+    fn refuse(&mut self, error: &LedgerError, log: &str, scan: usize) -> bool {
+        if let LedgerError::Map(MapError::Full(_)) = error {
             self.full = Some(error.to_string());
             return false;
         }
@@ -94,15 +114,11 @@ pub(crate) fn fuse_2d(
     for (k, batch) in scans.chunks(BATCH).enumerate() {
         let fused = mapper.integrate_all(batch, &|| start.elapsed().as_secs_f64());
         for (i, (fused, (pose, _))) in fused.into_iter().zip(batch).enumerate() {
-            match fused {
-                Ok(fused) => {
-                    let stats = report.add::<2>(&fused);
-                    poses.extend((stats.scans > 0).then_some(pose));
-                    report.stats += stats;
-                }
-                Err(error) if report.refuse(&error, log, k * BATCH + i) => {}
-                Err(_) => return report,
+            let before = report.stats.scans;
+            if !report.note::<2>(fused.map_err(LedgerError::from), log, k * BATCH + i) {
+                return report;
             }
+            poses.extend((report.stats.scans > before).then_some(pose));
             progress.add(1);
         }
         progress.holding(|| mapper.memory_bytes());
@@ -124,17 +140,51 @@ type Read = (usize, Pose<3>, Result<(Frame, BeamCounts), IoError>);
 
 impl Frames<'_> {
     fn read(&self, &i: &usize) -> Read {
-        let filtered = |(frame, counts): (Frame, BeamCounts)| {
-            (if self.points_only { frame.without_rays() } else { frame }, counts)
-        };
-        (i, *self.log.pose(i), self.log.filtered_frame(i, &self.filter).map(filtered))
+        (i, *self.log.pose(i), self.frame(i))
+    }
+
+    /// What is left of the readings of a frame, and what the filter counted.
+    pub(super) fn frame(&self, i: usize) -> Result<(Frame, BeamCounts), IoError> {
+        let (frame, counts) = self.log.filtered_frame(i, &self.filter)?;
+        Ok((if self.points_only { frame.without_rays() } else { frame }, counts))
+    }
+}
+
+/// What frames can be fused into.
+pub(super) trait TakesFrames {
+    /// Fuses a frame of the log.
+    fn take(
+        &mut self,
+        index: usize,
+        pose: &Pose<3>,
+        frame: &Frame,
+        clock: &(dyn Fn() -> f64 + Sync),
+    ) -> Result<Fused, LedgerError>;
+
+    /// Bytes held.
+    fn memory_bytes(&self) -> usize;
+}
+
+impl TakesFrames for Mapper<3> {
+    fn take(
+        &mut self,
+        _: usize,
+        pose: &Pose<3>,
+        frame: &Frame,
+        clock: &(dyn Fn() -> f64 + Sync),
+    ) -> Result<Fused, LedgerError> {
+        Ok(self.integrate_timed(pose, frame, clock)?)
+    }
+
+    fn memory_bytes(&self) -> usize {
+        Self::memory_bytes(self)
     }
 }
 
 /// Fuses these frames of a log, in order, the next being read while one is fused. The result does not depend on the
 /// number of threads.
 pub(crate) fn fuse_3d(
-    mapper: &mut Mapper<3>,
+    maps: &mut impl TakesFrames,
     frames: &Frames,
     poses: &mut Vec<Pose<3>>,
     threads: usize,
@@ -143,19 +193,19 @@ pub(crate) fn fuse_3d(
     let name = frames.log.path().display().to_string();
     let mut read = frames.indices.iter().map(|i| frames.read(i));
     if threads == 1 {
-        return fuse(mapper, read, &name, poses, progress);
+        return fuse(maps, read, &name, poses, progress);
     }
     std::thread::scope(|scope| {
         let (send, receive) = sync_channel::<Read>(AHEAD);
         // Sending fails where fusing has ended early.
         scope.spawn(move || read.all(|frame| send.send(frame).is_ok()));
-        fuse(mapper, receive.into_iter(), &name, poses, progress)
+        fuse(maps, receive.into_iter(), &name, poses, progress)
     })
 }
 
 /// The loop. Poses of frames that were fused are added to `poses`.
 fn fuse(
-    mapper: &mut Mapper<3>,
+    maps: &mut impl TakesFrames,
     frames: impl Iterator<Item = Read>,
     log: &str,
     poses: &mut Vec<Pose<3>>,
@@ -167,7 +217,7 @@ fn fuse(
     let mut waiting = clock();
     for (i, pose, read) in frames {
         *report.seconds.entry("frames").or_default() += clock() - waiting;
-        match read.map(|(frame, counts)| (mapper.integrate_timed(&pose, &frame, &clock), frame, counts)) {
+        match read.map(|(frame, counts)| (maps.take(i, &pose, &frame, &clock), frame, counts)) {
             Ok((Ok(fused), frame, counts)) => {
                 let stats = report.add::<3>(&fused);
                 // Points that share a row and column with a nearer one, or lie outside of all.
@@ -183,7 +233,7 @@ fn fuse(
             Err(error) => report.leave_out(error.to_string()),
         }
         progress.add(1);
-        progress.holding(|| mapper.memory_bytes());
+        progress.holding(|| maps.memory_bytes());
         waiting = clock();
     }
     report

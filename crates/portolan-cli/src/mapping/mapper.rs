@@ -14,7 +14,7 @@ use serde_json::Map;
 use super::extent::{Extent, check_memory, grid_over, seen, with_outlier};
 use super::fuse::{Frames, FusionReport, fuse_2d, fuse_3d};
 use super::map_server::grid_of;
-use super::{MapKind, Settings, recipe};
+use super::{Aside, LedgerRun, MapKind, Settings, recipe};
 use crate::arguments::Shift;
 use crate::log::{self, Log};
 use crate::progress::Progress;
@@ -45,6 +45,8 @@ pub(crate) enum Run<'a> {
         mapper: Box<Mapper<3>>,
         file: Box<MapFile<3>>,
     },
+    /// Into sums.
+    Sums(LedgerRun<'a>),
 }
 
 impl<'a> Run<'a> {
@@ -56,6 +58,9 @@ impl<'a> Run<'a> {
         before: Option<SavedMap>,
         limits: &Limits,
     ) -> anyhow::Result<Self> {
+        if settings.shape.ledger {
+            return LedgerRun::new(log, indices, settings, before, limits).map(Self::Sums);
+        }
         match log {
             Log::Two(log) => Self::new_2d(log, indices, settings, before.and_then(SavedMap::in_2d), limits),
             Log::Three(log) => Self::new_3d(log, indices, settings, before.and_then(SavedMap::in_3d), limits),
@@ -91,8 +96,7 @@ impl<'a> Run<'a> {
         before: Option<Box<MapFile<3>>>,
         limits: &Limits,
     ) -> anyhow::Result<Self> {
-        let filter = settings.shape.range.filter(settings.shape.self_filter.clone())?;
-        let frames = Frames { log, indices, filter, points_only: settings.shape.points_only };
+        let frames = Frames::new(log, indices, settings)?;
         let mut file = before.unwrap_or_default();
         let mapper = Box::new(mapper_3d(&mut file, settings, log.pose(0), limits)?);
         Ok(Self::Three { frames, mapper, file })
@@ -103,6 +107,7 @@ impl<'a> Run<'a> {
         match self {
             Self::Two { scans, .. } => scans.len(),
             Self::Three { frames, .. } => frames.indices.len(),
+            Self::Sums(run) => run.scans(),
         }
     }
 
@@ -115,26 +120,28 @@ impl<'a> Run<'a> {
                 report
             }
             Self::Three { frames, mapper, file } => {
-                fuse_3d(mapper, frames, &mut file.poses, threads, progress)
+                fuse_3d(&mut **mapper, frames, &mut file.poses, threads, progress)
             }
+            Self::Sums(run) => run.fuse(threads, progress),
         }
     }
 
-    /// The maps as a file, and the box that they cover.
+    /// The maps as a file, the box that they cover, and what is larger than memory.
     ///
     /// # Errors
     /// Where 2-D maps do not fit the grid that they were made for.
-    pub(crate) fn finish(self) -> anyhow::Result<(SavedMap, Extent)> {
+    pub(crate) fn finish(self, settings: &Settings) -> anyhow::Result<(SavedMap, Extent, Option<Aside>)> {
         match self {
             Self::Two { grid, kinds, mapper, mut file, .. } => {
                 store_2d(*mapper, kinds, &grid, &mut file)?;
-                Ok((SavedMap::Two(file), Extent::Two(grid)))
+                Ok((SavedMap::Two(file), Extent::Two(grid), None))
             }
             Self::Three { mapper, mut file, .. } => {
                 store_3d(*mapper, &mut file);
                 let extent = Extent::of_bricks(&file);
-                Ok((SavedMap::Three(file), extent))
+                Ok((SavedMap::Three(file), extent, None))
             }
+            Self::Sums(run) => run.finish(settings),
         }
     }
 }

@@ -67,6 +67,7 @@ impl Settings {
                 carve: how.carve,
                 carve_weight: how.carve_weight,
                 color: how.color,
+                ledger: false,
                 ..before.shape
             },
             max_distance: how.max_distance,

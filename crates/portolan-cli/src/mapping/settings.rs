@@ -24,7 +24,7 @@ use portolan::mapper::{MapperSettings, THIN};
 pub(crate) struct Shape {
     /// Edge of a cell (meters) [default with --append: that of the map]
     #[arg(long, value_name = "R", value_parser = length, allow_negative_numbers = true)]
-    #[arg(required = false, required_unless_present = "append")]
+    #[arg(required = false, required_unless_present_any = ["append", "repose"])]
     pub(crate) resolution: f64,
     /// Truncation distance: signed distances are stored up to here on either side of a surface (meters) [default: three
     /// cells]
@@ -68,6 +68,12 @@ pub(crate) struct Shape {
     #[arg(long, help_heading = ONLY_3D)]
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(crate) points_only: bool,
+    /// Keep sums of whole numbers instead of clamped cells, and the list of scans: maps of parts of a log add up to the same
+    /// bytes in any order (`merge`), scans can be taken out again or moved (--repose). Nothing is forgotten by itself, and no
+    /// color is kept
+    #[arg(long, conflicts_with_all = ["w_max", "half_life"])]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub(crate) ledger: bool,
     /// Leave every N-th scan out of the map, for `eval --scans`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..), allow_negative_numbers = true)]
     pub(crate) hold_out: Option<u64>,
@@ -132,6 +138,7 @@ impl Default for Shape {
             deskew: true,
             self_filter: Vec::new(),
             points_only: false,
+            ledger: false,
             hold_out: None,
         }
     }
@@ -175,7 +182,11 @@ impl Settings {
         let shape = &mut self.shape;
         shape.truncation.get_or_insert(three_cells(shape.resolution));
         shape.sweep.get_or_insert(SweepArg::usual(dimension));
-        shape.forgetting = ForgettingArgs::of(shape.forgetting.w_max().unwrap_or(W_MAX));
+        // Sums do not forget by themselves, and hold no colors.
+        let usual = if shape.ledger { f32::INFINITY } else { W_MAX };
+        let asked = shape.forgetting.w_max().filter(|_| !shape.ledger);
+        shape.forgetting = ForgettingArgs::of(asked.unwrap_or(usual));
+        shape.color &= !shape.ledger;
         if self.maps.is_empty() {
             let made = |kind: &&MapKind| kind.only().is_none_or(|only| only == dimension);
             let all = MapKind::value_variants().iter().filter(made).copied();

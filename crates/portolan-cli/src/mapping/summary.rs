@@ -123,6 +123,7 @@ impl Summary<'_> {
                 "fused": self.fusion.stats.scans,
                 "refused_poses": self.fusion.stats.refused_poses,
                 "in_map": header.scans,
+                "moved": self.fusion.moved.map(|[moved, _]| moved),
             },
             "beams": stats["beams"],
             "refused_beams": stats["refused_beams"],
@@ -235,6 +236,9 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
         stats.beams.hit,
         stats.beams.no_return
     );
+    if let Some([moved, held]) = summary.fusion.moved {
+        let _ = writeln!(text, "{moved} of the {held} scans of this log in the map were moved");
+    }
     for choice in summary.log.choices() {
         let _ = writeln!(text, "{choice}");
     }
@@ -248,6 +252,7 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
             let [x, y, z] = bounds.extent();
             writeln!(text, "{x:.2} x {y:.2} x {z:.2} m in cells of {r} m")
         }
+        Extent::OnDisk => writeln!(text, "cells of {r} m"),
     };
     let _ = writeln!(text, "{}", summary.settings.forgetting());
     let ways = Way::ALL.map(|way| (stats.ways.count(way), way_words(way)));

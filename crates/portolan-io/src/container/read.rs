@@ -1,9 +1,12 @@
 //! Reading a container.
 
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::fmt::Display;
-use std::io::Read;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use super::{
     ContainerWriter, ENTRY, HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_of,
@@ -28,11 +31,19 @@ pub struct Chunk {
 }
 
 /// A container whose index was checked; each chunk is checked and unpacked on request.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Container {
     path: PathBuf,
-    bytes: Vec<u8>,
+    bytes: Bytes,
     chunks: Vec<Chunk>,
+}
+
+/// Where the chunks are.
+#[derive(Debug)]
+enum Bytes {
+    Memory(Vec<u8>),
+    /// Read when they are asked for.
+    File(Mutex<File>),
 }
 
 impl Container {
@@ -70,12 +81,34 @@ impl Container {
             let advice = format!("the file has {} bytes: it is cut off", bytes.len());
             return Err(IoError::binary(name, 16, "the position of the index", header.index, advice));
         };
-        if crc32c::crc32c(&bytes[index..]) != header.index_crc {
-            let advice = "the file is cut off or damaged: copy it again";
-            return Err(IoError::binary(name, index as u64, "the checksum of the index", "wrong", advice));
+        let chunks = header.chunks(&bytes[index..], name)?;
+        Ok(Self { path: name.into(), bytes: Bytes::Memory(bytes), chunks })
+    }
+
+    /// Opens a file and reads its index alone; chunks are read when they are unpacked, so that files may be larger than memory.
+    ///
+    /// # Errors
+    /// As [`Container::from_reader`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let failed = |e| IoError::os(path, "read it", e);
+        let mut file = open_file(path)?;
+        let length = file.metadata().map_err(failed)?.len();
+        let mut first = Vec::new();
+        file.by_ref().take(HEADER as u64).read_to_end(&mut first).map_err(failed)?;
+        let header = Header::of(&first, path)?;
+        if !(HEADER as u64..=length).contains(&header.index) {
+            let advice = format!("the file has {length} bytes: it is cut off");
+            return Err(IoError::binary(path, 16, "the position of the index", header.index, advice));
         }
-        let chunks = chunks(&bytes, index, header.count, name)?;
-        Ok(Self { path: name.into(), bytes, chunks })
+        file.seek(SeekFrom::Start(header.index)).map_err(failed)?;
+        let mut index = Vec::new();
+        file.by_ref()
+            .take(MOST_CHUNKS as u64 * (ENTRY + LONGEST_NAME) as u64)
+            .read_to_end(&mut index)
+            .map_err(failed)?;
+        let chunks = header.chunks(&index, path)?;
+        Ok(Self { path: path.into(), bytes: Bytes::File(Mutex::new(file)), chunks })
     }
 
     /// The file, or the name that was given for it.
@@ -107,12 +140,12 @@ impl Container {
             let field = format!("chunk {} {}", chunk.tag, shown(&chunk.name));
             Err(IoError::binary(&self.path, chunk.position as u64, field, value, advice))
         };
-        let stored = self.stored(chunk);
-        if crc32c::crc32c(stored) != chunk.crc {
+        let stored = self.stored(chunk)?;
+        if crc32c::crc32c(&stored) != chunk.crc {
             return bad("damaged (its checksum is wrong)".into(), "copy the file again");
         }
         let mut content = Vec::new();
-        let unpacked = zstd::stream::read::Decoder::with_buffer(stored)
+        let unpacked = zstd::stream::read::Decoder::with_buffer(&*stored)
             .and_then(|d| d.take(chunk.length + 1).read_to_end(&mut content));
         match unpacked {
             Err(e) => bad(format!("damaged ({e})"), "write the file again"),
@@ -124,10 +157,23 @@ impl Container {
         }
     }
 
-    fn stored(&self, chunk: &Chunk) -> &[u8] {
-        // A chunk of another container may point anywhere.
-        let end = chunk.position.saturating_add(chunk.stored_length as usize);
-        self.bytes.get(chunk.position..end).unwrap_or(&[])
+    fn stored(&self, chunk: &Chunk) -> Result<Cow<'_, [u8]>> {
+        match &self.bytes {
+            Bytes::Memory(bytes) => {
+                // A chunk of another container may point anywhere.
+                let end = chunk.position.saturating_add(chunk.stored_length as usize);
+                Ok(Cow::Borrowed(bytes.get(chunk.position..end).unwrap_or(&[])))
+            }
+            Bytes::File(file) => {
+                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut stored = Vec::new();
+                let read = file
+                    .seek(SeekFrom::Start(chunk.position as u64))
+                    .and_then(|_| file.by_ref().take(chunk.stored_length).read_to_end(&mut stored));
+                read.map_err(|e| IoError::os(&self.path, "read it", e))?;
+                Ok(Cow::Owned(stored))
+            }
+        }
     }
 
     /// A writer that holds the chunks for which `keep` is true, packed as they are: for programs that replace some
@@ -138,7 +184,7 @@ impl Container {
     pub fn writer(&self, mut keep: impl FnMut(&Chunk) -> bool) -> Result<ContainerWriter> {
         let mut writer = ContainerWriter::new();
         for chunk in self.chunks.iter().filter(|c| keep(c)) {
-            writer.stored_chunk(&chunk.tag, &chunk.name, chunk.length, self.stored(chunk))?;
+            writer.stored_chunk(&chunk.tag, &chunk.name, chunk.length, &*self.stored(chunk)?)?;
         }
         Ok(writer)
     }
@@ -172,19 +218,29 @@ impl Header {
         }
         Ok(Self { count: u32_at(bytes, 12), index: u64_at(bytes, 16), index_crc: u32_at(bytes, 24) })
     }
+
+    /// The chunks of the index, whose bytes these are.
+    fn chunks(&self, index: &[u8], path: &Path) -> Result<Vec<Chunk>> {
+        if crc32c::crc32c(index) != self.index_crc {
+            let advice = "the file is cut off or damaged: copy it again";
+            return Err(IoError::binary(path, self.index, "the checksum of the index", "wrong", advice));
+        }
+        chunks(index, self.index as usize, self.count, path)
+    }
 }
 
+/// The chunks that an index lists, which begins at byte `index` of the file and goes on to its end.
 fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chunk>> {
     let mut chunks = Vec::new();
     let mut names = HashSet::new();
-    let (mut at, mut position) = (index, HEADER);
+    let (mut at, mut position) = (0, HEADER);
     if count as usize > MOST_CHUNKS {
         let advice = "a container has at most 2^20 chunks: the file is damaged";
         return Err(IoError::binary(path, 12, "the number of chunks", count, advice));
     }
     for _ in 0..count {
         let bad = |offset: usize, field: &str, value: &dyn Display, advice: &str| {
-            Err(IoError::binary(path, (at + offset) as u64, field, value, advice))
+            Err(IoError::binary(path, (index + at + offset) as u64, field, value, advice))
         };
         let Some(entry) = bytes.get(at..at + ENTRY) else {
             let advice = "the header announces more: the file is cut off";
@@ -222,8 +278,9 @@ fn chunks(bytes: &[u8], index: usize, count: u32, path: &Path) -> Result<Vec<Chu
         at += ENTRY + name_length;
     }
     if at != bytes.len() || position != index {
-        let (value, advice) = (format!("{} bytes", bytes.len()), "bytes are left over: write the file again");
-        return Err(IoError::binary(path, at as u64, "the file length", value, advice));
+        let (value, advice) =
+            (format!("{} bytes", index + bytes.len()), "bytes are left over: write the file again");
+        return Err(IoError::binary(path, (index + at) as u64, "the file length", value, advice));
     }
     Ok(chunks)
 }

@@ -2,7 +2,8 @@
 
 use std::collections::HashSet;
 use std::fmt::Display;
-use std::io::Write;
+use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::{HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_bytes};
@@ -23,10 +24,15 @@ const LEVEL: i32 = 3;
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct ContainerWriter {
     entries: Vec<u8>,
+    /// The chunks, unless they are in a file.
     blocks: Vec<u8>,
+    /// A file without a name that holds the chunks.
+    spooled: Option<File>,
+    /// Bytes of all chunks.
+    length: u64,
     names: HashSet<([u8; 8], String)>,
     count: u32,
 }
@@ -35,6 +41,16 @@ impl ContainerWriter {
     /// A container without chunks.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// A container without chunks that keeps them in a file without a name in `folder` until it is written: it may be larger than
+    /// memory.
+    ///
+    /// # Errors
+    /// [`IoError::Os`] where there can be no file.
+    pub fn spooled(folder: &Path) -> Result<Self> {
+        let file = tempfile::tempfile_in(folder).map_err(|e| IoError::os(folder, "write to it", e))?;
+        Ok(Self { spooled: Some(file), ..Self::default() })
     }
 
     /// Adds a chunk: a tag of 4 to 8 ASCII letters, digits or `_`, a name of at most 255 bytes (may be empty),
@@ -67,7 +83,7 @@ impl ContainerWriter {
             let value = format!("{tag} {name}, used twice");
             return unfit("the chunk name", value, "give every chunk its own name");
         }
-        let position = (HEADER + self.blocks.len()) as u64;
+        let position = HEADER as u64 + self.length;
         self.entries.extend(tag8);
         for value in [position, stored.len() as u64, length] {
             self.entries.extend(value.to_le_bytes());
@@ -75,9 +91,17 @@ impl ContainerWriter {
         self.entries.extend(crc32c::crc32c(stored).to_le_bytes());
         self.entries.extend((name.len() as u32).to_le_bytes());
         self.entries.extend(name.as_bytes());
-        self.blocks.extend(stored);
+        self.length += stored.len() as u64;
         self.count += 1;
-        Ok(())
+        match &mut self.spooled {
+            Some(file) => {
+                file.write_all(stored).map_err(|e| IoError::os(Path::new("container"), "write it", e))
+            }
+            None => {
+                self.blocks.extend(stored);
+                Ok(())
+            }
+        }
     }
 
     fn header(&self) -> [u8; HEADER] {
@@ -85,14 +109,14 @@ impl ContainerWriter {
         header.extend(MAGIC);
         header.extend(VERSION.to_le_bytes());
         header.extend(self.count.to_le_bytes());
-        header.extend(((HEADER + self.blocks.len()) as u64).to_le_bytes());
+        header.extend((HEADER as u64 + self.length).to_le_bytes());
         header.extend(crc32c::crc32c(&self.entries).to_le_bytes());
         let crc = crc32c::crc32c(&header);
         header.extend(crc.to_le_bytes());
         std::array::from_fn(|k| header[k])
     }
 
-    /// The file.
+    /// The file. Of a spooled container only what is not spooled.
     pub fn to_bytes(&self) -> Vec<u8> {
         [&self.header()[..], &self.blocks, &self.entries].concat()
     }
@@ -105,6 +129,13 @@ impl ContainerWriter {
         write_atomic(path, |w| {
             w.write_all(&self.header())?;
             w.write_all(&self.blocks)?;
+            if let Some(mut file) = self.spooled.as_ref() {
+                file.seek(SeekFrom::Start(0))?;
+                let copied = io::copy(&mut file, w)?;
+                if copied != self.length {
+                    return Err(io::Error::other("the file that held the chunks was cut off"));
+                }
+            }
             w.write_all(&self.entries)
         })
     }

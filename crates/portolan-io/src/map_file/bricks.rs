@@ -27,7 +27,7 @@ impl Reading<'_> {
         brick: impl Fn([&[u8]; N]) -> Option<C::Brick>,
     ) -> Result<Bricks<C, D>> {
         let (lattice, tag) = (self.lattice(entry)?, &*entry.chunk);
-        let keys = self.keys(tag)?;
+        let keys = self.keys(tag, BRICK_OVERHEAD)?;
         let lengths = planes.map(|(_, cell_bytes)| cell_bytes * block_cells::<D>());
         let mut parts = Vec::new();
         for ((name, _), length) in planes.iter().zip(lengths) {
@@ -57,13 +57,15 @@ impl Reading<'_> {
         Ok(store)
     }
 
-    fn uneven(&self, tag: &str) -> IoError {
+    /// That the parts of a map's planes do not fit together.
+    pub(super) fn uneven(&self, tag: &str) -> IoError {
         let advice = "every part of a plane must hold whole bricks, as many as that part of the other planes";
         self.bad(format!("the division of chunk {} into parts", shown(tag)), "uneven", advice)
     }
 
-    /// The keys of a chunk's bricks, in ascending order and within the range of cell indices.
-    fn keys<const D: usize>(&mut self, tag: &str) -> Result<Vec<BlockKey<D>>> {
+    /// The keys of a chunk's bricks, in ascending order and within the range of cell indices; `overhead`: what each brick takes
+    /// beside its planes (bytes).
+    pub(super) fn keys<const D: usize>(&mut self, tag: &str, overhead: u64) -> Result<Vec<BlockKey<D>>> {
         let field = format!("the length of chunk {} keys", shown(tag));
         if self.parts(tag, "keys").is_empty() {
             return Err(self.bad(field, "missing", AGAIN));
@@ -73,7 +75,7 @@ impl Reading<'_> {
             let advice = format!("give {key_bytes} bytes for each key");
             return Err(self.bad(field, format!("{length} bytes"), advice));
         }
-        self.take(length / key_bytes as u64 * BRICK_OVERHEAD)?;
+        self.take(length / key_bytes as u64 * overhead)?;
         let bytes = self.plane(tag, "keys", length)?;
         let number = |b: &[u8], k: usize| i32::from_le_bytes(std::array::from_fn(|i| b[4 * k + i]));
         let keys: Vec<BlockKey<D>> =

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use portolan::Ledger;
 use portolan::cell::{AttenuationRule, Color, HitLength, LogOdds8, OccupancyModel, SignedDistance};
 use portolan::geom::Pose;
 use portolan::map::{DenseTsdf, DistanceMap, OccupancyGrid, OccupancyTree, least_weight};
@@ -30,6 +31,8 @@ pub struct MapFile<const D: usize> {
     pub color_bricks: Option<ColorBricks<D>>,
     /// Hits per meter in bricks, in 2-D and 3-D.
     pub attenuation: Option<AttenuationBricks<D>>,
+    /// Maps of sums. A file that holds them is written with nothing else: the maps beside them are made of them.
+    pub ledger: Option<Ledger<D>>,
     /// Poses of the sensor at the fused scans, `world_from_sensor`.
     pub poses: Vec<Pose<D>>,
     pub(super) unknown_maps: Vec<Value>,

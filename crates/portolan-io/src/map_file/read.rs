@@ -73,7 +73,12 @@ impl<const D: usize> MapFile<D> {
                 None => file.unknown_maps.push(map),
             }
         }
-        file.poses = reading.poses()?;
+        let field = reading.field(super::ledger::FIELD);
+        file.ledger = reading.ledger(field)?;
+        file.poses = match &file.ledger {
+            Some(ledger) => ledger.scans().iter().map(|(_, _, record)| record.world_from_sensor).collect(),
+            None => reading.poses()?,
+        };
         (file.header, file.unknown_chunks) = reading.finish()?;
         Ok(file)
     }
@@ -152,7 +157,13 @@ impl Reading<'_> {
     }
 
     /// The setting that a word chooses.
-    fn chosen<T>(&self, map: &str, setting: &str, word: &str, of: impl Fn(&str) -> Option<T>) -> Result<T> {
+    pub(super) fn chosen<T>(
+        &self,
+        map: &str,
+        setting: &str,
+        word: &str,
+        of: impl Fn(&str) -> Option<T>,
+    ) -> Result<T> {
         let field = || format!("the {setting} of map {map}");
         of(word).ok_or_else(|| self.bad(field(), shown(word), "use a newer program"))
     }

@@ -70,6 +70,11 @@ impl<'a> Reading<'a> {
         }
     }
 
+    /// A field of the header, taken out of what is left of it.
+    pub(super) fn field(&mut self, name: &str) -> Option<Value> {
+        self.fields.remove(name)
+    }
+
     /// What the writer noted, and the chunks that were not read.
     pub(super) fn finish(mut self) -> Result<(MapHeader, Vec<UnknownChunk>)> {
         let mut unknown = Vec::new();
@@ -79,11 +84,15 @@ impl<'a> Reading<'a> {
                 unknown.push(UnknownChunk { tag: chunk.tag.clone(), name: chunk.name.clone(), content });
             }
         }
+        Ok((self.header_alone()?, unknown))
+    }
+
+    /// What the writer noted.
+    pub(super) fn header_alone(&mut self) -> Result<MapHeader> {
         self.fields.retain(|key, _| !["version", "dimension", "maps"].contains(&key.as_str()));
         let fields = std::mem::take(&mut self.fields);
         let header = serde_json::from_value(Value::Object(fields));
-        let header = header.map_err(|e| self.bad("the header", shown(e.to_string()), AGAIN))?;
-        Ok((header, unknown))
+        header.map_err(|e| self.bad("the header", shown(e.to_string()), AGAIN))
     }
 
     /// An error about the header, which is the first chunk.
@@ -103,17 +112,20 @@ impl<'a> Reading<'a> {
 
     /// The lattice of a map, whose cell indices must be exact.
     pub(super) fn lattice<const D: usize>(&self, entry: &Entry) -> Result<Lattice<D>> {
+        self.lattice_of(&entry.map, &entry.place.origin, entry.place.resolution)
+    }
+
+    /// The lattice with this origin and edge of a cell, whose cell indices must be exact.
+    pub(super) fn lattice_of<const D: usize>(&self, map: &str, origin: &[f64], r: f64) -> Result<Lattice<D>> {
         const LARGEST_INDEX: f64 = (1u64 << 45) as f64;
-        let Entry { map, place, .. } = entry;
-        let r = place.resolution;
         if !(r > 0.0 && r.is_finite()) {
             return self.possible(map, Err(format!("resolution is {r}: give metres, above zero")));
         }
-        match <[f64; D]>::try_from(&*place.origin) {
+        match <[f64; D]>::try_from(origin) {
             Ok(origin) if origin.iter().all(|v| (v / r).abs() < LARGEST_INDEX) => Ok(Lattice::new(origin, r)),
             _ => {
                 let advice = format!("give {D} numbers within 2^45 cells of zero");
-                Err(self.bad("the origin", format!("{:?} at {r} m", place.origin), advice))
+                Err(self.bad("the origin", format!("{origin:?} at {r} m"), advice))
             }
         }
     }
@@ -202,11 +214,16 @@ impl<'a> Reading<'a> {
         if self.parts("POSES", "sensor").is_empty() {
             return Ok(Vec::new());
         }
-        let bytes = self.plane("POSES", "sensor", self.length("POSES", "sensor"))?;
+        self.poses_of("POSES", self.length("POSES", "sensor"))
+    }
+
+    /// The poses in a plane of so many bytes.
+    pub(super) fn poses_of<const D: usize>(&mut self, tag: &str, length: u64) -> Result<Vec<Pose<D>>> {
+        let bytes = self.plane(tag, "sensor", length)?;
         let pose_bytes = (D * D + D) * size_of::<f64>();
         if bytes.len() % pose_bytes != 0 {
             let advice = format!("give {pose_bytes} bytes for each pose");
-            return Err(self.bad("the length of chunk POSES sensor", bytes.len(), advice));
+            return Err(self.bad(format!("the length of chunk {tag} sensor"), bytes.len(), advice));
         }
         let number = |bytes: &[u8], i: usize| f64::from_le_bytes(std::array::from_fn(|k| bytes[8 * i + k]));
         let poses: Vec<Pose<D>> = bytes

@@ -17,7 +17,7 @@ pub(super) struct OccupancySettings {
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "OccupancyModel")]
-struct Model {
+pub(super) struct Model {
     p_hit: f64,
     p_miss: f64,
     p_min: f64,

@@ -145,6 +145,7 @@ fn full<const D: usize>(seed: u64) -> MapFile<D> {
         tsdf_bricks: Some(tsdf),
         color_bricks: Some(colors),
         attenuation: Some(attenuation(seed)),
+        ledger: None,
         poses: vec![
             Pose::IDENTITY,
             Pose { translation: std::array::from_fn(|k| [1e6, -2.5, 0.125][k]), ..Pose::IDENTITY },

@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::bricks::{write_bricks, write_keys};
 use super::header::{Entry, Place};
 use super::kind::Kind;
+use super::ledger;
 use super::settings::{
     AttenuationSettings, ColorSettings, OccupancySettings, SWEEP, TsdfSettings, sweep_word,
 };
@@ -43,10 +44,14 @@ impl<const D: usize> MapFile<D> {
             IoError::unwritable("map.portolan".as_ref(), "the header", e, advice)
         })?;
         writer.chunk("HEAD", "", header.as_bytes())?;
-        self.write_dense(&mut writer)?;
-        self.write_bricks(&mut writer)?;
-        if !self.poses.is_empty() {
-            write_plane(&mut writer, "POSES", "sensor", &pose_bytes(&self.poses))?;
+        if let Some(ledger) = &self.ledger {
+            ledger::write(ledger, &mut writer)?;
+        } else {
+            self.write_dense(&mut writer)?;
+            self.write_bricks(&mut writer)?;
+            if !self.poses.is_empty() {
+                write_plane(&mut writer, "POSES", "sensor", &pose_bytes(&self.poses))?;
+            }
         }
         self.unknown_chunks.iter().try_for_each(|c| writer.chunk(&c.tag, &c.name, &c.content))?;
         Ok(writer)
@@ -54,7 +59,8 @@ impl<const D: usize> MapFile<D> {
 
     fn header_text(&self) -> serde_json::Result<String> {
         let mut maps = Vec::new();
-        for entry in self.entries()? {
+        let entries = if self.ledger.is_some() { Vec::new() } else { self.entries()? };
+        for entry in entries {
             maps.push(serde_json::to_value(entry)?);
         }
         maps.extend(self.unknown_maps.iter().cloned());
@@ -62,6 +68,9 @@ impl<const D: usize> MapFile<D> {
         header["version"] = json!(VERSION);
         header["dimension"] = json!(D);
         header["maps"] = Value::Array(maps);
+        if let Some(ledger) = &self.ledger {
+            header[ledger::FIELD] = ledger::header(ledger.settings())?;
+        }
         serde_json::to_string(&header)
     }
 
@@ -172,7 +181,7 @@ fn tree_bytes<const D: usize>(tree: &Tree<LogOdds8, D>) -> Vec<u8> {
     bytes
 }
 
-fn pose_bytes<const D: usize>(poses: &[Pose<D>]) -> Vec<u8> {
+pub(super) fn pose_bytes<const D: usize>(poses: &[Pose<D>]) -> Vec<u8> {
     let numbers = poses.iter().flat_map(|p| p.rotation.as_flattened().iter().chain(&p.translation));
     numbers.flat_map(|v| v.to_le_bytes()).collect()
 }

@@ -166,6 +166,116 @@ class Mapper:
     def _repr_png_(self) -> Optional[bytes]: ...
 
 @final
+class Ledger:
+    """Evidence that adds up: sums of whole numbers, and the list of the scans in them.
+
+    Any split of scans, any order, any number of processes: equal ledgers, and equal bytes. Scans are taken out again, or
+    moved to other poses, exactly. Nothing is forgotten by itself, and no colors are kept. Scans are known by the name of their
+    log and their number in it. Arguments are those of `Mapper`.
+    """
+
+    def __new__(
+        cls,
+        resolution: float,
+        *,
+        truncation: Optional[float] = None,
+        carve: bool = True,
+        carve_weight: Optional[float] = None,
+        weights: str = "constant",
+        sweep: Optional[str] = None,
+        occupancy: bool = True,
+        attenuation: bool = True,
+        distances: bool = True,
+        max_distance: float = 1.0,
+        thin: Optional[float] = None,
+        bounds: Optional[Sequence[float]] = None,
+        origin: Optional[Sequence[float]] = None,
+        memory: Optional[int] = None,
+    ) -> Ledger: ...
+    def add(
+        self,
+        log: str,
+        index: int,
+        scan: Union[ArrayLike, Scan, None] = None,
+        pose: Optional[ArrayLike] = None,
+        **readings: Any,
+    ) -> dict[str, int]:
+        """Adds a scan: a `Scan` of a log, which has its pose, points, or `ranges`, `depth` and so on as in `Mapper.integrate`. Wholly
+        or not at all. Raises `ValueError` where the scan is there already; `MapFull`.
+        """
+
+    def subtract(
+        self, log: str, index: int, scan: Union[ArrayLike, Scan, None] = None, **readings: Any
+    ) -> dict[str, int]:
+        """Takes a scan away, as if it had never been added. Raises `ValueError` where it is not there, or was another one."""
+
+    def repose(
+        self,
+        log: str,
+        index: int,
+        scan: Union[ArrayLike, Scan, None] = None,
+        pose: Optional[ArrayLike] = None,
+        **readings: Any,
+    ) -> dict[str, int]:
+        """Moves a scan to another pose, as if it had been added there. Raises as `subtract` and `add`."""
+
+    def map(
+        self,
+        log: Log,
+        indices: Optional[Sequence[int]] = None,
+        *,
+        progress: Optional[Callable[[int, int], Any]] = None,
+    ) -> dict[str, Any]:
+        """Adds the scans of a log with these indices, or all. As `Mapper.map`."""
+
+    def merge(self, other: Ledger) -> None:
+        """Adds another ledger. Raises `ValueError` where settings or lattices differ, or a scan is in both."""
+
+    def take_out(self, other: Ledger) -> None:
+        """Takes another ledger out, as if its scans had never been added. Raises `ValueError` where one is not there."""
+
+    def mapper(self) -> Mapper:
+        """The maps that follow from the sums, which answer all questions. What is fused into them is not added here."""
+
+    @property
+    def scans(self) -> list[tuple[str, int]]:
+        """Log and number of each scan, in order."""
+
+    def save(self, path: _Path) -> None:
+        """Writes a `map.portolan`, which `portolan merge` and all other commands read. Raises `OSError`, `ValueError`."""
+
+    def to_bytes(self) -> bytes:
+        """The content of its file. Equal ledgers have equal bytes. Pickling uses it."""
+
+    @staticmethod
+    def from_bytes(content: bytes, *, memory: Optional[int] = None) -> Ledger:
+        """A ledger of the content of its file. Raises `ValueError`."""
+
+    @staticmethod
+    def load(path: _Path, *, memory: Optional[int] = None) -> Ledger:
+        """Reads a `map.portolan` of sums, or the one in a folder. Raises `OSError`, `ValueError`."""
+
+    def copy(self) -> Ledger:
+        """A copy that goes its own way; cells are shared until one of the two changes them."""
+
+    def __copy__(self) -> Ledger: ...
+    def __deepcopy__(self, _memo: Any) -> Ledger: ...
+    def __reduce__(self) -> tuple[Any, tuple[bytes]]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __len__(self) -> int: ...
+    @property
+    def dimension(self) -> Optional[int]:
+        """2 or 3; `None` until the first scan."""
+
+    @property
+    def resolution(self) -> float:
+        """Edge of a cell (meters)."""
+
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes that the sums hold: measured."""
+
+@final
 class Occupancy:
     """Log odds of being occupied, a snapshot."""
 

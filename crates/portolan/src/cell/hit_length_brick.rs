@@ -104,6 +104,11 @@ impl HitLengthBrick {
         })
     }
 
+    /// A brick of `len` cells that were not hit and are all like this one.
+    pub(super) fn alike(cell: HitLength, len: usize) -> Self {
+        Self(Form::Even { cell, len })
+    }
+
     /// Its planes; made where all cells are alike.
     pub fn planes(&self) -> Cow<'_, HitLengthPlanes> {
         match &self.0 {

@@ -16,6 +16,7 @@ mod model;
 mod packed;
 mod signed_distance;
 mod stop_rule;
+mod sums;
 
 pub use brick::{DistanceBrick, LogOddsBrick};
 pub use color::{Color, ColorBrick, ColorObservation, ColorRule, Colors};
@@ -28,6 +29,10 @@ pub use log_odds::{LogOdds8, LogOdds32, LogOddsEvent, LogOddsRule, LogOddsValue,
 pub use model::{OccupancyModel, OccupancyModelError};
 pub use signed_distance::{DistancePlanes, FusionEvent, SignedDistance, TsdfRule, TsdfRuleError};
 pub use stop_rule::{StopRule, mean_chord};
+pub use sums::{
+    DISTANCE_STEPS, DistanceSum, HitLengthSum, HitMissSum, MOST_SUM, MOST_WEIGHT_UNITS, Sign, SumBrick,
+    SumCell, SumPlanes, SumTsdfRule, SumWidth, WEIGHT_UNITS,
+};
 
 /// What one scan says about the cells of a block: at most one observation per cell.
 pub trait Evidence: Clone + Send + Sync {

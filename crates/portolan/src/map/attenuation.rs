@@ -205,6 +205,17 @@ impl<const D: usize, S: Store<HitLength, D>> Attenuation<D, S> {
         &self.store
     }
 
+    /// Cells, for a store that is told what to do with scans.
+    pub(crate) fn store_mut(&mut self) -> &mut S {
+        &mut self.store
+    }
+
+    /// Forgets what earlier scans taught about the next: rows and columns, and which blocks to tell apart cell by cell.
+    pub(crate) fn forget_scans(&mut self) {
+        self.hit.clear();
+        self.sweeps.points.forget_layout();
+    }
+
     /// The map's cells, taken out.
     pub fn into_store(self) -> S {
         self.store

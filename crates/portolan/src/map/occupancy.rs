@@ -197,6 +197,16 @@ impl<const D: usize, V: LogOddsValue, S: Store<V, D>> Occupancy<D, V, S> {
         &self.store
     }
 
+    /// Cells, for a store that is told what to do with scans.
+    pub(crate) fn store_mut(&mut self) -> &mut S {
+        &mut self.store
+    }
+
+    /// Forgets what earlier scans taught about the next: rows and columns.
+    pub(crate) fn forget_scans(&mut self) {
+        self.sweeps.points.forget_layout();
+    }
+
     /// The map's cells, taken out.
     pub fn into_store(self) -> S {
         self.store

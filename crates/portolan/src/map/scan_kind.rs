@@ -4,12 +4,12 @@ use super::tsdf::BEAM_CELL_BYTES;
 use super::{Attenuation, BeamSweep, MapError, Occupancy, Tsdf};
 use crate::cell::{HitLength, LogOddsValue, SignedDistance};
 use crate::geom::{Pose, block_cells};
-use crate::scan::{Frame, PointScan, RangeImage, Scan, ScanStats};
+use crate::scan::{Fingerprint, Frame, PointScan, RangeImage, Scan, ScanStats};
 use crate::store::Store;
 
 /// A kind of scan that maps of `D` dimensions fuse: [`Scan`] in 2-D and 3-D; [`RangeImage`], [`PointScan`] and [`Frame`] in
 /// 3-D.
-pub trait ScanKind<const D: usize> {
+pub trait ScanKind<const D: usize>: Fingerprint {
     /// Fuses the scan into a field of distances; see [`Tsdf::integrate`].
     ///
     /// # Errors

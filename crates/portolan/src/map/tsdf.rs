@@ -249,6 +249,16 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
         &self.distances
     }
 
+    /// The distances, for a store that is told what to do with scans.
+    pub(crate) fn store_mut(&mut self) -> &mut S {
+        &mut self.distances
+    }
+
+    /// Forgets what earlier scans taught about the next: rows and columns.
+    pub(crate) fn forget_scans(&mut self) {
+        self.layout = LayoutFinder::default();
+    }
+
     /// The colors beside them; `None` where the map keeps none.
     pub fn colors(&self) -> Option<&Bricks<Color, D>> {
         self.colors.as_ref()

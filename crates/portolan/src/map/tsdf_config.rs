@@ -98,7 +98,7 @@ impl<const D: usize> TsdfConfig<D> {
     }
 
     /// The filter, if all settings are possible.
-    pub(super) fn rule(&self) -> Result<TsdfRule, MapError> {
+    pub(crate) fn rule(&self) -> Result<TsdfRule, MapError> {
         let rule = TsdfRule { truncation: self.truncation as f32, w_max: self.w_max };
         rule.validate()?;
         if !(self.carve_weight > 0.0 && self.carve_weight <= 1.0) {

@@ -367,7 +367,8 @@ fn fuse_all<M, S, const D: usize>(
     done
 }
 
-fn timed<T>(clock: &(dyn Fn() -> f64 + Sync), work: impl FnOnce() -> T) -> (T, f64) {
+/// What work gives, and the seconds that it took by the caller's clock.
+pub(crate) fn timed<T>(clock: &(dyn Fn() -> f64 + Sync), work: impl FnOnce() -> T) -> (T, f64) {
     let start = clock();
     let result = work();
     (result, clock() - start)

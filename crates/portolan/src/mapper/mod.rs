@@ -9,5 +9,6 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use maps::timed;
 pub use maps::{Fused, Mapper, MapperMaps};
 pub use settings::{MapperSettings, THIN};

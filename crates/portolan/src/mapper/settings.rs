@@ -90,7 +90,7 @@ impl<const D: usize> MapperSettings<D> {
     }
 
     /// What the maps do not check themselves.
-    pub(super) fn check(&self) -> Result<(), MapError> {
+    pub(crate) fn check(&self) -> Result<(), MapError> {
         let possible = self.max_distance > 0.0 && self.max_distance.is_finite();
         if possible { Ok(()) } else { Err(MapError::MaxDistance(self.max_distance)) }
     }

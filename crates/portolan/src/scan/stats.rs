@@ -45,6 +45,16 @@ impl std::ops::AddAssign for BeamCounts {
     }
 }
 
+impl std::ops::SubAssign for BeamCounts {
+    fn sub_assign(&mut self, o: Self) {
+        self.hit -= o.hit;
+        self.max_range -= o.max_range;
+        self.no_return -= o.no_return;
+        self.dropped -= o.dropped;
+        self.self_hit -= o.self_hit;
+    }
+}
+
 /// Readings that could not be used, by cause. They stay in the scan as [`BeamKind::Dropped`], so that their
 /// neighbors keep their places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -83,7 +93,16 @@ impl std::ops::AddAssign for RefusedBeams {
     }
 }
 
-/// What integrating one scan did; sums over scans with `+=`.
+impl std::ops::SubAssign for RefusedBeams {
+    fn sub_assign(&mut self, o: Self) {
+        self.not_finite -= o.not_finite;
+        self.negative -= o.negative;
+        self.too_near -= o.too_near;
+        self.too_far -= o.too_far;
+    }
+}
+
+/// What integrating one scan did; sums over scans with `+=`, without one that was taken back with `-=`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ScanStats {
     /// Scans fused.
@@ -132,6 +151,18 @@ impl std::ops::AddAssign for ScanStats {
         self.cells += o.cells;
         self.hits_outside += o.hits_outside;
         self.ways += o.ways;
+    }
+}
+
+impl std::ops::SubAssign for ScanStats {
+    fn sub_assign(&mut self, o: Self) {
+        self.scans -= o.scans;
+        self.refused_poses -= o.refused_poses;
+        self.beams -= o.beams;
+        self.refused -= o.refused;
+        self.cells -= o.cells;
+        self.hits_outside -= o.hits_outside;
+        self.ways -= o.ways;
     }
 }
 

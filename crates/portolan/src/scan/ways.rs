@@ -67,6 +67,12 @@ impl std::ops::AddAssign for ScanWays {
     }
 }
 
+impl std::ops::SubAssign for ScanWays {
+    fn sub_assign(&mut self, other: Self) {
+        self.0.iter_mut().zip(other.0).for_each(|(a, b)| *a -= b);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

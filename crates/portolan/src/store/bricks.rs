@@ -108,6 +108,19 @@ impl<C: Cell, const D: usize> Bricks<C, D> {
         }
     }
 
+    /// Forgets the bricks for which this does not hold. What is derived from them by epochs does not learn of it. O(n).
+    pub(crate) fn retain(&mut self, keep: impl Fn(&C::Brick) -> bool) {
+        let (keys, bricks, changed) = (&mut self.keys, &mut self.bricks, &mut self.changed);
+        let all = std::mem::take(keys).into_iter().zip(std::mem::take(bricks)).zip(std::mem::take(changed));
+        for ((key, brick), at) in all.filter(|((_, brick), _)| keep(brick)) {
+            keys.push(key);
+            bricks.push(brick);
+            changed.push(at);
+        }
+        self.bytes = bricks.iter().map(Planes::bytes).sum();
+        self.slots = keys.iter().zip(0..).map(|(key, slot)| (*key, slot)).collect();
+    }
+
     /// Bytes by which what finds bricks grows with the next one: tables double when they are full.
     fn growth(&self) -> usize {
         let keys = if self.keys.len() == self.keys.capacity() { self.keys.capacity().max(4) } else { 0 };

@@ -4,6 +4,7 @@ mod arena;
 mod bricks;
 mod dense;
 mod dense_bricks;
+mod sums;
 mod tree;
 mod tree_bricks;
 mod tree_build;
@@ -14,6 +15,7 @@ mod tree_remake;
 
 pub use bricks::Bricks;
 pub use dense::Dense;
+pub use sums::SumStore;
 pub use tree::{Leaf, Tree};
 pub use tree_bricks::TreeBricksError;
 pub use tree_leaves::LeavesIn;

@@ -52,6 +52,7 @@ pub(super) fn of_2d(file: &MapFile<2>) -> Value {
         });
     }
     maps_of_hits(&mut maps, file);
+    sums(&mut maps, file);
     of_header(2, &file.header, file.poses.len(), maps)
 }
 
@@ -69,7 +70,22 @@ pub(super) fn of_3d(file: &MapFile<3>) -> Value {
         maps["colors"] = of_bricks("red, green, blue, weight, 16 bits each", &map.store);
     }
     maps_of_hits(&mut maps, file);
+    sums(&mut maps, file);
     of_header(3, &file.header, file.poses.len(), maps)
+}
+
+/// What a map of sums holds, from which the others follow.
+fn sums<const D: usize>(maps: &mut Value, file: &MapFile<D>) {
+    let Some(ledger) = &file.ledger else { return };
+    let logs = ledger.scans().logs().map(|log| {
+        let scans = ledger.scans().iter().filter(|(name, ..)| *name == log).count();
+        json!({ "log": log, "scans": scans })
+    });
+    maps["sums"] = json!({
+        "cell": "sums of whole numbers, 16, 32 or 64 bits",
+        "logs": logs.collect::<Vec<_>>(),
+        "bytes": ledger.memory_bytes(),
+    });
 }
 
 fn maps_of_hits<const D: usize>(maps: &mut Value, file: &MapFile<D>) {

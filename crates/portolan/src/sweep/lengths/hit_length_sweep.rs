@@ -144,6 +144,11 @@ impl Sweep<3> for HitLengthSweep<PointScan> {
 }
 
 impl HitLengthSweep<PointScan> {
+    /// Looks for rows and columns anew.
+    pub(crate) fn forget_layout(&mut self) {
+        self.layout = LayoutFinder::default();
+    }
+
     /// Rows and columns for points that come without them; otherwise they are looked for.
     pub fn set_layout(&mut self, layout: SphericalLayout) {
         self.layout = LayoutFinder::of(layout);

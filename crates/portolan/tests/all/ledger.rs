@@ -1,0 +1,343 @@
+//! Laws of maps of sums: any split, any order, any number of threads, back again, elsewhere.
+
+use crate::common::apartment;
+use portolan::ledger::{Epochs, LedgerError};
+use portolan::map::{MapError, ScanKind, Tsdf, TsdfConfig, least_weight};
+use portolan::scan::{Frame, Scan};
+use portolan::store::Store;
+use portolan::{Ledger, MapperSettings, geom::Pose};
+use portolan_sim::building::{BuildingConfig, BuildingSensor, SpinningLidar, building_log};
+use proptest::prelude::*;
+use std::sync::LazyLock;
+
+/// A scan and its pose.
+type Taken<const D: usize, S> = (Pose<D>, S);
+
+/// Scans of the Apartment, far apart.
+static SCANS_2D: LazyLock<Vec<Taken<2, Scan<2>>>> =
+    LazyLock::new(|| apartment().log.iter().step_by(17).cloned().collect());
+
+/// Turns of a lidar through the Building: images, points whose rows are to be found, and points that are followed ray by ray.
+static SCANS_3D: LazyLock<Vec<Taken<3, Frame>>> = LazyLock::new(|| {
+    let lidar = SpinningLidar { columns: 180, rings: 16, ..Default::default() };
+    let sensor = BuildingSensor::Lidar(lidar);
+    let log = building_log(&BuildingConfig { scans: 9, sensor, ..Default::default() });
+    let as_points = |(i, (pose, frame)): (usize, (Pose<3>, Frame))| match frame {
+        Frame::Points(mut scan) if i % 3 != 0 => {
+            scan.image = None;
+            let every = if i % 3 == 1 { 1 } else { 7 };
+            scan.points = scan.points.iter().step_by(every).copied().collect();
+            (pose, Frame::Points(scan))
+        }
+        frame => (pose, frame),
+    };
+    log.scans.into_iter().enumerate().map(as_points).collect()
+});
+
+fn settings<const D: usize>() -> MapperSettings<D> {
+    MapperSettings::new(if D == 2 { 0.1 } else { 0.2 })
+}
+
+fn fused<const D: usize, S: ScanKind<D> + Sync>(
+    scans: &[Taken<D, S>],
+    which: impl IntoIterator<Item = usize>,
+) -> Ledger<D> {
+    let mut ledger = Ledger::new(settings()).unwrap();
+    for i in which {
+        assert_eq!(ledger.add("log", i as u64, &scans[i].0, &scans[i].1).unwrap().scans, 1);
+    }
+    ledger
+}
+
+fn with_threads<R: Send>(count: usize, work: impl FnOnce() -> R + Send) -> R {
+    rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap().install(work)
+}
+
+/// Parts are fused in the order of `keys`, on different numbers of threads, and merged in that order, too.
+fn any_split_in_any_order<const D: usize, S: ScanKind<D> + Sync>(
+    scans: &[Taken<D, S>],
+    parts: &[u8],
+    keys: &[u64],
+) {
+    let n = scans.len();
+    let whole = fused(scans, 0..n);
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by_key(|&i| keys[i]);
+    let mut merged = Ledger::new(settings()).unwrap();
+    for (part, threads) in [(2, 8), (0, 1), (1, 2)] {
+        let which = order.iter().copied().filter(|&i| parts[i] % 3 == part);
+        let of_part = with_threads(threads, || fused(scans, which));
+        merged.merge(&of_part).unwrap();
+    }
+    assert!(merged == whole);
+    // Half of it is taken back, scan by scan, and the rest as a whole.
+    let (out, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|&&i| keys[i] % 2 == 0);
+    for &i in &out {
+        merged.subtract("log", i as u64, &scans[i].1).unwrap();
+    }
+    let rest = fused(scans, rest);
+    assert!(merged == rest);
+    merged.take_out(&rest).unwrap();
+    assert!(merged == Ledger::new(settings()).unwrap());
+    assert!(merged.scans().is_empty());
+}
+
+fn poses_that_change<const D: usize, S: ScanKind<D> + Sync>(
+    scans: &[Taken<D, S>],
+    moved: &[bool],
+    shift: [f64; D],
+    back: bool,
+) where
+    S: Clone,
+{
+    let mut corrected = scans.to_vec();
+    for (i, (pose, _)) in corrected.iter_mut().enumerate().filter(|(i, _)| moved[*i]) {
+        (0..D).for_each(|k| pose.translation[k] += shift[k] * (1.0 + i as f64 * 0.3));
+    }
+    let mut ledger = fused(scans, 0..scans.len());
+    for (i, (pose, scan)) in corrected.iter().enumerate().filter(|(i, _)| moved[*i]) {
+        ledger.repose("log", i as u64, pose, scan).unwrap();
+    }
+    assert!(ledger == fused(&corrected, 0..scans.len()));
+    assert_eq!(ledger == fused(scans, 0..scans.len()), !moved.iter().any(|m| *m));
+    if back {
+        for (i, (pose, scan)) in scans.iter().enumerate() {
+            ledger.repose("log", i as u64, pose, scan).unwrap();
+        }
+        assert!(ledger == fused(scans, 0..scans.len()));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    #[test]
+    fn scans_in_2d_add_up(parts in prop::collection::vec(any::<u8>(), 12), keys in prop::collection::vec(any::<u64>(), 12)) {
+        any_split_in_any_order(&SCANS_2D[..12], &parts, &keys);
+    }
+
+    #[test]
+    fn scans_in_2d_move(moved in prop::collection::vec(any::<bool>(), 12), x in -0.4..0.4f64, y in -0.4..0.4f64) {
+        poses_that_change(&SCANS_2D[..12], &moved, [x, y], true);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4, ..ProptestConfig::default() })]
+
+    #[test]
+    fn scans_in_3d_add_up(parts in prop::collection::vec(any::<u8>(), 9), keys in prop::collection::vec(any::<u64>(), 9)) {
+        any_split_in_any_order(&SCANS_3D[..9], &parts, &keys);
+    }
+
+    #[test]
+    fn scans_in_3d_move(moved in prop::collection::vec(any::<bool>(), 5), x in -0.4..0.4f64, y in -0.4..0.4f64) {
+        poses_that_change(&SCANS_3D[..5], &moved, [x, y, 0.1], false);
+    }
+}
+
+/// What a mean in floating point is, the quotient of the sums is, to the width of a step.
+fn means_are_means<const D: usize, S: ScanKind<D> + Sync>(scans: &[Taken<D, S>]) {
+    let sums = fused(scans, 0..scans.len()).mapper().unwrap();
+    let config = TsdfConfig { w_max: f32::INFINITY, ..*sums.tsdf().unwrap().config() };
+    let mut means = Tsdf::<D>::new(config).unwrap();
+    for (pose, scan) in scans {
+        means.integrate(pose, scan).unwrap();
+    }
+    let believed = least_weight(config.weights, config.carve_weight);
+    let (mut cells, mut worst, mut total) = (0u32, [0.0f64; 2], 0.0);
+    for (key, brick) in means.store().bricks_by_age() {
+        for i in (0..brick.weights().len()).filter(|&i| brick.weights()[i] > 0.0) {
+            let sum = sums.tsdf().unwrap().store().cell(key.cell(i)).unwrap();
+            let off = f64::from(sum.distance - brick.distances()[i]).abs();
+            let of = &mut worst[usize::from(brick.weights()[i] >= believed)];
+            *of = of.max(off);
+            cells += 1;
+            total += off;
+        }
+    }
+    assert_eq!(sums.tsdf().unwrap().observed_cells(0.0), means.observed_cells(0.0));
+    let (mean, [others, worst]) = (total / f64::from(cells), worst.map(|off| 1e3 * off));
+    println!(
+        "{D}-D: {cells} cells, {:.4} mm off in the mean, at most {worst:.4}, {others:.4} where hardly anything was seen",
+        1e3 * mean
+    );
+    // Weights that taper off behind a surface are rounded to 1/256: a hundredth of those that count, all of those that do not.
+    assert!(cells > 5000 && worst < 1e3 * 1e-3 * config.truncation && mean < 2.5e-4 * config.truncation);
+    assert!(others < 1e3 * 0.05 * config.truncation);
+}
+
+#[test]
+fn sums_are_the_weighted_means() {
+    means_are_means(&SCANS_2D);
+    means_are_means(&SCANS_3D);
+}
+
+/// Log odds are clamped once, hits per meter are the same numbers.
+#[test]
+fn occupancy_and_hits_per_meter_follow_from_the_counts() {
+    let sums = fused(&SCANS_2D, 0..SCANS_2D.len());
+    let maps = sums.mapper().unwrap();
+    let occupancy = maps.occupancy().unwrap();
+    let mut seen = 0;
+    for (key, brick) in sums.occupancy_sums().unwrap().bricks_by_age() {
+        for i in 0..brick.cells() {
+            let [hits, misses] = brick.at(i);
+            let exact = (31 * hits - 15 * misses).clamp(-73, 127);
+            let cell = occupancy.store().cell(key.cell(i));
+            assert_eq!(cell.map(|c| i64::from(c.0)), (hits + misses > 0).then_some(exact));
+            seen += usize::from(cell.is_some());
+        }
+    }
+    assert_eq!(seen, occupancy.observed_cells());
+    let rule = portolan::cell::AttenuationRule::NEVER;
+    let mut counted = portolan::map::Attenuation::<2>::new(*occupancy.store().lattice(), rule).unwrap();
+    for (pose, scan) in &*SCANS_2D {
+        counted.integrate(pose, scan).unwrap();
+    }
+    let ours = maps.attenuation().unwrap();
+    assert_eq!(ours.observed_cells(), counted.observed_cells());
+    for (key, brick) in counted.store().bricks_by_age() {
+        assert!(ours.store().brick(key) == Some(brick));
+    }
+}
+
+#[test]
+fn slips_are_refused_and_change_nothing() {
+    let scans = &*SCANS_2D;
+    let mut ledger = fused(scans, 0..4);
+    let before = ledger.clone();
+    let at = |i: usize| (&scans[i].0, &scans[i].1);
+    let twice = ledger.add("log", 2, at(2).0, at(2).1);
+    assert_eq!(twice, Err(LedgerError::Twice { log: "log".into(), index: 2 }));
+    assert_eq!(ledger.subtract("log", 7, at(7).1), Err(LedgerError::NotHeld { log: "log".into(), index: 7 }));
+    assert!(matches!(ledger.subtract("log", 2, at(3).1), Err(LedgerError::OtherReadings { .. })));
+    assert!(matches!(ledger.subtract("other", 2, at(2).1), Err(LedgerError::NotHeld { .. })));
+    assert!(matches!(ledger.repose("log", 9, at(2).0, at(2).1), Err(LedgerError::NotHeld { .. })));
+    let nowhere = Pose { translation: [f64::NAN; 2], ..*at(2).0 };
+    assert!(matches!(ledger.repose("log", 2, &nowhere, at(2).1), Err(LedgerError::Pose { .. })));
+    assert!(matches!(ledger.add("log", 8, &nowhere, at(8).1), Err(LedgerError::Pose { .. })));
+    assert!(matches!(ledger.merge(&fused(scans, 3..6)), Err(LedgerError::Twice { index: 3, .. })));
+    assert!(matches!(ledger.take_out(&fused(scans, 3..6)), Err(LedgerError::NotHeld { index: 4, .. })));
+    let mut elsewhere = Ledger::new(settings()).unwrap();
+    elsewhere.add("log", 1, &Pose::<2>::new(4.0, 4.0, 0.0), at(1).1).unwrap();
+    assert!(matches!(ledger.take_out(&elsewhere), Err(LedgerError::OtherPose { index: 1, .. })));
+    let others = [
+        MapperSettings { resolution: 0.05, ..settings() },
+        MapperSettings { origin: Some([0.05, 0.0]), ..settings() },
+        MapperSettings { carve_weight: 0.5, ..settings() },
+        MapperSettings { truncation: Some(0.5), ..settings() },
+        MapperSettings { attenuation: None, ..settings() },
+        MapperSettings { occupancy: None, ..settings() },
+    ];
+    for other in others {
+        let other = Ledger::new(other).unwrap();
+        assert!(matches!(ledger.merge(&other), Err(LedgerError::Different { .. })));
+    }
+    assert!(ledger == before);
+    assert!(matches!(
+        Ledger::new(MapperSettings { color: true, ..settings::<3>() }),
+        Err(LedgerError::Without(_))
+    ));
+}
+
+#[test]
+fn far_from_zero_an_origin_must_be_given() {
+    let (pose, scan) = &SCANS_2D[0];
+    let far =
+        Pose { translation: [pose.translation[0] + 500_000.0, pose.translation[1] + 4_000_000.0], ..*pose };
+    let mut ledger = Ledger::new(settings()).unwrap();
+    assert!(matches!(ledger.add("log", 0, &far, scan), Err(LedgerError::Far { .. })));
+    let origin = Some([500_000.0, 4_000_000.0]);
+    let mut ledger = Ledger::new(MapperSettings { origin, ..settings() }).unwrap();
+    ledger.add("log", 0, &far, scan).unwrap();
+    let near = fused(&SCANS_2D, [0]);
+    let weights = |ledger: &Ledger<2>| {
+        ledger
+            .distance_sums()
+            .unwrap()
+            .bricks_by_age()
+            .map(|(_, b)| b.planes().iter().sum::<i64>())
+            .sum::<i64>()
+    };
+    assert!((weights(&ledger) - weights(&near)).abs() < weights(&near).abs() / 1000);
+}
+
+#[test]
+fn a_scan_that_has_no_room_is_left_out_whole() {
+    let memory = fused(&SCANS_2D, 0..SCANS_2D.len()).memory_bytes() / 2;
+    let mut ledger = Ledger::new(MapperSettings { memory, ..settings() }).unwrap();
+    let mut refused = 0;
+    for (i, (pose, scan)) in SCANS_2D.iter().enumerate() {
+        let before = ledger.clone();
+        match ledger.add("log", i as u64, pose, scan) {
+            Ok(_) => assert!(ledger.memory_bytes() <= memory),
+            Err(LedgerError::Map(MapError::Full(_))) => {
+                refused += 1;
+                assert!(ledger == before);
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    assert!(refused > 0 && refused < SCANS_2D.len(), "{refused}");
+    let which: Vec<usize> = ledger.scans().iter().map(|(_, i, _)| i as usize).collect();
+    assert!(ledger == fused(&SCANS_2D, which));
+}
+
+#[test]
+fn epochs_keep_the_newest_scans_exactly() {
+    let mut epochs = Epochs::new(settings(), 2.0, 4.0).unwrap();
+    for (i, (pose, scan)) in SCANS_2D.iter().enumerate() {
+        epochs.add("log", i as u64, i as f64, pose, scan).unwrap();
+        // The epoch of now, the two before it that are kept whole, and what is not yet older than the time that is kept.
+        let kept: Vec<usize> = epochs.ledger().scans().iter().map(|(_, i, _)| i as usize).collect();
+        assert!(kept.len() <= 8 && kept.last() == Some(&i) && kept.windows(2).all(|w| w[0] + 1 == w[1]));
+        assert!(i < 5 || i - kept[0] >= 4);
+        assert!(*epochs.ledger() == fused(&SCANS_2D, kept));
+    }
+    let (pose, scan) = &SCANS_2D[0];
+    assert!(matches!(epochs.add("log", 99, 1.0, pose, scan), Err(LedgerError::Time { .. })));
+    assert!(matches!(epochs.add("log", 99, f64::NAN, pose, scan), Err(LedgerError::Time { .. })));
+}
+
+/// What was taken away answers nothing, and what is derived from the rest is the rest's.
+#[test]
+fn the_maps_of_a_ledger_answer_like_any_other() {
+    let mut ledger = fused(&SCANS_2D, 0..SCANS_2D.len());
+    let mut maps = ledger.mapper().unwrap();
+    let esdf = maps.esdf().unwrap();
+    let p = SCANS_2D[3].0.translation;
+    assert!(esdf.distance(p).known().unwrap() > 0.1);
+    assert!(maps.contour().length() > 20.0);
+    for (i, (_, scan)) in SCANS_2D.iter().enumerate() {
+        ledger.subtract("log", i as u64, scan).unwrap();
+    }
+    let empty = ledger.mapper().unwrap();
+    assert_eq!(empty.tsdf().unwrap().observed_cells(0.0), 0);
+    assert!(empty.tsdf().unwrap().store().is_empty());
+    assert_eq!(empty.occupancy().unwrap().probability(p).known(), None);
+}
+
+/// The surface of the sums is as far from the walls as that of the clamped cells.
+#[test]
+fn surfaces_are_as_true_as_those_of_clamped_cells() {
+    let sensor = BuildingSensor::Lidar(SpinningLidar { columns: 512, ..Default::default() });
+    let log = building_log(&BuildingConfig { scans: 10, sensor, ..Default::default() });
+    let how = MapperSettings { occupancy: None, attenuation: None, ..MapperSettings::<3>::new(0.1) };
+    let mut clamped = portolan::Mapper::with(how);
+    let mut sums = Ledger::new(how).unwrap();
+    for (i, (pose, scan)) in log.scans.iter().enumerate() {
+        clamped.integrate(pose, scan).unwrap();
+        sums.add("log", i as u64, pose, scan).unwrap();
+    }
+    let median = |mapper: &mut portolan::Mapper<3>| {
+        let mesh = mapper.mesh();
+        let mut off: Vec<f64> =
+            mesh.vertices.iter().map(|v| log.world.signed_distance(v.map(f64::from)).abs()).collect();
+        assert!(off.len() > 10_000);
+        1e3 * crate::common::quantile(&mut off, 0.5)
+    };
+    let (clamped, sums) = (median(&mut clamped), median(&mut sums.mapper().unwrap()));
+    println!("median distance of vertices from the walls: {clamped:.3} mm clamped, {sums:.3} mm of sums");
+    assert!((clamped - sums).abs() < 0.1);
+}
