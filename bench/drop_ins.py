@@ -5,7 +5,7 @@
     python3 bench/drop_ins.py [--threads 1] [--runs 5] [--size 256] [--only WORD] [--json FILE]
 
 All run in this process, on as many CPUs as there are threads, each library with as many threads (SciPy and scikit-image know
-one). Runs of all take turns. Inputs and VTK's objects are made before the clock starts; results are compared once, before.
+one), each with as much to give as the other (VTK knows no values). Runs of all take turns. Inputs and VTK's objects are made before the clock starts; results are compared once, before.
 The ratio is the median of the peer over ours. What misses its aim comes first.
 """
 import argparse
@@ -91,12 +91,19 @@ def surface_cases(np, portolan, n, threads):
     ball = np.float32(4 * np.pi) - np.sqrt((x - 4 * np.pi) ** 2 + (y - 4 * np.pi) ** 2 + (z - 4 * np.pi) ** 2)
     for name, volume in {"gyroid": gyroid, "ball": ball}.items():
         volume = np.ascontiguousarray(volume)
-        who = {
-            "portolan": lambda volume=volume: portolan.marching_cubes(volume, 0.1)[:2],
+        ours = lambda volume=volume, **options: portolan.marching_cubes(volume, 0.1, **options)[:2]
+        yield f"marching_cubes, {name} {n}^3", {
+            "portolan": ours,
             "scikit-image": lambda volume=volume: measure.marching_cubes(volume, 0.1)[:2],
         }
-        who.update(flying_edges(volume, threads))
-        yield f"marching_cubes, {name} {n}^3", who
+        # Each with as much as the peer gives.
+        edges = flying_edges(volume, threads)
+        for what, options in {"normals": dict(values=False), "mesh alone": dict(normals=False, values=False)}.items():
+            if edges:
+                yield f"marching_cubes, {name} {n}^3, {what}", {
+                    "portolan": lambda ours=ours, options=options: ours(**options),
+                    "vtk": edges[what],
+                }
 
 
 def flying_edges(volume, threads):
@@ -112,7 +119,7 @@ def flying_edges(volume, threads):
     image.SetDimensions(*volume.shape[::-1])
     image.GetPointData().SetScalars(numpy_support.numpy_to_vtk(volume.ravel(), deep=0))
     found = {}
-    for name, normals in (("vtk, normals", True), ("vtk, no normals", False)):
+    for name, normals in (("normals", True), ("mesh alone", False)):
         edges = vtk.vtkFlyingEdges3D()
         edges.SetInputData(image)
         edges.SetValue(0, 0.1)
@@ -166,19 +173,28 @@ def measured(cases, runs, np, clock):
 
 def overhead(np, portolan):
     """Seconds for one call with next to nothing to do; the least of some hundred rounds."""
-    mask, volume = np.eye(4, dtype=bool), np.indices((3, 3, 3))[0].astype("f4")
+    import edt
+    from skimage import measure
+
+    nothing, mask, volume = np.zeros((0, 4), bool), np.eye(4, dtype=bool), np.indices((3, 3, 3))[0].astype("f4")
     out = {}
-    for name, run in {
-        "edt, 4 x 4": lambda: portolan.edt(mask),
-        "marching_cubes, 3 x 3 x 3": lambda: portolan.marching_cubes(volume, 0.5),
+    for name, calls in {
+        "edt, no cells": [lambda: portolan.edt(nothing), lambda: edt.edt(nothing)],
+        "edt, 4 x 4": [lambda: portolan.edt(mask), lambda: edt.edt(mask)],
+        "marching_cubes, 3 x 3 x 3": [
+            lambda: portolan.marching_cubes(volume, 0.5),
+            lambda: measure.marching_cubes(volume, 0.5),
+        ],
     }.items():
-        rounds = []
-        for _ in range(200):
-            start = time.perf_counter()
-            for _ in range(100):
-                run()
-            rounds.append((time.perf_counter() - start) / 100)
-        out[name] = (min(rounds), statistics.median(rounds))
+        out[name] = []
+        for run, count in zip(calls, (100, 10)):
+            rounds = []
+            for _ in range(200):
+                start = time.perf_counter()
+                for _ in range(count):
+                    run()
+                rounds.append((time.perf_counter() - start) / count)
+            out[name] += [min(rounds), statistics.median(rounds)]
     return out
 
 
@@ -223,14 +239,15 @@ def main():
             rows.append((ratio >= aim, ratio / aim, case, name, ratio, aim, seconds))
     rows.sort(key=lambda row: row[:2])
     spread = lambda s: f"{1e3 * statistics.median(s):9.1f} ({1e3 * min(s):.1f} to {1e3 * max(s):.1f})"
-    print(f"\n\n{'case':<40}{'peer':<17}{'over ours':>10}{'aim':>5}         ours, ms: median (all){'theirs':>22}")
+    print(f"\n\n{'case':<44}{'peer':<17}{'over ours':>10}{'aim':>5}         ours, ms: median (all){'theirs':>22}")
     for met, _, case, name, ratio, aim, seconds in rows:
         mark = "" if met else "  MISSED"
-        print(f"{case:<40}{name:<17}{ratio:9.1f}x{aim:>4}x{mark:<8}  {spread(seconds['portolan']):<28}{spread(seconds[name])}")
+        print(f"{case:<44}{name:<17}{ratio:9.1f}x{aim:>4}x{mark:<8}  {spread(seconds['portolan']):<28}{spread(seconds[name])}")
     calls = overhead(np, portolan)
-    for name, (least, median) in calls.items():
+    for name, (least, median, theirs, _) in calls.items():
         mark = "" if least < OVERHEAD else "  MISSED"
-        print(f"one call, {name}: {1e6 * least:.2f} us at least, {1e6 * median:.2f} us median (aim {1e6 * OVERHEAD:.0f}){mark}")
+        aim = f"aim {1e6 * OVERHEAD:.0f}; the peer's {1e6 * theirs:.1f} at least"
+        print(f"one call, {name}: {1e6 * least:.2f} us at least, {1e6 * median:.2f} us median ({aim}){mark}")
     if args.json:
         with open(args.json, "w") as file:
             json.dump({"versions": versions, "arguments": vars(args), "seconds": all_seconds, "calls": calls}, file, indent=1)

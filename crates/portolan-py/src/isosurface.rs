@@ -5,9 +5,13 @@ use portolan::surface::{Inside, Isosurface, IsosurfaceSettings, isosurface};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rayon::prelude::*;
 
 use crate::arrays::{array, dense, rows, shown};
 use crate::fault::{value_error, work};
+
+/// Fewer vertices or triangles are not shared out.
+const SHARED: usize = 1 << 15;
 
 /// The same array with this type of values, in the order of memory that is wanted; in place where it is so already.
 fn ordered<'py, T: numpy::Element>(
@@ -42,43 +46,64 @@ fn extent(samples: &[f32]) -> Option<(f32, f32)> {
 
 /// Axes in the order of the array, lengths in its unit, triangles turned if that mirrors them or if it is asked for.
 fn place(found: &mut Isosurface, spacing: [f64; 3], fortran: bool, turned: bool) {
-    let axes: [usize; 3] = if fortran { [0, 1, 2] } else { [2, 1, 0] };
     let scale = spacing.map(|s| s as f32);
-    for v in &mut found.mesh.vertices {
-        *v = [0, 1, 2].map(|k| v[axes[k]] * scale[k]);
+    if !fortran || spacing != [1.0; 3] {
+        each(&mut found.mesh.vertices, |v| {
+            if !fortran {
+                v.swap(0, 2);
+            }
+            for k in 0..3 {
+                v[k] *= scale[k];
+            }
+        });
     }
     let inverse = spacing.map(|s| (1.0 / s) as f32);
     let equal = spacing[0] == spacing[1] && spacing[1] == spacing[2];
-    for n in &mut found.mesh.normals {
-        *n = axes.map(|k| n[k]);
-        if !equal {
-            let there = [0, 1, 2].map(|k| n[k] * inverse[k]);
-            let length = there.iter().map(|v| v * v).sum::<f32>().sqrt();
-            *n = if length > 0.0 { there.map(|v| v / length) } else { *n };
-        }
+    if !fortran || !equal {
+        each(&mut found.mesh.normals, |n| {
+            if !fortran {
+                n.swap(0, 2);
+            }
+            if !equal {
+                let there = [0, 1, 2].map(|k| n[k] * inverse[k]);
+                let length = there.iter().map(|v| v * v).sum::<f32>().sqrt();
+                *n = if length > 0.0 { there.map(|v| v / length) } else { *n };
+            }
+        });
     }
     if turned {
-        found.mesh.triangles.iter_mut().for_each(|t| t.swap(0, 2));
+        each(&mut found.mesh.triangles, |t| t.swap(0, 2));
     }
 }
 
-/// Vertices, triangles, normals and ranges.
+/// Changes all, many on all cores.
+fn each<T: Send>(all: &mut [T], change: impl Fn(&mut T) + Sync) {
+    if all.len() < SHARED {
+        all.iter_mut().for_each(change);
+    } else {
+        all.par_chunks_mut(SHARED).for_each(|some| some.iter_mut().for_each(&change));
+    }
+}
+
+/// Vertices, triangles, and where they are asked for normals and ranges.
 type Surface<'py> = (
     Bound<'py, PyArrayDyn<f32>>,
-    Bound<'py, PyAny>,
-    Bound<'py, PyArrayDyn<f32>>,
-    Bound<'py, PyArrayDyn<f32>>,
+    Bound<'py, PyArrayDyn<i32>>,
+    Option<Bound<'py, PyArrayDyn<f32>>>,
+    Option<Bound<'py, PyArrayDyn<f32>>>,
 );
 
 /// The surface at which the values of an array cross a level, as triangles: marching cubes.
 #[pyfunction]
-#[pyo3(signature = (volume, level=None, spacing=None, gradient_direction="descent", mask=None))]
+#[pyo3(signature = (volume, level=None, spacing=None, gradient_direction="descent", mask=None, *, normals=true, values=true))]
 pub(crate) fn marching_cubes<'py>(
     volume: &Bound<'py, PyAny>,
     level: Option<f64>,
     spacing: Option<[f64; 3]>,
     gradient_direction: &str,
     mask: Option<&Bound<'py, PyAny>>,
+    normals: bool,
+    values: bool,
 ) -> PyResult<Surface<'py>> {
     let py = volume.py();
     let descent = match gradient_direction {
@@ -143,14 +168,8 @@ pub(crate) fn marching_cubes<'py>(
                 f64::from(0.5 * (least + most))
             }
         };
-        let settings = IsosurfaceSettings {
-            level,
-            inside: Inside::Above,
-            normals: true,
-            ranges: true,
-            apart: false,
-            cubes,
-        };
+        let settings =
+            IsosurfaceSettings { level, inside: Inside::Above, normals, ranges: values, apart: false, cubes };
         let mut found = isosurface(samples, shape, &settings);
         if found.mesh.triangles.is_empty() {
             return match extent(samples) {
@@ -176,8 +195,8 @@ pub(crate) fn marching_cubes<'py>(
     }
     Ok((
         rows(py, mesh.vertices, &[vertices])?,
-        rows(py, mesh.triangles, &[triangles])?.call_method1("view", ("i4",))?,
-        rows(py, mesh.normals, &[vertices])?,
-        array(py, ranges, &[vertices])?,
+        rows(py, mesh.triangles, &[triangles])?.call_method1("view", ("i4",))?.cast_into()?,
+        if normals { Some(rows(py, mesh.normals, &[vertices])?) } else { None },
+        if values { Some(array(py, ranges, &[vertices])?) } else { None },
     ))
 }

@@ -12,6 +12,7 @@ mod dimension;
 mod esdf;
 mod events;
 mod fault;
+mod indices;
 mod isosurface;
 mod ledger;
 mod log;

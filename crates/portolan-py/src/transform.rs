@@ -3,10 +3,10 @@
 use numpy::{PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use portolan::field::{Label, MaskError, MaskTransform};
 use pyo3::prelude::*;
-use rayon::prelude::*;
 
 use crate::arrays::{array as array_of, dense, shown};
 use crate::fault::{value_error, work};
+use crate::indices::indices;
 
 /// What is asked of one array.
 #[derive(Clone, Copy)]
@@ -59,32 +59,6 @@ fn refused(error: MaskError) -> PyErr {
         MaskError::Border => value_error(format!("return_indices with black_border: {error}")),
         _ => value_error(format!("mask: {error}")),
     }
-}
-
-/// Row, column and layer of every cell, the axis of least stride first unless `reversed`; -1 where there is none.
-fn indices<const D: usize>(nearest: &[u32], shape: [usize; D], reversed: bool, threads: usize) -> Vec<i32> {
-    let mut all = vec![-1; D * nearest.len()];
-    if nearest.is_empty() {
-        return all;
-    }
-    let mut stride = 1;
-    for (k, n) in shape.iter().enumerate() {
-        let (n, below) = (*n as u32, stride);
-        stride *= n;
-        let plane = if reversed { D - 1 - k } else { k } * nearest.len();
-        let plane = &mut all[plane..plane + nearest.len()];
-        let one = |(to, from): (&mut i32, &u32)| {
-            if *from != u32::MAX {
-                *to = (*from / below % n) as i32;
-            }
-        };
-        if threads == 1 || nearest.len() < 1 << 16 {
-            plane.iter_mut().zip(nearest).for_each(one);
-        } else {
-            plane.par_iter_mut().zip(nearest).with_min_len(1 << 14).for_each(one);
-        }
-    }
-    all
 }
 
 fn transform<T: Label, const D: usize>(

@@ -88,6 +88,29 @@ def test_it_is_the_surface_of_scikit_image(order, direction, spacing, seed):
     assert np.median(along) > 0.99 and along.min() > 0.5
 
 
+@pytest.mark.parametrize("order", "CF")
+def test_what_is_not_asked_for_is_none(order):
+    volume = np.array(smooth((19, 28, 21), 5), order=order)
+    whole = portolan.marching_cubes(volume, 0.1)
+    for normals, values in ((True, False), (False, True), (False, False)):
+        some = portolan.marching_cubes(volume, 0.1, normals=normals, values=values)
+        for got, want, asked in zip(some, whole, (True, True, normals, values)):
+            assert (got is None) == (not asked)
+            if asked:
+                np.testing.assert_array_equal(got, want)
+
+
+@pytest.mark.parametrize("order", "CF")
+def test_a_sample_that_is_not_finite_changes_what_is_around_it_alone(order):
+    volume = smooth((30, 26, 35), 7)
+    holed = volume.copy()
+    holed[0, 0, 0] = np.nan
+    # An array with holes goes another way.
+    rows = lambda v: set(map(bytes, np.concatenate([v[0], v[2], v[3][:, None]], 1)[(v[0] > 2).any(1)]))
+    whole, rest = (rows(portolan.marching_cubes(np.array(v, order=order), 0.1)) for v in (volume, holed))
+    assert whole == rest and len(whole) > 500
+
+
 def test_a_ball_has_triangles_like_those_of_scikit_image():
     verts, faces, _, _ = portolan.marching_cubes(ball(), 0.0)
     v, f, _, _ = measure.marching_cubes(ball(), 0.0)

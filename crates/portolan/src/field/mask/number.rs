@@ -20,11 +20,14 @@ pub(super) trait Number: Copy + PartialOrd + Default + Send + Sync {
     /// The sum; not less than [`Number::FAR`] where one of the two is.
     fn plus(self, cost: Self) -> Self;
 
-    /// A signed offset in rows, which fits by the choice of the type.
+    /// A signed offset in rows, which fits by the choice of the type. Ordered as the offsets are.
     fn of_offset(k: isize) -> Self;
 
     /// The offset again.
     fn offset(self) -> isize;
+
+    /// The first where `is`, else the second; without a branch.
+    fn choose(is: bool, yes: Self, no: Self) -> Self;
 
     /// The largest value, below [`Number::FAR`], that is not more than `squared`.
     fn limit(squared: f64) -> Self;
@@ -60,12 +63,18 @@ impl Number for u16 {
 
     #[inline(always)]
     fn of_offset(k: isize) -> Self {
-        k as i16 as Self
+        (k as i16 ^ i16::MIN) as Self
     }
 
     #[inline(always)]
     fn offset(self) -> isize {
-        self as i16 as isize
+        (self as i16 ^ i16::MIN) as isize
+    }
+
+    #[inline(always)]
+    fn choose(is: bool, yes: Self, no: Self) -> Self {
+        let mask = Self::from(is).wrapping_neg();
+        yes & mask | no & !mask
     }
 
     #[inline(always)]
@@ -109,12 +118,18 @@ impl Number for u32 {
 
     #[inline(always)]
     fn of_offset(k: isize) -> Self {
-        k as i32 as Self
+        (k as i32 ^ i32::MIN) as Self
     }
 
     #[inline(always)]
     fn offset(self) -> isize {
-        self as i32 as isize
+        (self as i32 ^ i32::MIN) as isize
+    }
+
+    #[inline(always)]
+    fn choose(is: bool, yes: Self, no: Self) -> Self {
+        let mask = Self::from(is).wrapping_neg();
+        yes & mask | no & !mask
     }
 
     #[inline(always)]
@@ -163,6 +178,11 @@ impl Number for f32 {
     #[inline(always)]
     fn offset(self) -> isize {
         self as isize
+    }
+
+    #[inline(always)]
+    fn choose(is: bool, yes: Self, no: Self) -> Self {
+        if is { yes } else { no }
     }
 
     #[inline(always)]

@@ -136,7 +136,7 @@ impl<L: Number, const N: usize> Panel<L, N> {
                 span = bounds(&found.offset, row);
             } else {
                 // Lanes that find nothing better keep what is near.
-                found.offset = [L::ZERO; N];
+                found.offset = [L::of_offset(0); N];
                 found.look::<true>(rows, window, squares, k, end);
                 let far = bounds(&found.offset, row);
                 span = (far.0.min(span.0), far.1.max(span.1));
@@ -180,11 +180,13 @@ impl<L: Number, const N: usize> Panel<L, N> {
 /// The lowest and the highest row that the offsets of a row lead to.
 #[inline(always)]
 fn bounds<L: Number, const N: usize>(offsets: &[L; N], row: usize) -> (u32, u32) {
-    let (mut low, mut high) = (isize::MAX, isize::MIN);
-    for offset in offsets {
-        low = low.min(offset.offset());
-        high = high.max(offset.offset());
+    // In the numbers of the lanes, one after the other: what becomes vectors best.
+    let (mut low, mut high) = (offsets[0], offsets[0]);
+    for &offset in offsets {
+        low = if offset < low { offset } else { low };
+        high = if offset > high { offset } else { high };
     }
+    let (low, high) = (low.offset(), high.offset());
     (row.saturating_add_signed(low) as u32, row.saturating_add_signed(high) as u32)
 }
 

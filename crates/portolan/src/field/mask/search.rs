@@ -41,7 +41,7 @@ impl<L: Number, const N: usize> Found<L, N> {
     #[inline(always)]
     pub(super) fn at(f: &[[L; N]], window: Window) -> Self {
         let inside = window.first <= window.row && window.row <= window.last;
-        Self { best: if inside { f[window.row] } else { [L::FAR; N] }, offset: [L::ZERO; N] }
+        Self { best: if inside { f[window.row] } else { [L::FAR; N] }, offset: [L::of_offset(0); N] }
     }
 
     /// Looks at offsets from `k` to `end` (excluded) on both sides, as long as some lane can find less; with `OFFSET`,
@@ -103,14 +103,20 @@ impl<L: Number, const N: usize> Found<L, N> {
     #[inline(always)]
     fn relax<const OFFSET: bool, const BELOW: bool>(&mut self, row: &[L; N], cost: L, j: usize) {
         let step = L::of_offset(if BELOW { -(j as isize) } else { j as isize });
+        // Lanes of one operation after the other, without a branch: else only `f32` becomes vectors.
+        let (mut sum, mut least) = ([L::ZERO; N], [L::ZERO; N]);
         for i in 0..N {
-            let sum = row[i].plus(cost);
-            let best = self.best[i];
-            if OFFSET {
-                let less = if BELOW { sum <= best } else { sum < best };
-                self.offset[i] = if less { step } else { self.offset[i] };
-            }
-            self.best[i] = if sum < best { sum } else { best };
+            sum[i] = row[i].plus(cost);
         }
+        for i in 0..N {
+            least[i] = if sum[i] < self.best[i] { sum[i] } else { self.best[i] };
+        }
+        if OFFSET {
+            for i in 0..N {
+                let less = if BELOW { least[i] == sum[i] } else { least[i] != self.best[i] };
+                self.offset[i] = L::choose(less, step, self.offset[i]);
+            }
+        }
+        self.best = least;
     }
 }

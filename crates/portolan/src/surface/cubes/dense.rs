@@ -4,8 +4,9 @@ use super::assemble::{Placement, assemble};
 use super::numbers::Numbers;
 use super::piece::Part;
 use super::samples::DenseSamples;
-use super::signs::{Layers, Signs, byte};
+use super::signs::{Layers, Signs, word32};
 use super::vertex::{Attributes, MARGIN};
+use super::whole;
 use crate::geom::BlockKey;
 use crate::parallel;
 use crate::surface::Mesh;
@@ -67,24 +68,39 @@ pub fn isosurface(samples: &[f32], shape: [usize; 3], settings: &IsosurfaceSetti
     assert!(settings.cubes.is_none_or(|cubes| cubes.len() == samples.len()), "one flag per node");
     assert!(shape.iter().all(|&n| n <= 1 << 30), "an index of a node is an i32");
     let want = Attributes { normals: settings.normals, colors: false, ranges: settings.ranges };
-    let below = Below::of(settings);
-    let dense = DenseSamples {
-        samples,
-        shape,
-        level: settings.level,
-        sign: below.sign,
-        margin: if settings.apart { MARGIN } else { 0.0 },
-        cubes: settings.cubes,
-        first: [0; 3],
-    };
-    let tiles = Tiles::new(shape);
+    let (dense, below, tiles) =
+        (DenseSamples::of(samples, shape, settings), Below::of(settings), Tiles::new(shape));
+    if settings.cubes.is_none()
+        && let Some((mesh, ranges)) = whole::surface(&tiles, &dense, below, want)
+    {
+        return Isosurface { mesh, ranges };
+    }
+    with_holes(&tiles, &dense, below, want)
+}
+
+impl<'a> DenseSamples<'a> {
+    fn of(samples: &'a [f32], shape: [usize; 3], settings: &IsosurfaceSettings<'a>) -> Self {
+        Self {
+            samples,
+            shape,
+            level: settings.level,
+            sign: Below::of(settings).sign,
+            margin: if settings.apart { MARGIN } else { 0.0 },
+            cubes: settings.cubes,
+            first: [0; 3],
+        }
+    }
+}
+
+/// The level set of any array, piece by piece.
+fn with_holes(tiles: &Tiles, dense: &DenseSamples, below: Below, want: Attributes) -> Isosurface {
     let scratch = || (Vec::new(), Numbers::new(), [0; 4]);
     let parts = parallel::map_numbers(tiles.count(), scratch, |i, (signs, numbers, sizes)| {
         let tile = tiles.tile(i);
-        tile.read(samples, shape, below, signs);
+        tile.read(dense.samples, dense.shape, below, signs);
         // The sizes of the previous tile: arrays seldom grow.
         let mut part = Part::like(sizes);
-        tile.mesh(&dense, want, signs, numbers, &mut part);
+        tile.mesh(dense, want, signs, numbers, &mut part);
         *sizes = part.sizes();
         part
     });
@@ -96,7 +112,7 @@ pub fn isosurface(samples: &[f32], shape: [usize; 3], settings: &IsosurfaceSetti
 
 /// What is inside, in the numbers of the samples: `sign * sample < threshold`.
 #[derive(Clone, Copy)]
-struct Below {
+pub(super) struct Below {
     sign: f32,
     threshold: f32,
 }
@@ -123,8 +139,8 @@ const TILE: usize = 1 << 17;
 
 /// The bricks of an array in tiles: whole rows of bricks along x, some beside each other along y. In ascending order of
 /// keys.
-struct Tiles {
-    bricks: [usize; 3],
+pub(super) struct Tiles {
+    pub(super) bricks: [usize; 3],
     /// Rows of bricks of a tile.
     rows: usize,
     /// Tiles along y.
@@ -132,7 +148,7 @@ struct Tiles {
 }
 
 /// Some rows of bricks.
-struct Tile {
+pub(super) struct Tile {
     nx: usize,
     y: std::ops::Range<usize>,
     z: usize,
@@ -145,11 +161,11 @@ impl Tiles {
         Self { bricks, rows, along: bricks[1].div_ceil(rows) }
     }
 
-    fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.along * self.bricks[2]
     }
 
-    fn tile(&self, i: usize) -> Tile {
+    pub(super) fn tile(&self, i: usize) -> Tile {
         let first = i % self.along * self.rows;
         let y = first..(first + self.rows).min(self.bricks[1]);
         Tile { nx: self.bricks[0], y, z: i / self.along }
@@ -162,15 +178,38 @@ impl Tile {
         x + self.nx * (y - self.y.start + (self.y.len() + 1) * (z - self.z))
     }
 
-    /// Signs of the tile's nodes, and of the nearest ones of its upper neighbors.
-    fn read(&self, samples: &[f32], shape: [usize; 3], below: Below, signs: &mut Vec<Signs>) {
+    /// Signs of the tile's nodes, and of the nearest ones of its upper neighbors; whether all samples are finite.
+    pub(super) fn read(
+        &self,
+        samples: &[f32],
+        shape: [usize; 3],
+        below: Below,
+        signs: &mut Vec<Signs>,
+    ) -> bool {
         signs.clear();
         signs.resize(2 * self.nx * (self.y.len() + 1), Signs::NOTHING);
+        let mut finite = true;
         for z in 8 * self.z..(8 * self.z + 9).min(shape[2]) {
             for y in 8 * self.y.start..(8 * self.y.end + 1).min(shape[1]) {
                 let row = &samples[(y + shape[1] * z) * shape[0]..][..shape[0]];
                 let first = self.place(0, y >> 3, z >> 3);
-                read_row(row, below, &mut signs[first..first + self.nx], [y & 7, z & 7]);
+                finite &= read_row(row, below, &mut signs[first..first + self.nx], [y & 7, z & 7]);
+            }
+        }
+        finite
+    }
+
+    /// The bricks that may have surface, and the signs around them.
+    pub(super) fn each_crossed(&self, signs: &[Signs], mut found: impl FnMut([usize; 3], &Layers)) {
+        for y in self.y.clone() {
+            for x in 0..self.nx {
+                let layers = Layers::new(std::array::from_fn(|o| {
+                    let at = self.place(x, y + (o >> 1 & 1), self.z + (o >> 2));
+                    if x + (o & 1) < self.nx { &signs[at + (o & 1)] } else { &Signs::NOTHING }
+                }));
+                if layers.any_crossing() {
+                    found([x, y, self.z], &layers);
+                }
             }
         }
     }
@@ -184,34 +223,35 @@ impl Tile {
         numbers: &mut Numbers,
         part: &mut Part,
     ) {
-        for y in self.y.clone() {
-            for x in 0..self.nx {
-                let layers = Layers::new(std::array::from_fn(|o| {
-                    let at = self.place(x, y + (o >> 1 & 1), self.z + (o >> 2));
-                    if x + (o & 1) < self.nx { &signs[at + (o & 1)] } else { &Signs::NOTHING }
-                }));
-                if layers.any_crossing() {
-                    let samples = DenseSamples { first: [8 * x, 8 * y, 8 * self.z], ..*samples };
-                    let key = BlockKey([x, y, self.z].map(|k| k as i32));
-                    part.add(key, &layers, &samples, want, numbers);
-                }
-            }
-        }
+        self.each_crossed(signs, |at, layers| {
+            let samples = DenseSamples { first: at.map(|k| 8 * k), ..*samples };
+            part.add(BlockKey(at.map(|k| k as i32)), layers, &samples, want, numbers);
+        });
     }
 }
 
-/// Signs of one row of nodes along x.
-fn read_row(row: &[f32], below: Below, signs: &mut [Signs], [y, z]: [usize; 2]) {
-    let (whole, rest) = row.as_chunks::<8>();
+/// Signs of one row of nodes along x; whether all of it is finite.
+fn read_row(row: &[f32], below: Below, signs: &mut [Signs], [y, z]: [usize; 2]) -> bool {
     let shift = 8 * y;
-    for (signs, values) in signs.iter_mut().zip(whole) {
-        signs.inside[z] |= u64::from(byte(values, |v| below.holds(v))) << shift;
-        signs.observed[z] |= u64::from(byte(values, f32::is_finite)) << shift;
+    // Seldom false, and known at once for the row.
+    let finite = row.iter().fold(true, |all, v| all & v.is_finite());
+    let mut put = |at: usize, inside: u8, observed: u8| {
+        signs[at].inside[z] |= u64::from(inside) << shift;
+        signs[at].observed[z] |= u64::from(observed) << shift;
+    };
+    let (words, rest) = row.as_chunks::<32>();
+    for (at, values) in words.iter().enumerate() {
+        let observed = if finite { u32::MAX } else { word32(values, f32::is_finite) };
+        let bytes = word32(values, |v| below.holds(v)).to_le_bytes().into_iter().zip(observed.to_le_bytes());
+        for (k, (inside, observed)) in bytes.enumerate() {
+            put(4 * at + k, inside, observed);
+        }
     }
-    for (k, v) in rest.iter().enumerate() {
-        signs[whole.len()].inside[z] |= u64::from(below.holds(*v) && v.is_finite()) << (shift + k);
-        signs[whole.len()].observed[z] |= u64::from(v.is_finite()) << (shift + k);
+    for (at, values) in rest.chunks(8).enumerate() {
+        let bits = |has: &dyn Fn(f32) -> bool| (0..).zip(values).map(|(k, v)| u8::from(has(*v)) << k).sum();
+        put(4 * words.len() + at, bits(&|v| below.holds(v) && v.is_finite()), bits(&f32::is_finite));
     }
+    finite
 }
 
 #[cfg(test)]
@@ -225,7 +265,7 @@ mod tests {
     use crate::surface::EdgeCounts;
     use crate::surface::cubes::testing::bricks;
     use crate::surface::{MeshSettings, marching_cubes};
-    use crate::testing::Random;
+    use crate::testing::{Random, with_threads};
     use proptest::prelude::*;
 
     fn field(shape: [usize; 3], mut value: impl FnMut([f64; 3]) -> f64) -> Vec<f32> {
@@ -240,6 +280,38 @@ mod tests {
         let mut used = vec![false; mesh.vertices.len()];
         mesh.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
         assert!(used.iter().all(|&u| u), "a vertex without triangle");
+    }
+
+    #[test]
+    fn without_holes_it_is_the_same_in_place() {
+        let mut random = Random(21);
+        let want = Attributes { normals: true, colors: false, ranges: true };
+        let shapes = [[2, 2, 2], [9, 8, 3], [17, 16, 15], [33, 7, 20], [20, 40, 30], [3, 300, 17]];
+        for (shape, kind) in shapes.into_iter().flat_map(|shape| (0..3).map(move |kind| (shape, kind))) {
+            let samples = field(shape, |p| match kind {
+                // Every case, values at the level, and one that is smooth.
+                0 => f64::from(random.value()),
+                1 => (random.next() % 5) as f64 - 2.0,
+                _ => (0.4 * p[0]).sin() + (0.3 * p[1]).cos() - (0.5 * p[2]).sin(),
+            });
+            for (inside, apart) in [(Inside::Below, true), (Inside::Above, false)] {
+                let settings =
+                    IsosurfaceSettings { inside, apart, level: 0.0, ..IsosurfaceSettings::default() };
+                let tiles = Tiles::new(shape);
+                let dense = DenseSamples::of(&samples, shape, &settings);
+                let below = Below::of(&settings);
+                let pieces = with_holes(&tiles, &dense, below, want);
+                for threads in [1, 3] {
+                    let placed = with_threads(threads, || whole::surface(&tiles, &dense, below, want));
+                    let (mesh, ranges) = placed.unwrap();
+                    assert!(Isosurface { mesh, ranges } == pieces, "{shape:?}, {kind}, {inside:?}");
+                }
+            }
+        }
+        let settings = IsosurfaceSettings::default();
+        let holed = [f32::NAN, 1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0];
+        let dense = DenseSamples::of(&holed, [2; 3], &settings);
+        assert!(whole::surface(&Tiles::new([2; 3]), &dense, Below::of(&settings), want).is_none());
     }
 
     #[test]

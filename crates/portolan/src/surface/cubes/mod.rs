@@ -9,9 +9,11 @@
 //! | `samples`, `vertex`, `numbers`, `piece` | the vertices and triangles of one brick |
 //! | `assemble`, `normals` | pieces joined into a mesh |
 //! | `extract`, `incremental`, `dense` | from bricks of distances, from changes of them, from arrays |
+//! | `whole`, `writer`, `edges` | arrays without holes: counted, then written into place |
 
 mod assemble;
 mod dense;
+mod edges;
 mod extract;
 mod incremental;
 mod loops;
@@ -27,6 +29,8 @@ mod table;
 mod testing;
 mod tunnel;
 mod vertex;
+mod whole;
+mod writer;
 
 pub use dense::{Inside, Isosurface, IsosurfaceSettings, isosurface};
 pub use extract::{MeshSettings, marching_cubes};

@@ -3,6 +3,7 @@
 use crate::surface::Mesh;
 
 /// A gradient scaled to length one; zero where undefined.
+#[inline(always)]
 pub(super) fn unit(gradient: [f32; 3]) -> [f32; 3] {
     let square = gradient[0] * gradient[0] + gradient[1] * gradient[1] + gradient[2] * gradient[2];
     if square > f32::MIN_POSITIVE && square.is_finite() {
@@ -15,10 +16,10 @@ pub(super) fn unit(gradient: [f32; 3]) -> [f32; 3] {
 
 /// Gives vertices without a normal the mean of their triangles' normals, weighted by area.
 pub(super) fn complete(mesh: &mut Mesh) {
-    let missing: Vec<bool> = mesh.normals.iter().map(|n| *n == [0.0; 3]).collect();
-    if !missing.contains(&true) {
+    if !mesh.normals.contains(&[0.0; 3]) {
         return;
     }
+    let missing: Vec<bool> = mesh.normals.iter().map(|n| *n == [0.0; 3]).collect();
     let mut sums = vec![[0.0f64; 3]; mesh.normals.len()];
     for t in mesh.triangles.iter().filter(|t| t.iter().any(|&v| missing[v as usize])) {
         let n = mesh.area_normal(*t);

@@ -163,6 +163,12 @@ impl DenseSamples<'_> {
 }
 
 impl DenseSamples<'_> {
+    /// A sample beside the level: negative inside. Subtracted in `f64`, so that the sign is right for every level.
+    #[inline(always)]
+    pub(super) fn relative(&self, sample: f32) -> f32 {
+        self.sign * ((f64::from(sample) - self.level) as f32).clamp(f32::MIN, f32::MAX)
+    }
+
     #[inline]
     fn finite(&self, node: [i32; 3]) -> bool {
         let inside = (0..3).all(|k| self.first[k].wrapping_add_signed(node[k] as isize) < self.shape[k]);
@@ -200,8 +206,7 @@ impl Samples for DenseSamples<'_> {
     #[inline(always)]
     fn value(&self, node: [i32; 3]) -> f32 {
         let sample = self.samples.get(self.index(node)).copied().unwrap_or(0.0);
-        // Subtracted in f64, so that the sign is right for every level.
-        self.sign * ((f64::from(sample) - self.level) as f32).clamp(f32::MIN, f32::MAX)
+        self.relative(sample)
     }
 
     #[inline]

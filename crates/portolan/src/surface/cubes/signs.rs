@@ -117,3 +117,16 @@ pub(super) fn byte(values: &[f32; 8], has: impl Fn(f32) -> bool) -> u8 {
     }
     byte
 }
+
+/// A bit for each of 32 values.
+#[inline(always)]
+pub(super) fn word32(values: &[f32; 32], has: impl Fn(f32) -> bool) -> u32 {
+    // Four lanes that meet once at the end: made bit by bit, a word takes four times as long.
+    let mut lanes = [0u32; 4];
+    for (j, four) in values.as_chunks::<4>().0.iter().enumerate() {
+        for k in 0..4 {
+            lanes[k] |= if has(four[k]) { 1 << (4 * j + k) } else { 0 };
+        }
+    }
+    lanes[0] | lanes[1] | (lanes[2] | lanes[3])
+}
