@@ -1,8 +1,7 @@
 //! Maps of sums: scans into them, and the maps that other commands read out of them.
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{anyhow, bail};
 use portolan::Ledger;
-use portolan::cell::Sign;
 use portolan::geom::vector::{distance, scale};
 use portolan::geom::{Grid, Pose};
 use portolan::ledger::LedgerError;
@@ -10,12 +9,11 @@ use portolan::map::MapError;
 use portolan::mapper::{Fused, Mapper};
 use portolan::scan::{RangeLimits, ScanStats};
 use portolan_io::scan_log::ScanLog;
-use portolan_io::{LaserLog, LedgerFile, MapFile, MapHeader, add_ledger_files, scans_of_sum};
-use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use portolan_io::{LaserLog, MapFile};
+use std::path::Path;
 use std::time::Instant;
-use tempfile::TempDir;
 
+use super::aside::Aside;
 use super::extent::Extent;
 use super::fuse::{Frames, FusionReport};
 use super::mapper::{Limits, OccupancyKinds, store_2d, store_3d};
@@ -223,7 +221,7 @@ impl<'a, const D: usize> Part<'a, D> {
         match added {
             Err(LedgerError::Map(MapError::Full(_))) if !self.ledger.scans().is_empty() => {
                 if let Err(error) = self.put_aside() {
-                    self.aside.failed = Some(error);
+                    self.aside.fail(error);
                     return added;
                 }
                 self.ledger.add_timed(&self.name, index as u64, pose, scan, clock)
@@ -236,18 +234,12 @@ impl<'a, const D: usize> Part<'a, D> {
     fn put_aside(&mut self) -> anyhow::Result<()> {
         let empty = Ledger::new(*self.ledger.settings())?;
         let full = std::mem::replace(&mut *self.ledger, empty);
-        self.aside.held.extend(full.scans().iter().map(|(log, index, _)| (log.to_owned(), index)));
-        let mut part = MapFile::default();
-        part.ledger = Some(full);
-        Ok(part.write(self.aside.next()?)?)
+        self.aside.put(full)
     }
 
     /// Whether something was put aside; what is left then is, too.
     fn is_aside(&mut self) -> anyhow::Result<bool> {
-        if let Some(error) = self.aside.failed.take() {
-            return Err(error);
-        }
-        if self.aside.files.is_empty() {
+        if self.aside.is_empty()? {
             return Ok(false);
         }
         if !self.ledger.scans().is_empty() {
@@ -318,64 +310,6 @@ impl super::fuse::TakesFrames for Part<'_, 3> {
 
     fn memory_bytes(&self) -> usize {
         self.ledger.memory_bytes()
-    }
-}
-
-/// Ledgers that did not fit into memory together, in files beside the map, which go when the run ends.
-pub(crate) struct Aside {
-    out: PathBuf,
-    folder: Option<TempDir>,
-    files: Vec<PathBuf>,
-    held: HashSet<(String, u64)>,
-    failed: Option<anyhow::Error>,
-}
-
-impl Aside {
-    fn new(out: &Path) -> Self {
-        let (files, held) = Default::default();
-        Self { out: out.to_owned(), folder: None, files, held, failed: None }
-    }
-
-    fn holds(&self, log: &str, index: u64) -> bool {
-        !self.held.is_empty() && self.held.contains(&(log.to_owned(), index))
-    }
-
-    /// A name for the next file.
-    fn next(&mut self) -> anyhow::Result<PathBuf> {
-        if self.folder.is_none() {
-            std::fs::create_dir_all(&self.out)
-                .with_context(|| format!("{}: cannot create the folder", self.out.display()))?;
-            let made = tempfile::Builder::new().prefix(".portolan-parts-").tempdir_in(&self.out);
-            self.folder = Some(made.with_context(|| format!("{}: cannot write to it", self.out.display()))?);
-        }
-        let folder = self.folder.as_ref().map_or(self.out.as_path(), TempDir::path);
-        self.files.push(folder.join(format!("{}.portolan", self.files.len())));
-        Ok(self.files[self.files.len() - 1].clone())
-    }
-
-    /// The sum of all, as a file with this header, which gets the names of logs and the number of scans.
-    pub(crate) fn add_up(&self, file: &mut SavedMap, path: &Path, memory: u64) -> anyhow::Result<()> {
-        match file {
-            SavedMap::Two(file) => self.add_up_in::<2>(&mut file.header, path, memory),
-            SavedMap::Three(file) => self.add_up_in::<3>(&mut file.header, path, memory),
-        }
-    }
-
-    fn add_up_in<const D: usize>(
-        &self,
-        header: &mut MapHeader,
-        path: &Path,
-        memory: u64,
-    ) -> anyhow::Result<()> {
-        let mut parts = Vec::new();
-        for file in &self.files {
-            let opened = LedgerFile::<D>::open(file, memory)?;
-            parts.push((opened.ok_or_else(|| anyhow!("{}: holds no sums", file.display()))?, Sign::Plus));
-        }
-        let scans = scans_of_sum(&parts)?;
-        header.logs = scans.logs().map(str::to_owned).collect();
-        header.scans = scans.len() as u64;
-        Ok(add_ledger_files(&parts, header, path)?)
     }
 }
 

@@ -5,12 +5,13 @@
 //! | what is asked for | `settings.rs`, `choices.rs` |
 //! | the library's recipe for it | `recipe.rs` |
 //! | scans and empty or saved maps | `mapper.rs`, `extent.rs` |
-//! | one scan after the other | `fuse.rs`; into sums `ledger.rs` |
+//! | one scan after the other | `fuse.rs`; into sums `ledger.rs`, `aside.rs` |
 //! | surface, distance field, octree | `derived.rs` |
 //! | files | `artifacts.rs`, `files.rs`, `octomap.rs`, `map_server.rs`, `picture.rs`, `preview.rs` |
 //! | the report | `summary.rs` |
 
 mod artifacts;
+mod aside;
 mod choices;
 mod derived;
 mod extent;
@@ -28,13 +29,14 @@ mod settings;
 mod summary;
 
 pub(crate) use artifacts::{Artifacts, Written, title};
+pub(crate) use aside::Aside;
 pub(crate) use choices::MapKind;
 pub(crate) use derived::{Derived, DistanceField};
 pub(crate) use extent::{brick_extent, check_memory, grid_over, seen, with_outlier};
 pub use files::polylines;
 pub(crate) use files::{dense_esdf, write_contour, write_mesh};
 pub(crate) use fuse::{FusionReport, fuse_2d};
-pub(crate) use ledger::{Aside, LedgerRun, in_file_2d, in_file_3d};
+pub(crate) use ledger::{LedgerRun, in_file_2d, in_file_3d};
 pub(crate) use map_server::{cells_for_map_server, grid_of};
 pub(crate) use mapper::{
     Limits, OccupancyKinds, Run, mapper_2d, mapper_3d, store_2d, store_3d, unbounded_mapper_2d,

@@ -63,7 +63,8 @@ fn memory_is_enough(log: &Path, folder: &Path, memory: &str) {
     let out = |name: &str| -> PathBuf { folder.join(name) };
     map(log, &out("unlimited"), &["--ledger"]);
     let call =
-        ["map", arg(log), "--resolution", "0.1", "--ledger", "--memory", memory, "--out", arg(&out("small"))];
+        ["map", arg(log), "--resolution", "0.1", "--ledger", "--memory", memory, "--out", arg(&out("small"))]
+            .map(str::to_owned);
     let text = succeed(call);
     assert!(text.contains("takes more memory than --memory allows"), "{text}");
     assert!(bytes(&out("small")) == bytes(&out("unlimited")));
@@ -73,7 +74,8 @@ fn memory_is_enough(log: &Path, folder: &Path, memory: &str) {
     assert_eq!(names, ["map.portolan", "summary.json"]);
     // So little that one scan alone has no room: said, and nothing is half done.
     let call =
-        ["map", arg(log), "--resolution", "0.1", "--ledger", "--memory", "1K", "--out", arg(&out("none"))];
+        ["map", arg(log), "--resolution", "0.1", "--ledger", "--memory", "1K", "--out", arg(&out("none"))]
+            .map(str::to_owned);
     let error = fail(1, call);
     assert!(error.contains("--memory"), "{error}");
 }
@@ -151,8 +153,9 @@ fn scans_follow_corrected_poses() {
     // Less than the tolerance stays.
     map(&at("off/a.log"), &at("stays"), &["--ledger"]);
     let before = bytes(&at("stays"));
-    let far = ["map", arg(&at("off/a.log")), "--out", arg(&at("stays")), "--tolerance", "3", "--repose"];
-    succeed(far.iter().copied().chain([arg(&at("poses.txt"))]));
+    let far = ["map", arg(&at("off/a.log")), "--out", arg(&at("stays")), "--tolerance", "3", "--repose"]
+        .map(str::to_owned);
+    succeed(far.into_iter().chain([arg(&at("poses.txt")).to_owned()]));
     assert!(bytes(&at("stays")) == before);
     // Clamped cells do not give scans back, and another log's scans are not there.
     map(&at("true/a.log"), &at("clamped"), &[]);
@@ -191,7 +194,8 @@ fn logs_add_up_and_slips_are_told() {
             .contains("clamped cells")
     );
     let coarse =
-        ["map", arg(&log), "--resolution", "0.2", "--ledger", "--quiet", "--out", arg(&at("coarse"))];
+        ["map", arg(&log), "--resolution", "0.2", "--ledger", "--quiet", "--out", arg(&at("coarse"))]
+            .map(str::to_owned);
     succeed(coarse);
     let error = fail(1, ["merge", arg(&at("b")), arg(&at("coarse")), "--out", arg(&at("x"))]);
     assert!(error.contains("resolution"), "{error}");
@@ -205,8 +209,8 @@ fn logs_add_up_and_slips_are_told() {
         (&["--shard", "0/2"], "3/8"),
         (&["--tolerance", "1"], "--repose"),
     ] {
-        let call = ["map", arg(&log), "--resolution", "0.1", "--out", arg(&at("x"))];
-        let error = fail(2, call.iter().copied().chain(more.iter().copied()));
+        let call = ["map", arg(&log), "--resolution", "0.1", "--out", arg(&at("x"))].map(str::to_owned);
+        let error = fail(2, call.into_iter().chain(more.iter().map(|&word| word.to_owned())));
         assert!(error.contains(part), "{part}: {error}");
     }
     assert!(!at("x").exists());

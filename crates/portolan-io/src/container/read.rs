@@ -184,7 +184,7 @@ impl Container {
     pub fn writer(&self, mut keep: impl FnMut(&Chunk) -> bool) -> Result<ContainerWriter> {
         let mut writer = ContainerWriter::new();
         for chunk in self.chunks.iter().filter(|c| keep(c)) {
-            writer.stored_chunk(&chunk.tag, &chunk.name, chunk.length, &*self.stored(chunk)?)?;
+            writer.stored_chunk(&chunk.tag, &chunk.name, chunk.length, &self.stored(chunk)?)?;
         }
         Ok(writer)
     }
