@@ -151,7 +151,7 @@ class _Ray:
             import ray
         except ImportError as error:
             raise ImportError("ray=True needs Ray: pip install ray") from error
-        self._ray = ray
+        self._ray: _Any = ray
         self._own = not ray.is_initialized()
         if self._own:
             ray.init(**(how if isinstance(how, dict) else {}))
