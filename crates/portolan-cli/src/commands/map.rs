@@ -96,6 +96,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         // Not one scan could be used: the first error is of more use than an empty map.
         bail!("{error}");
     }
+    if let (0, Some(full)) = (fusion.stats.scans, &fusion.full)
+        && settings.shape.ledger
+    {
+        bail!(
+            "{log_name}: {full}; not one scan was fused; start again with more --memory, a coarser --resolution or --bounds"
+        );
+    }
     let (mut file, extent, aside) = run.finish(&settings)?;
     stages.end("store");
     let mut bytes = file.bytes();
@@ -159,7 +166,8 @@ fn describe(file: &mut SavedMap, settings: &Settings, log: &Log, stats: &ScanSta
         header.scans += stats.scans;
     }
     json::take_counts(&mut header.statistics, &json::object(json::stats(taken)));
-    header.every = settings.every;
+    // Every scan, said or not, is the same.
+    header.every = settings.every.filter(|n| *n > 1);
     header.hold_out = settings.shape.hold_out;
     header.settings = settings.to_json();
     json::add_counts(&mut header.statistics, &json::object(json::stats(stats)));

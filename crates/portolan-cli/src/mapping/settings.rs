@@ -360,6 +360,8 @@ mod tests {
         settings: Given<Settings>,
         #[arg(long)]
         append: bool,
+        #[arg(long)]
+        repose: bool,
     }
 
     #[test]

@@ -145,26 +145,33 @@ fn means_are_means<const D: usize, S: ScanKind<D> + Sync>(scans: &[Taken<D, S>])
         means.integrate(pose, scan).unwrap();
     }
     let believed = least_weight(config.weights, config.carve_weight);
-    let (mut cells, mut worst, mut total) = (0u32, [0.0f64; 2], 0.0);
+    let (mut cells, mut worst, mut total) = (0u32, [0.0f64; 3], 0.0);
     for (key, brick) in means.store().bricks_by_age() {
         for i in (0..brick.weights().len()).filter(|&i| brick.weights()[i] > 0.0) {
             let sum = sums.tsdf().unwrap().store().cell(key.cell(i)).unwrap();
             let off = f64::from(sum.distance - brick.distances()[i]).abs();
-            let of = &mut worst[usize::from(brick.weights()[i] >= believed)];
+            let weight = brick.weights()[i];
+            let of = &mut worst[usize::from(weight >= believed) + usize::from(weight >= 1.0)];
             *of = of.max(off);
             cells += 1;
             total += off;
         }
     }
     assert_eq!(sums.tsdf().unwrap().observed_cells(0.0), means.observed_cells(0.0));
-    let (mean, [others, worst]) = (total / f64::from(cells), worst.map(|off| 1e3 * off));
+    let (truncation, mean) = (config.truncation, total / f64::from(cells));
+    let [hardly, little, well] = worst;
     println!(
-        "{D}-D: {cells} cells, {:.4} mm off in the mean, at most {worst:.4}, {others:.4} where hardly anything was seen",
-        1e3 * mean
+        "{D}-D: {cells} cells, {:.4} mm off in the mean, at most {:.3} of weight 1 and more, {:.3} of half a look at free space and \
+         more, {:.3} of less",
+        1e3 * mean,
+        1e3 * well,
+        1e3 * little,
+        1e3 * hardly
     );
-    // Weights that taper off behind a surface are rounded to 1/256: a hundredth of those that count, all of those that do not.
-    assert!(cells > 5000 && worst < 1e3 * 1e-3 * config.truncation && mean < 2.5e-4 * config.truncation);
-    assert!(others < 1e3 * 0.05 * config.truncation);
+    // Weights that taper off behind a surface are rounded to 1/256: where hardly anything else was seen, that shifts a mean of
+    // looks that differ.
+    assert!(cells > 5000 && mean < 2.5e-4 * truncation);
+    assert!(well < 0.01 * truncation && little.max(hardly) < 0.05 * truncation);
 }
 
 #[test]
@@ -332,12 +339,12 @@ fn surfaces_are_as_true_as_those_of_clamped_cells() {
     }
     let median = |mapper: &mut portolan::Mapper<3>| {
         let mesh = mapper.mesh();
-        let mut off: Vec<f64> =
-            mesh.vertices.iter().map(|v| log.world.signed_distance(v.map(f64::from)).abs()).collect();
+        let vertices = (0..mesh.vertices.len()).map(|i| mesh.vertex_world(i));
+        let mut off: Vec<f64> = vertices.map(|p| log.world.signed_distance(p).abs()).collect();
         assert!(off.len() > 10_000);
         1e3 * crate::common::quantile(&mut off, 0.5)
     };
     let (clamped, sums) = (median(&mut clamped), median(&mut sums.mapper().unwrap()));
     println!("median distance of vertices from the walls: {clamped:.3} mm clamped, {sums:.3} mm of sums");
-    assert!((clamped - sums).abs() < 0.1);
+    assert!(clamped < 15.0 && (clamped - sums).abs() < 0.1);
 }
