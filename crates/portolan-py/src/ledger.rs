@@ -376,8 +376,8 @@ impl Ledger {
     fn mapper(&self, py: Python<'_>) -> PyResult<Mapper> {
         let Some(held) = self.snapshot(py)? else { return Err(value_error("nothing was added yet")) };
         let maps = work(py, || match &held {
-            Either::Two(ledger) => ledger.mapper().map(|maps| Either::Two(maps)),
-            Either::Three(ledger) => ledger.mapper().map(|maps| Either::Three(maps)),
+            Either::Two(ledger) => ledger.mapper().map(Either::Two),
+            Either::Three(ledger) => ledger.mapper().map(Either::Three),
         })?;
         let maps = maps.map_err(|error| of_ledger(&error))?;
         let poses = match held {

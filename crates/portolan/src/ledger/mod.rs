@@ -52,10 +52,9 @@ use sum_map::{SumAttenuation, SumOccupancy, SumTsdf};
 /// let settings = MapperSettings::<2>::new(0.05);
 /// let mut whole = Ledger::new(settings)?;
 /// let (mut a, mut b) = (Ledger::new(settings)?, Ledger::new(settings)?);
-/// for i in 0..4 {
-///     let x = 0.1 * i as f64;
-///     whole.add("log", i, &at(x), &scan(x))?;
-///     (if i % 2 == 0 { &mut a } else { &mut b }).add("log", i, &at(x), &scan(x))?;
+/// for (i, x) in [0.0, 0.1, 0.2, 0.3].into_iter().enumerate() {
+///     whole.add("log", i as u64, &at(x), &scan(x))?;
+///     (if i % 2 == 0 { &mut a } else { &mut b }).add("log", i as u64, &at(x), &scan(x))?;
 /// }
 /// b.merge(&a)?;
 /// assert!(b == whole);
