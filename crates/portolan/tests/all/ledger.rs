@@ -71,7 +71,7 @@ fn any_split_in_any_order<const D: usize, S: ScanKind<D> + Sync>(
     }
     assert!(merged == whole);
     // Half of it is taken back, scan by scan, and the rest as a whole.
-    let (out, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|&&i| keys[i] % 2 == 0);
+    let (out, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|&&i| keys[i].is_multiple_of(2));
     for &i in &out {
         merged.subtract("log", i as u64, &scans[i].1).unwrap();
     }
@@ -82,14 +82,12 @@ fn any_split_in_any_order<const D: usize, S: ScanKind<D> + Sync>(
     assert!(merged.scans().is_empty());
 }
 
-fn poses_that_change<const D: usize, S: ScanKind<D> + Sync>(
+fn poses_that_change<const D: usize, S: ScanKind<D> + Sync + Clone>(
     scans: &[Taken<D, S>],
     moved: &[bool],
     shift: [f64; D],
     back: bool,
-) where
-    S: Clone,
-{
+) {
     let mut corrected = scans.to_vec();
     for (i, (pose, _)) in corrected.iter_mut().enumerate().filter(|(i, _)| moved[*i]) {
         (0..D).for_each(|k| pose.translation[k] += shift[k] * (1.0 + i as f64 * 0.3));
