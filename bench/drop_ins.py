@@ -17,6 +17,8 @@ import statistics
 import sys
 import time
 
+from about import about
+
 AIMS = {"edt": 2, "scipy": 20, "scikit-image": 5, "vtk": 2}
 #: Seconds that a call may take beside its work.
 OVERHEAD = 2e-6
@@ -200,6 +202,7 @@ def overhead(np, portolan):
 
 def main():
     args = arguments()
+    load = os.getloadavg()
     cpus = sorted(os.sched_getaffinity(0))[: args.threads]
     os.sched_setaffinity(0, cpus)
     os.environ["RAYON_NUM_THREADS"] = str(args.threads)
@@ -250,7 +253,11 @@ def main():
         print(f"one call, {name}: {1e6 * least:.2f} us at least, {1e6 * median:.2f} us median ({aim}){mark}")
     if args.json:
         with open(args.json, "w") as file:
-            json.dump({"versions": versions, "arguments": vars(args), "seconds": all_seconds, "calls": calls}, file, indent=1)
+            asked = {name: value for name, value in vars(args).items() if name != "json"}
+            # A line for each case.
+            lines = ",\n".join(f"  {json.dumps(case)}: {json.dumps(seconds)}" for case, seconds in all_seconds.items())
+            head = {"about": about(load), "versions": versions, "arguments": asked, "calls": calls}
+            file.write(f'{json.dumps(head, indent=1)[:-2]},\n "seconds": {{\n{lines}\n }}\n}}\n')
 
 
 if __name__ == "__main__":

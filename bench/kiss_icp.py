@@ -106,7 +106,7 @@ def main():
     write_kitti(work / "given.txt", given)
     for name, poses in [("given", work / "given.txt"), ("kiss", estimate)]:
         run([portolan, "map", scans, "--poses", poses, "--resolution", arguments.resolution, "--hold-out", 10,
-             "--out", work / name, "--quiet"])
+             "--overwrite", "--out", work / name, "--quiet"])
         found = run([portolan, "eval", work / name, "--scans", scans, "--poses", poses, "--json"], capture_output=True)
         print(name, "held-out scans:", json.dumps(json.loads(found.stdout)))
     found = run([portolan, "eval", work / "kiss", "--reference", work / "given" / "mesh.ply", "--json"],

@@ -16,7 +16,10 @@ PEERS = {
     "occupancy": ["octomap", "octomap-discretized"],
     "lidar-tsdf": ["vdbfusion"],
     "depth-tsdf": ["open3d"],
-    "surface": ["flying-edges", "flying-edges-normals", "scikit-image", "pymcubes"],
+    # With normals and values, with normals, and the mesh alone: each beside what gives as much.
+    "surface": ["scikit-image"],
+    "surface-normals": ["flying-edges"],
+    "surface-mesh": ["flying-edges", "pymcubes"],
     "query": ["octomap"],
 }
 
@@ -30,6 +33,7 @@ def arguments():
     parser.add_argument("--scans", type=int, default=20)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--cpu", action="store_true", help="seconds of the CPU")
     parser.add_argument("--carve", action="store_true")
     parser.add_argument("--sweep", choices=["auto", "exact"], default="auto")
     return parser.parse_args()
@@ -173,7 +177,8 @@ def surface(args):
     if args.peer == "portolan":
         import portolan
 
-        make, run = lambda: None, lambda _: portolan.marching_cubes(volume, 0.0)
+        want = {"normals": args.workload != "surface-mesh", "values": args.workload == "surface"}
+        make, run = lambda: None, lambda _: portolan.marching_cubes(volume, 0.0, **want)
         count = lambda r: len(r[1])
     elif args.peer == "scikit-image":
         from skimage import measure
@@ -201,8 +206,8 @@ def surface(args):
             edges.SetInputData(image)
             edges.SetValue(0, 0.0)
             edges.ComputeGradientsOff()
-            if args.peer == "flying-edges":
-                edges.ComputeNormalsOff()
+            edges.SetComputeNormals(args.workload == "surface-normals")
+            edges.ComputeScalarsOff()
             return edges
 
         def run(edges):
@@ -243,17 +248,19 @@ def main():
             os.environ[f"{name}_NUM_THREADS"] = "1"
     os.environ["RAYON_NUM_THREADS"] = str(args.threads)
     try:
-        per, make, run, describe = globals()[args.workload.replace("-", "_")](args)
+        workload = "surface" if args.workload.startswith("surface") else args.workload
+        per, make, run, describe = globals()[workload.replace("-", "_")](args)
     except ImportError as missing:
         print(json.dumps({"missing": str(missing)}))
         return
+    clock = time.process_time if args.cpu else time.perf_counter
     seconds, result = [], None
     for _ in range(args.repeats):
         result = None  # the last run's memory is not this one's
         made = make()
-        start = time.perf_counter()
+        start = clock()
         result = run(made)
-        seconds.append(time.perf_counter() - start)
+        seconds.append(clock() - start)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     print(json.dumps({"seconds": seconds, "per": per, "peak": peak, "version": version(args.peer), **describe(result)}))
 

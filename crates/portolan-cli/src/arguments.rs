@@ -35,6 +35,11 @@ pub(crate) fn length_or_zero(text: &str) -> Result<f64, String> {
     number_that(text, |v| v >= 0.0 && v.is_finite(), "a finite length in meters, not negative")
 }
 
+/// A number of standard deviations.
+pub(crate) fn sigmas(text: &str) -> Result<f64, String> {
+    number_that(text, |v| v > 0.0 && v.is_finite(), "a number of standard deviations above zero, like 3")
+}
+
 /// A length, or infinitely far for `off`.
 pub(crate) fn length_or_off(text: &str) -> Result<f64, String> {
     if text == "off" { Ok(f64::INFINITY) } else { length(text) }

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use crate::stop::Signal;
+
 /// The call was bad, whatever the files hold: exit status 2.
 #[derive(Debug)]
 struct BadCall(String);
@@ -17,6 +19,23 @@ impl std::error::Error for BadCall {}
 /// An error that ends the run with status 2: settings that contradict each other.
 pub(crate) fn bad_call(text: impl Into<String>) -> anyhow::Error {
     BadCall(text.into()).into()
+}
+
+/// A signal ended the run, which says what it leaves.
+#[derive(Debug)]
+struct Stopped(Signal, String);
+
+impl std::fmt::Display for Stopped {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "ended by {}: {}", self.0.name(), self.1)
+    }
+}
+
+impl std::error::Error for Stopped {}
+
+/// An error that ends the run with the status of a signal: what it leaves.
+pub(crate) fn stopped(signal: Signal, leaves: impl Into<String>) -> anyhow::Error {
+    Stopped(signal, leaves.into()).into()
 }
 
 /// What was wrong with a call, in one line: the rest of what clap says is the usage of the command line.
@@ -35,7 +54,11 @@ pub(crate) fn report(error: &anyhow::Error) -> u8 {
     let text: String = format!("{error:#}").chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     // Without a stderr the text goes nowhere.
     let _ = writeln!(io::stderr(), "portolan: {text}");
-    if error.is::<BadCall>() { 2 } else { 1 }
+    match error.downcast_ref::<Stopped>() {
+        Some(Stopped(signal, _)) => signal.exit_status(),
+        None if error.is::<BadCall>() => 2,
+        None => 1,
+    }
 }
 
 fn closed(error: &io::Error) -> bool {

@@ -22,7 +22,7 @@ pub(crate) fn stats(stats: &ScanStats) -> Value {
         "refused_poses": stats.refused_poses,
         "beams": {
             "total": b.total(), "hit": b.hit, "max_range": b.max_range, "no_return": b.no_return,
-            "dropped": b.dropped, "self_hit": b.self_hit, "hits_outside": stats.hits_outside,
+            "dropped": b.dropped, "self_hit": b.self_hit, "mover": b.mover, "hits_outside": stats.hits_outside,
         },
         "refused_beams": {
             "total": r.total(), "not_finite": r.not_finite, "negative": r.negative, "too_near": r.too_near,

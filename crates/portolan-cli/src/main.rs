@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    portolan_cli::run(std::env::args_os()).into()
+    portolan_cli::run_as_program(std::env::args_os()).into()
 }

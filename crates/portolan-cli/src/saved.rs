@@ -60,6 +60,15 @@ impl SavedMap {
         })
     }
 
+    /// That scans are in it under two names, where they are.
+    pub(crate) fn copies(&self) -> Option<String> {
+        let copies = match self {
+            Self::Two(file) => file.ledger.as_ref().map_or(0, |ledger| ledger.scans().copies()),
+            Self::Three(file) => file.ledger.as_ref().map_or(0, |ledger| ledger.scans().copies()),
+        };
+        in_words_of_copies(copies)
+    }
+
     /// Whether it holds sums.
     pub(crate) fn is_ledger(&self) -> bool {
         match self {
@@ -134,6 +143,16 @@ impl SavedMap {
         };
         named.into_iter().chain([("sums", sums)]).filter_map(|(name, bytes)| Some((name, bytes?))).collect()
     }
+}
+
+/// What is to be said of scans that are in a map under two names.
+pub(crate) fn in_words_of_copies(copies: usize) -> Option<String> {
+    (copies > 0).then(|| {
+        format!(
+            "{copies} scans have the readings and poses of scans of another log: is one log there under two names? They count \
+             twice; take one out with merge --without"
+        )
+    })
 }
 
 /// That a map has no signed distances, and what to do.

@@ -10,6 +10,7 @@ use portolan_io::{
 };
 
 use crate::dimension::{Dimension, Given};
+use crate::folder::check_file;
 use crate::log::describe;
 use crate::mapping::available_memory;
 use crate::saved::SavedMap;
@@ -46,7 +47,11 @@ pub(crate) struct MeshSource {
 
 /// Opens a file or a folder.
 pub(crate) fn open(path: &Path) -> anyhow::Result<Source> {
-    Ok(match detect(path)? {
+    let kind = detect(path)?;
+    if !matches!(kind, FileKind::Portolan | FileKind::PortolanFolder) && path.is_file() {
+        check_file(path)?;
+    }
+    Ok(match kind {
         FileKind::Portolan => of_map(path)?,
         FileKind::PortolanFolder => of_map(&path.join("map.portolan"))?,
         FileKind::EsdfBin => Source::Esdf(EsdfFile::read(path)?),

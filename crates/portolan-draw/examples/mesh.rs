@@ -27,7 +27,7 @@ fn main() -> Result<(), Error> {
     let mesh = MeshView { vertices: &vertices, triangles: &triangles, normals: &[], colors: &[] };
     let subtitle = format!("{} triangles", triangles.len());
     let start = std::time::Instant::now();
-    let sheet = preview(&Preview { mesh, sensors: &sensors, title: "A mesh", subtitle: &subtitle });
+    let sheet = preview(&Preview { mesh, sensors: &sensors, up: None, title: "A mesh", subtitle: &subtitle });
     let took = start.elapsed();
     std::fs::write(out, sheet.encode_png())?;
     eprintln!("{subtitle}: drawn in {took:.2?}");

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use portolan::field::{ClearanceField, Esdf, UnknownSpace};
+use portolan::field::{ClearanceField, Esdf, SurfaceNoise, UnknownSpace};
 use portolan::{Answer, Status};
 
 /// One row of answers; `None` becomes an empty field.
@@ -25,6 +25,32 @@ pub struct AnswerRow<const D: usize> {
     pub gradient: Option<[f64; D]>,
     /// What unknown space counts as; `None` where nothing is certified.
     pub unknown: Option<UnknownSpace>,
+    /// Standard deviation of the distance (meters), where the surface is known to be so sure.
+    pub sigma: Option<f64>,
+    /// What `lower` would be if every obstacle were nearer by so many of its standard deviations as were asked for (meters).
+    pub lower_at: Option<f64>,
+}
+
+/// The columns at the end of a row about what the surface itself is uncertain by.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum SigmaColumns {
+    /// None.
+    #[default]
+    No,
+    /// `sigma`.
+    Sigma,
+    /// `sigma`, and the lower bound at so many standard deviations, which the column's name says.
+    LowerAt(f64),
+}
+
+impl SigmaColumns {
+    /// The name of the column of [`AnswerRow::lower_at`], `lower_at_3_sigma` for three standard deviations, if there is one.
+    pub fn lower_at(self) -> Option<String> {
+        match self {
+            Self::LowerAt(sigmas) => Some(format!("lower_at_{sigmas}_sigma")),
+            Self::No | Self::Sigma => None,
+        }
+    }
 }
 
 impl<const D: usize> AnswerRow<D> {
@@ -46,6 +72,8 @@ impl<const D: usize> AnswerRow<D> {
                 .filter(|d| distance.status() == Status::Saturated && *d < 0.0),
             gradient: distance.known().map(|(_, gradient)| gradient),
             unknown: None,
+            sigma: None,
+            lower_at: None,
         }
     }
 
@@ -89,6 +117,25 @@ impl<const D: usize> AnswerRow<D> {
     }
 }
 
+impl<const D: usize> AnswerRow<D> {
+    /// Fills in [`AnswerRow::lower_at`] of a row that [`AnswerRow::certify`] filled in by the same field.
+    pub fn less_noise(&mut self, field: &Esdf<D>, noise: &SurfaceNoise<D>, p: [f64; D]) {
+        let (Some(lower), Some(unknown)) = (self.lower, self.unknown) else { return };
+        let less = |unknown| field.less_noise(noise).clearance(p, unknown).value();
+        self.lower_at = match less(UnknownSpace::Optimistic) {
+            // What is inside may lie deeper.
+            Some(c) if c.inside => Some(lower - noise.margin_within(p, c.upper)),
+            Some(c) => Some(match unknown {
+                UnknownSpace::Optimistic => c.lower,
+                UnknownSpace::Pessimistic => less(UnknownSpace::Pessimistic).map_or(0.0, |c| c.lower),
+            })
+            // Bounds are given up to a limit.
+            .map(|less| less.min(lower)),
+            None => None,
+        };
+    }
+}
+
 /// A field is computed this many cells farther than it is reported, so that a saturated answer is certified.
 pub const HELD_BACK: f64 = 2.0;
 
@@ -98,33 +145,55 @@ pub fn certified_reach<const D: usize>(field: &Esdf<D>) -> f64 {
     f64::from(field.max_distance()) - HELD_BACK * field.lattice().resolution
 }
 
-/// Writes the header line of [`write_answer`]'s rows.
+/// Writes the header line of [`write_answer`]'s rows with these columns.
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write_answer_header<const D: usize>(w: &mut impl Write) -> io::Result<()> {
+pub fn write_answer_header<const D: usize>(w: &mut impl Write, columns: SigmaColumns) -> io::Result<()> {
     let (z, gz) = if D == 3 { (",z", ",gz") } else { ("", "") };
-    writeln!(w, "x,y{z},status,occupancy,distance,lower,upper,gx,gy{gz},unknown_as")
+    write!(w, "x,y{z},status,occupancy,distance,lower,upper,gx,gy{gz},unknown_as")?;
+    if columns != SigmaColumns::No {
+        write!(w, ",sigma")?;
+    }
+    match columns.lower_at() {
+        Some(name) => writeln!(w, ",{name}"),
+        None => writeln!(w),
+    }
 }
 
-/// Writes one row: `x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz],unknown_as`. Numbers are written so that
-/// reading gives the same double.
+/// Writes one row: `x,y[,z],status,occupancy,distance,lower,upper,gx,gy[,gz],unknown_as[,sigma[,lower_at_K_sigma]]`. Numbers are
+/// written so that reading gives the same double.
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write_answer<const D: usize>(w: &mut impl Write, row: &AnswerRow<D>) -> io::Result<()> {
+pub fn write_answer<const D: usize>(
+    w: &mut impl Write,
+    row: &AnswerRow<D>,
+    columns: SigmaColumns,
+) -> io::Result<()> {
     for (k, v) in row.point.iter().enumerate() {
         write!(w, "{}{v}", if k == 0 { "" } else { "," })?;
     }
     write!(w, ",{}", row.status.word())?;
     let gradient = (0..D).map(|k| row.gradient.map(|g| g[k]));
     for field in [row.occupancy, row.distance, row.lower, row.upper].into_iter().chain(gradient) {
-        match field {
-            Some(v) => write!(w, ",{v}")?,
-            None => write!(w, ",")?,
-        }
+        write_number(w, field)?;
     }
-    writeln!(w, ",{}", row.unknown.map_or("", UnknownSpace::word))
+    write!(w, ",{}", row.unknown.map_or("", UnknownSpace::word))?;
+    if columns != SigmaColumns::No {
+        write_number(w, row.sigma)?;
+    }
+    if let SigmaColumns::LowerAt(_) = columns {
+        write_number(w, row.lower_at)?;
+    }
+    writeln!(w)
+}
+
+fn write_number(w: &mut impl Write, v: Option<f64>) -> io::Result<()> {
+    match v {
+        Some(v) => write!(w, ",{v}"),
+        None => write!(w, ","),
+    }
 }
 
 #[cfg(test)]
@@ -202,7 +271,7 @@ mod tests {
     #[test]
     fn missing_answers_are_empty_fields() {
         let mut out = Vec::new();
-        write_answer_header::<2>(&mut out).unwrap();
+        write_answer_header::<2>(&mut out, SigmaColumns::No).unwrap();
         let row = AnswerRow {
             point: [0.1, 2.0],
             status: Status::Known,
@@ -212,8 +281,10 @@ mod tests {
             upper: None,
             gradient: Some([0.0, 1.0]),
             unknown: Some(UnknownSpace::Pessimistic),
+            sigma: None,
+            lower_at: None,
         };
-        write_answer(&mut out, &row).unwrap();
+        write_answer(&mut out, &row, SigmaColumns::No).unwrap();
         let none = AnswerRow {
             point: [1.0, 2.0, 3.0],
             status: Status::Outside,
@@ -223,11 +294,27 @@ mod tests {
             upper: None,
             gradient: None,
             unknown: None,
+            sigma: None,
+            lower_at: None,
         };
-        write_answer_header::<3>(&mut out).unwrap();
-        write_answer(&mut out, &none).unwrap();
+        write_answer_header::<3>(&mut out, SigmaColumns::No).unwrap();
+        write_answer(&mut out, &none, SigmaColumns::No).unwrap();
         let expected = "x,y,status,occupancy,distance,lower,upper,gx,gy,unknown_as\n0.1,2,known,0.25,-1.5,-1.6,,0,1,obstacle\n\
                         x,y,z,status,occupancy,distance,lower,upper,gx,gy,gz,unknown_as\n1,2,3,outside,,,,,,,,\n";
         assert_eq!(String::from_utf8(out).unwrap(), expected);
+        let ends = |columns: SigmaColumns, row: &AnswerRow<2>| {
+            let mut out = Vec::new();
+            write_answer_header::<2>(&mut out, columns).unwrap();
+            write_answer(&mut out, row, columns).unwrap();
+            let text = String::from_utf8(out).unwrap();
+            text.lines()
+                .map(|line| line.split(',').skip(10).collect::<Vec<_>>().join(","))
+                .collect::<Vec<_>>()
+        };
+        let sure = AnswerRow { sigma: Some(0.02), lower_at: Some(-0.5), ..row };
+        assert_eq!(ends(SigmaColumns::Sigma, &row), ["sigma", ""]);
+        assert_eq!(ends(SigmaColumns::Sigma, &sure), ["sigma", "0.02"]);
+        assert_eq!(ends(SigmaColumns::LowerAt(2.5), &row), ["sigma,lower_at_2.5_sigma", ","]);
+        assert_eq!(ends(SigmaColumns::LowerAt(3.0), &sure), ["sigma,lower_at_3_sigma", "0.02,-0.5"]);
     }
 }

@@ -1,6 +1,6 @@
 //! What kind of file this is: by its content first, then by its name.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::bytes::open;
 use crate::mesh::{MeshFormat, mesh_format};
@@ -59,8 +59,7 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind> {
         if let Some(kind) = ScanLogKind::recognize(path) {
             return Ok(of_log(kind));
         }
-        let what = "a folder without map.portolan and without scans of a known layout; name a file inside it";
-        return Ok(FileKind::Unknown(what.into()));
+        return Ok(FileKind::Unknown(unknown_folder(path)));
     }
     if path.is_file() && is_bag(path) {
         return Ok(FileKind::Bag);
@@ -69,6 +68,36 @@ pub fn detect(path: impl AsRef<Path>) -> Result<FileKind> {
     let as_log = || ScanLogKind::recognize(path).map(of_log);
     let kind = by_content(path, &head).or_else(as_log).or_else(|| by_name(path, &head));
     Ok(kind.unwrap_or_else(|| unknown(&head)))
+}
+
+/// Folders inside a folder that are looked at, and how many are named.
+const MOST_FOLDERS: usize = 500;
+const NAMED: usize = 3;
+
+/// What a folder lacks, and where in it something may be: logs are often given by a folder too high.
+fn unknown_folder(path: &Path) -> String {
+    let inside = |folder: &Path| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut all: Vec<PathBuf> = entries.take(MOST_FOLDERS).map(|entry| entry.path()).collect();
+        all.sort();
+        all
+    };
+    let children = inside(path);
+    if children.is_empty() {
+        return "an empty folder; give the folder or the file that holds the scans".into();
+    }
+    let folders = |all: Vec<PathBuf>| all.into_iter().filter(|p| p.is_dir()).collect::<Vec<_>>();
+    let near = folders(children);
+    let far = near.iter().flat_map(|folder| folders(inside(folder))).take(MOST_FOLDERS);
+    let is_something = |p: &PathBuf| p.join("map.portolan").is_file() || ScanLogKind::recognize(p).is_some();
+    let found: Vec<PathBuf> = near.iter().cloned().chain(far).filter(is_something).collect();
+    if found.is_empty() {
+        return "a folder without map.portolan and without scans of a known layout; name a file inside it"
+            .into();
+    }
+    let named: Vec<_> = found.iter().take(NAMED).map(|p| p.display().to_string()).collect();
+    let more = if found.len() > NAMED { format!(" and {} more", found.len() - NAMED) } else { String::new() };
+    format!("a folder above logs or maps; name one of them: {}{more}", named.join(", "))
 }
 
 /// A bag is a log of either dimension.

@@ -97,6 +97,10 @@ impl<const D: usize> Samples<'_, D> {
             let advice = format!("give one value per cell, from 1 to {MOST_CELLS} of them");
             return Err(IoError::unwritable(path, "the shape", value, advice));
         }
+        if let Some(i) = distances.iter().position(|d| d.is_infinite()) {
+            let (field, value) = (format!("the distance of cell {i}"), distances[i]);
+            return Err(IoError::unwritable(path, field, value, "give NaN where nothing is known"));
+        }
         let (origin, resolution) = (grid.lattice.origin, grid.lattice.resolution);
         if !(resolution > 0.0 && resolution.is_finite() && origin.iter().all(|v| v.is_finite())) {
             let value = format!("{resolution} at {origin:?}");
@@ -231,6 +235,11 @@ fn body<const D: usize>(
         distances.extend(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
         left -= now;
     }
+    // NaN is what is not known; nothing is infinitely far.
+    if let Some(i) = distances.iter().position(|d: &f32| d.is_infinite()) {
+        let at = HEADER + 4 * i as u64;
+        return bad(at, "a distance", distances[i].to_string(), "give metres, NaN where nothing is known");
+    }
     let grid = Grid::new(origin, resolution, std::array::from_fn(|k| shape[k] as usize));
     let field = if flags == 1 {
         let mut plane = vec![0; cells as usize];
@@ -331,6 +340,11 @@ mod tests {
                 Err(e) => assert!(e.to_string().contains(part), "{e}"),
             }
         }
+        for infinite in [f32::INFINITY, f32::NEG_INFINITY] {
+            let mut bytes = good.clone();
+            bytes[64 + 4 * 7..][..4].copy_from_slice(&infinite.to_le_bytes());
+            says(EsdfFile::parse(&bytes, "e".as_ref()), "byte 92: a distance is");
+        }
         let mut huge = good.clone();
         huge[16..28].fill(0xff);
         says(EsdfFile::parse(&huge, "e".as_ref()), "the shape");
@@ -344,6 +358,7 @@ mod tests {
         assert!(write_esdf("never", &grid, &[1.0, 2.0], Some(&[1])).is_err());
         assert!(write_esdf("never", &Grid::new([0.0, 0.0], f64::NAN, [1, 1]), &[1.0], None).is_err());
         assert!(write_esdf("never", &Grid::new([0.0, 0.0], 1.0, [0, 1]), &[], None).is_err());
+        says(write_esdf("never", &grid, &[1.0, f32::INFINITY], None), "the distance of cell 1 is inf");
     }
 
     #[test]

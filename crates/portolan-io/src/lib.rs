@@ -27,6 +27,7 @@
 //! | PLY meshes (written binary) | [`read_ply_mesh`], [`mesh_counts`] | [`write_ply_mesh`] |
 //! | GLB meshes (glTF 2.0) | [`read_mesh`] | [`write_glb`] |
 //! | OBJ meshes | [`read_mesh`] | [`write_obj`] |
+//! | which files of a folder one run wrote (JSON) | [`Manifest`] | [`Manifest::write`] |
 //! | query points, answers (CSV) | [`QueryPoints`] | [`write_answer`] |
 //!
 //! [`detect`] finds out what a file is. Readers and writers handle plain data (slices, grids, stores); only
@@ -50,6 +51,7 @@ mod kitti_bin;
 mod las_file;
 mod laser_log;
 mod log_writer;
+mod manifest;
 mod map_file;
 mod map_messages;
 mod map_picture;
@@ -73,8 +75,10 @@ mod svg;
 mod testing;
 mod xyz;
 
-pub use answer_row::{AnswerRow, HELD_BACK, certified_reach, write_answer, write_answer_header};
-pub use bytes::{Compression, Input, open, write_atomic};
+pub use answer_row::{
+    AnswerRow, HELD_BACK, SigmaColumns, certified_reach, write_answer, write_answer_header,
+};
+pub use bytes::{Compression, Input, open, rename_durable, write_atomic, write_durable};
 pub use carmen::{CarmenStats, RefusedScan, RefusedScans, ScanFault, ScanMessage};
 pub use container::{Chunk, Container, ContainerWriter};
 pub use costmap::write_costmap;
@@ -86,6 +90,7 @@ pub use geojson::{geojson_to_bytes, parse_geojson, read_geojson, write_geojson};
 pub use kitti_bin::{read_kitti_bin, write_kitti_bin};
 pub use laser_log::{LaserLog, LaserLogStats, RawLaserScan, TimeOrder, detect_no_return};
 pub use log_writer::{LogLayout, LogWriter};
+pub use manifest::{FileSum, Manifest};
 pub use map_file::{
     AttenuationBricks, ColorBricks, LedgerFile, MapFile, MapHeader, OccupancyBricks, TsdfBricks,
     add_ledger_files, map_dimension, scans_of_sum, sweep_of, sweep_word, weights_of, weights_word,

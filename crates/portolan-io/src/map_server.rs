@@ -16,10 +16,10 @@ use std::path::{Path, PathBuf};
 
 use portolan::geom::{Grid, Pose};
 
-use crate::bytes::{Input, Lines, open, parse_f64};
+use crate::bytes::{Input, Lines, open, parse_f64, prepare};
 use crate::error::shown;
 use crate::map_picture::read_map_picture;
-use crate::{IoError, Pgm, Result, write_atomic};
+use crate::{IoError, Pgm, Result};
 
 /// The state of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -196,7 +196,7 @@ fn cell(value: u16, white: u16, info: &MapServerInfo) -> (MapCell, f32) {
 ///
 /// # Errors
 /// [`IoError::Unwritable`] where the lengths differ or the resolution is not positive, else as
-/// [`write_atomic`].
+/// [`crate::write_atomic`].
 pub fn write_map_server(yaml: impl AsRef<Path>, grid: &Grid<2>, cells: &[MapCell]) -> Result<()> {
     let gray = |c: &MapCell| match c {
         MapCell::Free => 254,
@@ -236,18 +236,27 @@ pub(crate) fn write_pair(
     if name.chars().any(char::is_control) {
         return Err(IoError::unwritable(yaml, "the image name", shown(name), "choose a plain name"));
     }
-    Pgm { width, height, max_value: 255, pixels }.write(&image_path)?;
+    let image = Pgm { width, height, max_value: 255, pixels }.prepare(&image_path)?;
     let mode = match mode {
         MapMode::Trinary => "trinary",
         MapMode::Scale => "scale",
         MapMode::Raw => "raw",
     };
     let note = note.replace(char::is_control, " ");
-    write_atomic(yaml, |w| {
+    let text = prepare(yaml, |w| {
         writeln!(w, "# {note}")?;
         writeln!(w, "image: '{name}'\nmode: {mode}\nresolution: {resolution}\norigin: [{x}, {y}, 0.0]")?;
         writeln!(w, "negate: 0\noccupied_thresh: {occupied_thresh}\nfree_thresh: {free_thresh}")
-    })
+    })?;
+    // Whoever reads the pair begins with the yaml file: without one there is no map, and never an image of one map with the
+    // place of another, whenever this run is killed.
+    if let Ok(old) = std::fs::canonicalize(yaml)
+        && old.is_file()
+    {
+        std::fs::remove_file(old).map_err(|e| IoError::os(yaml, "replace it", e))?;
+    }
+    image.publish()?;
+    text.publish()
 }
 
 fn yaml(mut lines: Lines<Input>) -> Result<MapServerInfo> {

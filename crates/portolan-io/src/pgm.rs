@@ -3,9 +3,9 @@
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use crate::bytes::{Input, check_padding, open, parse_f64, read_failed};
+use crate::bytes::{Input, Prepared, check_padding, open, parse_f64, prepare, read_failed};
 use crate::error::shown;
-use crate::{IoError, Result, write_atomic};
+use crate::{IoError, Result};
 
 /// The most pixels of an image.
 const MOST_PIXELS: u64 = 1 << 27;
@@ -77,14 +77,18 @@ impl Pgm {
     /// Writes a `P5` file: one byte a pixel up to 255, else two.
     ///
     /// # Errors
-    /// [`IoError::Unwritable`] where the size does not fit the pixels, else as [`write_atomic`].
+    /// [`IoError::Unwritable`] where the size does not fit the pixels, else as [`crate::write_atomic`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
-        let path = path.as_ref();
+        self.prepare(path.as_ref())?.publish()
+    }
+
+    /// Writes it, and leaves it without its name.
+    pub(crate) fn prepare<'a>(&self, path: &'a Path) -> Result<Prepared<'a>> {
         if self.width.checked_mul(self.height) != Some(self.pixels.len()) || self.max_value == 0 {
             let value = format!("{} x {} for {} pixels", self.width, self.height, self.pixels.len());
             return Err(IoError::unwritable(path, "the image size", value, "make width x height pixels"));
         }
-        write_atomic(path, |w| self.write_to(w))
+        prepare(path, |w| self.write_to(w))
     }
 
     fn write_to(&self, w: &mut impl Write) -> io::Result<()> {

@@ -6,10 +6,10 @@ use pyo3::prelude::*;
 
 use crate::fault::{of_command, work};
 
-/// Runs the command line on these words, the name of the program first; gives the exit status.
+/// Runs the command line on these words, the name of the program first, as the process that this is; gives the exit status.
 #[pyfunction]
 pub(crate) fn run(py: Python<'_>, words: Vec<OsString>) -> PyResult<u8> {
-    work(py, || portolan_cli::run(words))
+    work(py, || portolan_cli::run_as_program(words))
 }
 
 /// Runs a command, and raises what it would have printed on stderr.

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::arrays::{array, dense, rows, shown};
 use crate::fault::{value_error, work};
+use crate::transform::threads;
 
 /// Fewer vertices or triangles are not shared out.
 const SHARED: usize = 1 << 15;
@@ -45,10 +46,10 @@ fn extent(samples: &[f32]) -> Option<(f32, f32)> {
 }
 
 /// Axes in the order of the array, lengths in its unit, triangles turned if that mirrors them or if it is asked for.
-fn place(found: &mut Isosurface, spacing: [f64; 3], fortran: bool, turned: bool) {
+fn place(found: &mut Isosurface, spacing: [f64; 3], fortran: bool, turned: bool, threads: usize) {
     let scale = spacing.map(|s| s as f32);
     if !fortran || spacing != [1.0; 3] {
-        each(&mut found.mesh.vertices, |v| {
+        each(&mut found.mesh.vertices, threads, |v| {
             if !fortran {
                 v.swap(0, 2);
             }
@@ -60,7 +61,7 @@ fn place(found: &mut Isosurface, spacing: [f64; 3], fortran: bool, turned: bool)
     let inverse = spacing.map(|s| (1.0 / s) as f32);
     let equal = spacing[0] == spacing[1] && spacing[1] == spacing[2];
     if !fortran || !equal {
-        each(&mut found.mesh.normals, |n| {
+        each(&mut found.mesh.normals, threads, |n| {
             if !fortran {
                 n.swap(0, 2);
             }
@@ -72,16 +73,18 @@ fn place(found: &mut Isosurface, spacing: [f64; 3], fortran: bool, turned: bool)
         });
     }
     if turned {
-        each(&mut found.mesh.triangles, |t| t.swap(0, 2));
+        each(&mut found.mesh.triangles, threads, |t| t.swap(0, 2));
     }
 }
 
-/// Changes all, many on all cores.
-fn each<T: Send>(all: &mut [T], change: impl Fn(&mut T) + Sync) {
-    if all.len() < SHARED {
+/// Changes all, many on so many threads at most.
+fn each<T: Send>(all: &mut [T], threads: usize, change: impl Fn(&mut T) + Sync) {
+    if threads == 1 || all.len() < SHARED {
         all.iter_mut().for_each(change);
     } else {
-        all.par_chunks_mut(SHARED).for_each(|some| some.iter_mut().for_each(&change));
+        // No more chunks than threads, so that no more take part.
+        let together = SHARED.max(all.len().div_ceil(threads));
+        all.par_chunks_mut(together).for_each(|some| some.iter_mut().for_each(&change));
     }
 }
 
@@ -95,7 +98,8 @@ type Surface<'py> = (
 
 /// The surface at which the values of an array cross a level, as triangles: marching cubes.
 #[pyfunction]
-#[pyo3(signature = (volume, level=None, spacing=None, gradient_direction="descent", mask=None, *, normals=true, values=true))]
+#[pyo3(signature = (volume, level=None, spacing=None, gradient_direction="descent", mask=None, *, normals=true, values=true, parallel=None))]
+#[expect(clippy::too_many_arguments, reason = "those of Python")]
 pub(crate) fn marching_cubes<'py>(
     volume: &Bound<'py, PyAny>,
     level: Option<f64>,
@@ -104,8 +108,10 @@ pub(crate) fn marching_cubes<'py>(
     mask: Option<&Bound<'py, PyAny>>,
     normals: bool,
     values: bool,
+    parallel: Option<usize>,
 ) -> PyResult<Surface<'py>> {
     let py = volume.py();
+    let threads = threads(parallel);
     let descent = match gradient_direction {
         "descent" => true,
         "ascent" => false,
@@ -168,8 +174,9 @@ pub(crate) fn marching_cubes<'py>(
                 f64::from(0.5 * (least + most))
             }
         };
+        let inside = Inside::Above;
         let settings =
-            IsosurfaceSettings { level, inside: Inside::Above, normals, ranges: values, apart: false, cubes };
+            IsosurfaceSettings { level, inside, normals, ranges: values, apart: false, cubes, threads };
         let mut found = isosurface(samples, shape, &settings);
         if found.mesh.triangles.is_empty() {
             return match extent(samples) {
@@ -181,7 +188,7 @@ pub(crate) fn marching_cubes<'py>(
             };
         }
         // Triangles are seen from the smaller values; reversed axes mirror them, so that they are as 'descent' wants them.
-        place(&mut found, spacing, fortran, fortran == descent);
+        place(&mut found, spacing, fortran, fortran == descent, threads);
         Ok(Some(found))
     })?;
     let Some(Isosurface { mesh, ranges }) = found.map_err(value_error)? else {
@@ -193,9 +200,11 @@ pub(crate) fn marching_cubes<'py>(
     if i32::try_from(vertices).is_err() {
         return Err(value_error(format!("volume: {vertices} vertices are more than an int32 can count")));
     }
+    // In place: types of one size.
+    let faces = mesh.triangles.into_iter().map(|t| t.map(|v| v as i32)).collect();
     Ok((
         rows(py, mesh.vertices, &[vertices])?,
-        rows(py, mesh.triangles, &[triangles])?.call_method1("view", ("i4",))?.cast_into()?,
+        rows(py, faces, &[triangles])?,
         if normals { Some(rows(py, mesh.normals, &[vertices])?) } else { None },
         if values { Some(array(py, ranges, &[vertices])?) } else { None },
     ))

@@ -46,7 +46,7 @@ fn made<const D: usize>(options: &Options) -> PyResult<Box<portolan::Ledger<D>>>
 }
 
 /// The readings of a scan, and its pose where it has one.
-fn scan_of(
+pub(crate) fn scan_of(
     scan: Option<&Bound<'_, PyAny>>,
     readings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(AnyScan, Option<AnyPose>)> {
@@ -92,7 +92,7 @@ fn scan_of(
     Ok((readings.scan()?, None))
 }
 
-fn given_pose(pose: Option<&Bound<'_, PyAny>>, own: Option<AnyPose>) -> PyResult<AnyPose> {
+pub(crate) fn given_pose(pose: Option<&Bound<'_, PyAny>>, own: Option<AnyPose>) -> PyResult<AnyPose> {
     match (pose, own) {
         (Some(pose), _) => pose_of(pose),
         (None, Some(own)) => Ok(own),

@@ -17,6 +17,7 @@ mod isosurface;
 mod ledger;
 mod log;
 mod mapper;
+mod movers;
 mod occupancy;
 mod options;
 mod path;
@@ -49,6 +50,8 @@ mod _portolan {
     use crate::log::{Log, Scan, open};
     #[pymodule_export]
     use crate::mapper::{Mapper, load};
+    #[pymodule_export]
+    use crate::movers::Movers;
     #[pymodule_export]
     use crate::occupancy::Occupancy;
     #[pymodule_export]

@@ -24,7 +24,7 @@ pub(crate) struct Log {
 /// A scan of a log.
 #[pyclass(frozen, module = "portolan")]
 pub(crate) struct Scan {
-    time: Option<f64>,
+    pub(crate) time: Option<f64>,
     pub(crate) pose: AnyPose,
     pub(crate) readings: AnyScan,
 }
@@ -112,7 +112,8 @@ impl Log {
     }
 }
 
-/// A kind of beam as a byte: 0 hit, 1 cut at the largest range, 2 no echo, 3 no information, 4 the robot itself.
+/// A kind of beam as a byte: 0 hit, 1 cut at the largest range, 2 no echo, 3 no information, 4 the robot itself, 5 what
+/// moved.
 fn kind(kind: BeamKind) -> u8 {
     match kind {
         BeamKind::Hit => 0,
@@ -120,6 +121,7 @@ fn kind(kind: BeamKind) -> u8 {
         BeamKind::NoReturn => 2,
         BeamKind::Dropped => 3,
         BeamKind::SelfHit => 4,
+        BeamKind::Mover => 5,
     }
 }
 
@@ -199,7 +201,7 @@ impl Scan {
     }
 
     /// Kind of each beam of a planar laser: 0 hit, 1 cut at the largest range, 2 no echo, 3 no information, 4 the robot
-    /// itself; `None` in 3-D.
+    /// itself, 5 what moved; `None` in 3-D.
     #[getter]
     fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArrayDyn<u8>>>> {
         match &self.readings {

@@ -15,6 +15,7 @@ pub(crate) fn counts<'py>(py: Python<'py>, stats: &ScanStats) -> PyResult<Bound<
         ("no_return", beams.no_return),
         ("dropped", beams.dropped),
         ("self_hits", beams.self_hit),
+        ("movers", beams.mover),
         ("refused_readings", refused),
         ("refused_poses", stats.refused_poses),
         ("hits_outside", stats.hits_outside),

@@ -27,7 +27,8 @@ enum What {
 /// Distances, and of which axis the nearest cells have which index: axis by axis, in the order of the array's axes.
 type Found = (Vec<f32>, Vec<i32>);
 
-fn threads(parallel: Option<usize>) -> usize {
+/// What `parallel` asks for: threads at most.
+pub(crate) fn threads(parallel: Option<usize>) -> usize {
     match parallel {
         None | Some(0) => usize::MAX,
         Some(n) => n,

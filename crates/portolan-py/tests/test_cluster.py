@@ -48,6 +48,11 @@ def test_parts_on_processes(tmp_path, parts):
     assert (tmp_path / "out" / "map.portolan").read_bytes() == whole
     assert (tmp_path / "out" / "contour.geojson").read_bytes() == (tmp_path / "whole" / "contour.geojson").read_bytes()
     assert seen[-1] == (2 * parts - 1, 2 * parts - 1)
+    with pytest.raises(ValueError, match="overwrite=True"):
+        portolan.cluster.map(log, tmp_path / "out", resolution=0.2, parts=parts)
+    assert (tmp_path / "out" / "map.portolan").read_bytes() == whole
+    portolan.cluster.map(log, tmp_path / "out", resolution=0.2, parts=parts, overwrite=True)
+    assert (tmp_path / "out" / "map.portolan").read_bytes() != whole
 
 
 def test_what_goes_wrong_is_said(tmp_path):

@@ -100,6 +100,26 @@ def test_what_is_not_asked_for_is_none(order):
                 np.testing.assert_array_equal(got, want)
 
 
+@pytest.mark.parametrize("holes", [False, True])
+@pytest.mark.parametrize("order", "CF")
+def test_it_is_the_same_on_any_number_of_threads(order, holes):
+    # Noise: vertices and triangles enough to be shared out.
+    volume = np.array(np.random.default_rng(8).random((60, 50, 70), np.float32), order=order)
+    if holes:
+        volume[3, 4, 5] = np.nan
+    one = portolan.marching_cubes(volume, 0.5, (1, 2, 3), parallel=1)
+    assert len(one[0]) > 1 << 16 and len(one[1]) > 1 << 16
+    for parallel in (None, 0, 2, 7):
+        for a, b in zip(one, portolan.marching_cubes(volume, 0.5, (1, 2, 3), parallel=parallel)):
+            assert a.dtype == b.dtype and np.array_equal(a.view(np.uint32), b.view(np.uint32))
+
+
+def test_threads_are_a_number():
+    for wrong in (-1, 1.5, "two"):
+        with pytest.raises((TypeError, OverflowError)):
+            portolan.marching_cubes(ball(), 0.0, parallel=wrong)
+
+
 @pytest.mark.parametrize("order", "CF")
 def test_a_sample_that_is_not_finite_changes_what_is_around_it_alone(order):
     volume = smooth((30, 26, 35), 7)

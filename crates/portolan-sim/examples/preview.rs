@@ -72,7 +72,8 @@ fn main() -> Result<(), Error> {
     };
     let meshed = start.elapsed();
     let subtitle = format!("{} scans, {resolution} m, {} triangles", scans.len(), mesh.triangles.len());
-    let sheet = preview(&Preview { mesh: view, sensors: &sensors, title: log, subtitle: &subtitle });
+    let sheet =
+        preview(&Preview { mesh: view, sensors: &sensors, up: None, title: log, subtitle: &subtitle });
     eprintln!(
         "{subtitle}: fused {fused:.2?}, meshed {:.2?}, drawn {:.2?}",
         meshed - fused,

@@ -49,6 +49,7 @@ pub mod handover;
 pub mod ledger;
 pub mod map;
 pub mod mapper;
+pub mod movers;
 mod parallel;
 pub mod plan;
 pub mod scan;
@@ -58,6 +59,7 @@ pub mod surface;
 pub mod sweep;
 #[cfg(test)]
 mod testing;
+pub mod uncertainty;
 
 pub use answer::{Answer, Status};
 pub use ledger::Ledger;

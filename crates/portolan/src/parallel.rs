@@ -95,7 +95,18 @@ pub(crate) fn change_each<T: Send, S>(
     scratch: impl Fn() -> S + Sync,
     change: impl Fn(&mut T, &mut S) + Sync,
 ) {
-    for_each(items.chunks_mut(together), scratch, |items, scratch| {
+    change_each_on(usize::MAX, items, together, scratch, change);
+}
+
+/// [`change_each`] on so many threads at most.
+pub(crate) fn change_each_on<T: Send, S>(
+    most: usize,
+    items: &mut [T],
+    together: usize,
+    scratch: impl Fn() -> S + Sync,
+    change: impl Fn(&mut T, &mut S) + Sync,
+) {
+    for_each_on(most, items.chunks_mut(together), scratch, |items, scratch| {
         items.iter_mut().for_each(|item| change(item, scratch));
     });
 }
@@ -111,8 +122,19 @@ pub(crate) fn map_numbers<R: Send, S>(
     scratch: impl Fn() -> S + Sync,
     make: impl Fn(usize, &mut S) -> R + Sync,
 ) -> Vec<R> {
+    map_numbers_on(usize::MAX, count, scratch, make)
+}
+
+/// [`map_numbers`] on so many threads at most.
+pub(crate) fn map_numbers_on<R: Send, S>(
+    most: usize,
+    count: usize,
+    scratch: impl Fn() -> S + Sync,
+    make: impl Fn(usize, &mut S) -> R + Sync,
+) -> Vec<R> {
     let mut made: Vec<Option<R>> = (0..count).map(|_| None).collect();
-    for_each(made.iter_mut().enumerate(), scratch, |(i, made), scratch| *made = Some(make(i, scratch)));
+    let tasks = made.iter_mut().enumerate();
+    for_each_on(most, tasks, scratch, |(i, made), scratch| *made = Some(make(i, scratch)));
     made.into_iter().flatten().collect()
 }
 

@@ -4,7 +4,7 @@ use crate::gallery::{Cost, LEVEL, Row, Workload};
 
 use super::page::{escaped, table as html_table};
 use super::{Facts, Section};
-use portolan_draw::{shown_bytes, shown_seconds};
+use portolan_draw::shown_seconds;
 
 /// The rows that answer a question most cheaply, within what runs differ by.
 fn cheapest(rows: &[Row], cost: impl Fn(&Row) -> Option<Cost>) -> Vec<usize> {
@@ -13,34 +13,64 @@ fn cheapest(rows: &[Row], cost: impl Fn(&Row) -> Option<Cost>) -> Vec<usize> {
     (0..rows.len()).filter(|&i| seconds(i).is_some_and(|s| s <= LEVEL * best)).collect()
 }
 
+/// The unit that suits the middle of a column of numbers: its name, and how many of it make one.
+fn unit(mut values: Vec<f64>, units: &[(&'static str, f64)]) -> (&'static str, f64) {
+    values.retain(|v| *v > 0.0);
+    values.sort_unstable_by(f64::total_cmp);
+    let middle = values.get(values.len() / 2).copied().unwrap_or(1.0);
+    units.iter().copied().find(|(_, scale)| middle * scale < 1000.0).unwrap_or(units[units.len() - 1])
+}
+
+const TIMES: [(&str, f64); 3] = [("ns", 1e9), ("µs", 1e6), ("ms", 1e3)];
+const SIZES: [(&str, f64); 2] = [("kB", 1e-3), ("MB", 1e-6)];
+
+/// To three digits, but no digit of a whole number is left out.
+fn three_digits(value: f64) -> String {
+    let digits = if value > 0.0 { (2 - value.log10().floor() as i32).clamp(0, 4) } else { 0 };
+    format!("{value:.*}", digits as usize)
+}
+
 pub(super) fn table(facts: &Facts) -> Section {
     let rows = &facts.scene.gallery.rows;
     let columns: [fn(&Row) -> Option<Cost>; 4] =
         [|r| r.update, |r| r.occupancy, |r| r.distance, |r| r.surface];
     let best: Vec<Vec<usize>> = columns.iter().map(|cost| cheapest(rows, cost)).collect();
+    let times =
+        columns.map(|cost| unit(rows.iter().filter_map(|r| Some(cost(r)?.seconds)).collect(), &TIMES));
+    let bytes = |row: &Row| row.memory_bytes as f64;
+    let size = unit(rows.iter().map(bytes).collect(), &SIZES);
+    let least = rows.iter().filter(|row| !row.derived).map(bytes).fold(f64::INFINITY, f64::min);
     let cells = rows.iter().enumerate().map(|(i, row)| {
         let plus = if row.derived { "+" } else { "" };
         let mut cells = vec![
             format!("{}<small>{}</small>", escaped(&row.name), escaped(&row.note)),
-            format!("{plus}{}", shown_bytes(row.memory_bytes as f64)),
+            match format!("{plus}{}", three_digits(bytes(row) * size.1)) {
+                shown if !row.derived && bytes(row) <= LEVEL * least => format!("<b>{shown}</b>"),
+                shown => shown,
+            },
         ];
         for (column, cost) in columns.iter().enumerate() {
             let Some(cost) = cost(row) else {
                 cells.push("–".into());
                 continue;
             };
-            let time = shown_seconds(cost.seconds);
+            let time = three_digits(cost.seconds * times[column].1);
             let time = if best[column].contains(&i) { format!("<b>{time}</b>") } else { time };
             cells.push(format!("{time}<small>{}</small>", cost.by.unwrap_or("")));
         }
         cells
     });
-    let header =
-        ["representation", "memory", "update per scan", "occupancy probe", "distance probe", "surface"];
+    let named = ["update per scan", "occupancy probe", "distance probe", "surface"];
+    let with_unit = |(name, unit): (&str, &str)| format!("{name}, {unit}");
+    let header: Vec<String> = ["representation".to_owned(), with_unit(("memory", size.0))]
+        .into_iter()
+        .chain(named.into_iter().zip(times.map(|t| t.0)).map(with_unit))
+        .collect();
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let body = format!(
         "<p>Measured: bytes held, seconds of one core. A dash says that the representation cannot \
          answer; nothing is faked. <b>+</b> is memory on top of the TSDF that a field is derived from, and its update is a \
-         full rebuild. The cheapest in each column, and what is level with it, is set in bold.</p>{}\
+         full rebuild. The cheapest in each column, and what is level with it, is set in bold; every column has one unit.</p>{}\
          <p>No row wins all columns, and none was ever going to.</p>",
         html_table(&header, &cells.collect::<Vec<_>>(), &[])
     );

@@ -13,6 +13,7 @@ mod page;
 mod pictures;
 
 use crate::experiment::{Drift, Forgetting, PoseSet};
+use crate::gallery::Workload;
 use crate::pictures::Scene;
 
 /// What the sections are made of.
@@ -48,7 +49,40 @@ pub fn html(facts: &Facts) -> String {
         ghost::section(facts),
         Some(against_text::section(facts)),
     ];
-    page::page(&introduction(facts), sections.into_iter().flatten())
+    let sections: Vec<Section> = sections.into_iter().flatten().collect();
+    page::page(&format!("{}{}", summary(facts), introduction(facts)), &sections)
+}
+
+/// What one should know who reads no further: who is cheapest, what it weighs, how true it is.
+fn summary(facts: &Facts) -> String {
+    let gallery = facts.scene.gallery;
+    let first = |w: &crate::gallery::Winner| {
+        let asked = match w.workload {
+            Workload::Occupancy => "occupancy",
+            Workload::Distance => "distances",
+            Workload::Surface => "the surface",
+        };
+        format!("{asked}: {}", page::escaped(&gallery.rows[w.row].name))
+    };
+    let cheapest: Vec<_> = gallery.winners.iter().map(first).collect();
+    let sizes = gallery.rows.iter().filter(|row| !row.derived).map(|row| row.memory_bytes as f64);
+    let (least, most) = sizes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), v| (a.min(v), b.max(v)));
+    let headline = gallery.headline();
+    let error = headline.fields.first().and_then(|field| field.against_truth);
+    let truth = error.map_or(String::new(), |e| {
+        format!(
+            "<li>Distances of the accurate field are within {:.1} mm of the true world in the median, within {:.0} mm in 99 of \
+             100 places.</li>",
+            1e3 * e.median,
+            1e3 * e.p99
+        )
+    });
+    format!(
+        "<ul class=lead><li>No map is cheapest at everything. For {}.</li><li>The same scans weigh from {} to {}.</li>{truth}</ul>",
+        cheapest.join("; for "),
+        portolan_draw::shown_bytes(least),
+        portolan_draw::shown_bytes(most),
+    )
 }
 
 fn introduction(facts: &Facts) -> String {
@@ -63,6 +97,8 @@ fn introduction(facts: &Facts) -> String {
          once: {width} × {height} cells of 5 cm, truncation 15 cm, weights clamped at {clamp}. Then all of them are asked the \
          same three questions: <em>is this point occupied? how far is the nearest surface? where is the boundary?</em> \
          The simulator knows the truth, so each answer has an error beside its cost.</p>\
+         <p>“The text” on this page is chapter 19, <em>Modern Map Representations</em>, of the online textbook <em>Probabilistic \
+         Robotics</em>, with which this program began; its numbers stand beside ours at the end.</p>\
          <p>Every number of ours on this page was computed in {seconds:.1} s, on the machine that wrote it, by the command under \
          each section. Times vary from run to run by some ten percent; memory and errors do not.</p>{warnings}",
         scans = facts.scene.log.len(),

@@ -17,21 +17,28 @@ th,td{padding:.42em .7em;text-align:right;border-bottom:1px solid var(--line);ve
 th:first-child,td:first-child,td.text,th.text{text-align:left}thead th{border-bottom:2px solid var(--ink);white-space:nowrap}
 td b{color:var(--best)}small,figcaption,.command{color:var(--muted)}td small{display:block}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(20rem,1fr));gap:1.3rem;margin:1.2rem 0}
-figure{margin:0}figure.wide{max-width:48rem;margin:1.2rem 0}figure.full{margin:1.2rem 0}img{display:block;width:100%;height:auto;background:#fff;border:1px solid var(--line);border-radius:4px}
+figure{margin:0}figure.wide{max-width:48rem;margin:1.2rem 0}figure.full{margin:1.2rem 0}nav{columns:2;max-width:48rem}nav a{color:var(--accent)}.scrolls{display:none}img{display:block;width:100%;height:auto;background:#fff;border:1px solid var(--line);border-radius:4px}
 figcaption{font-size:.88rem;margin-top:.4em}figcaption b{color:var(--ink)}
 .command{font-size:.88rem}code{font:.92em ui-monospace,monospace;background:var(--soft);padding:.12em .4em;border-radius:3px;color:var(--ink)}
 .legend span{display:inline-block;margin-right:1.2em;white-space:nowrap;font-size:.9rem}.legend i{display:inline-block;width:1.1em;height:.75em;margin-right:.4em;border:1px solid var(--line);vertical-align:baseline}
+@media (max-width:60rem){.scrolls{display:block}nav{columns:1}}
+/* Pictures are drawn on white: in the dark light becomes dark, and colors keep their hue. */
+@media (prefers-color-scheme:dark){img,.legend i{filter:invert(1) hue-rotate(180deg)}}
 .warn{color:var(--warn)}sub{line-height:0}
 ";
 
 /// The whole file.
-pub(super) fn page(introduction: &str, sections: impl Iterator<Item = Section>) -> String {
+pub(super) fn page(introduction: &str, sections: &[Section]) -> String {
+    let contents: String = sections
+        .iter()
+        .map(|s| format!("<li><a href=\"#{}\">{}</a></li>", anchor(s.title), escaped(s.title)))
+        .collect();
     let mut html = format!(
         "<!doctype html>\n<html lang=en>\n<head>\n<meta charset=utf-8>\n\
          <meta name=viewport content=\"width=device-width,initial-scale=1\">\n\
          <meta name=color-scheme content=\"light dark\">\n<title>One log, every map</title>\n\
          <style>{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>One log, every map: what each answer costs, and how true it is</h1>\n\
-         {introduction}\n"
+         {introduction}\n<nav aria-label=Contents><ul>{contents}</ul></nav>\n"
     );
     for Section { title, body, command } in sections {
         // What is said about the command stands behind it, three blanks away.
@@ -39,7 +46,8 @@ pub(super) fn page(introduction: &str, sections: impl Iterator<Item = Section>) 
         // Writing to a string cannot fail.
         let _ = write!(
             html,
-            "<section>\n<h2>{}</h2>\n{body}\n<p class=command>The command: <code>{}</code> {}</p>\n</section>\n",
+            "<section>\n<h2 id=\"{}\">{}</h2>\n{body}\n<p class=command>The command: <code>{}</code> {}</p>\n</section>\n",
+            anchor(title),
             escaped(title),
             escaped(command),
             escaped(note)
@@ -47,6 +55,12 @@ pub(super) fn page(introduction: &str, sections: impl Iterator<Item = Section>) 
     }
     html.push_str("</main>\n</body>\n</html>\n");
     html
+}
+
+/// The name of a section in addresses.
+fn anchor(title: &str) -> String {
+    let letters = title.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
+    letters.collect()
 }
 
 /// Text that can stand in HTML.
@@ -57,7 +71,10 @@ pub(super) fn escaped(text: &str) -> String {
 /// A table of cells that are HTML already; columns named in `text` are set left.
 pub(super) fn table(header: &[&str], rows: &[Vec<String>], text: &[usize]) -> String {
     let class = |i: usize| if text.contains(&i) { " class=text" } else { "" };
-    let mut html = String::from("<div class=scroll><table><thead><tr>");
+    let mut html = String::from(
+        "<p class=\"scrolls command\">The table scrolls sideways.</p><div class=scroll tabindex=0 role=region \
+         aria-label=\"A table that scrolls sideways\"><table><thead><tr>",
+    );
     header.iter().enumerate().for_each(|(i, h)| {
         let _ = write!(html, "<th scope=col{}>{h}</th>", class(i));
     });

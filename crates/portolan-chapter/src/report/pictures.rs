@@ -20,7 +20,7 @@ pub(super) fn section(facts: &Facts) -> Section {
         (
             Layer::Grid,
             "Occupancy grid.",
-            "One byte a cell. White is free, dark occupied, gray never observed; nothing else is stored.",
+            "One byte a cell. Free is the color of the page, occupied that of ink, gray was never observed; nothing else is stored.",
         ),
         (
             Layer::Tree,
@@ -50,7 +50,7 @@ pub(super) fn section(facts: &Facts) -> Section {
         (
             Layer::Hits,
             "Hits per meter.",
-            "The share of beams through each cell that end in it: white lets all pass. Thin things stay as the part that they stop.",
+            "The share of beams through each cell that end in it: the color of the page lets all pass. Thin things stay as the part that they stop.",
         ),
         (Layer::Cloud, "Point cloud.", "The log itself: every end point, free space nowhere."),
         (

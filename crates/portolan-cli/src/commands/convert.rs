@@ -23,10 +23,12 @@ use crate::arguments::{Bounds, bounds, length, thin};
 use crate::dimension::{Given, ONLY_3D};
 use crate::error::bad_call;
 use crate::esdf::{EsdfArg, esdf_of_cells, status_plane, tsdf_of_samples};
+use crate::folder;
 use crate::mapping::{Octree, cells_for_map_server, polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::source::{Source, open};
 use crate::unknown::{STAYS, UnknownCells};
+use crate::up::{Up, up};
 
 mod arrays;
 mod costs;
@@ -60,6 +62,10 @@ pub(crate) struct Args {
     /// Write only this box of the distance field: x0,y0,x1,y1 in 2-D, x0,y0,z0,x1,y1,z1 in 3-D (meters)
     #[arg(long, value_name = "BOX", value_parser = bounds, allow_hyphen_values = true)]
     bounds: Option<Bounds>,
+    /// Which way is up, where the map says it wrongly: an axis like +z or -y, or a direction x,y,z. --z is refused where it is
+    /// not z
+    #[arg(long, value_name = "AXIS|X,Y,Z", value_parser = up, allow_hyphen_values = true, requires = "z", help_heading = ONLY_3D)]
+    up: Option<Up>,
     #[command(flatten)]
     arrays: ArrayArgs,
     #[command(flatten)]
@@ -86,6 +92,7 @@ enum Target {
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let target = target(&args.out);
     let source = open(&args.input)?;
+    folder::warn(&args.input, args.output)?;
     let Some(target) = target else { return Err(not_possible(args, &source)) };
     source.check::<Args>(&args.given)?;
     args.check(target, &source)?;
@@ -112,6 +119,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     if !done {
         return Err(not_possible(args, &source));
     }
+    folder::forget(&args.out)?;
     let document = json!({
         "input": args.input.display().to_string(),
         "kind": source.describe(),
@@ -351,6 +359,10 @@ impl Args {
         let out = self.out.display();
         if self.arrays.asked() && target != Target::Arrays {
             return Err(bad_call(format!("options of arrays are only for .npz and .npy, not for {out}")));
+        }
+        if let (true, Source::Map3(file)) = (self.costs.is_layer(), source) {
+            let up = self.up.or_else(|| Up::of_header(&file.header)).unwrap_or(Up::Z);
+            up.check_slab(&self.input.display().to_string())?;
         }
         if self.costs.asked() && target != Target::MapServer {
             return Err(bad_call(format!("options of costmaps are only for .yaml, not for {out}")));

@@ -14,17 +14,19 @@ use portolan::scan::{Scan, ScanStats};
 use portolan_chapter::experiment::{Drift, Forgetting, PoseSet};
 use portolan_chapter::pictures::{self, Scene};
 use portolan_chapter::report::{self, Facts};
-use portolan_io::{MapFile, write_atomic};
+use portolan_io::{Manifest, MapFile, write_atomic};
 use portolan_sim::{LapConfig, Lidar, SEED};
 
 use self::found::Found;
 use super::gallery;
 use crate::arguments::ForgettingArgs;
 use crate::dimension::Dimension;
+use crate::folder::Results;
 use crate::json;
 use crate::log::RangeArgs;
 use crate::mapping::{
-    Artifacts, Derived, FusionReport, Limits, OccupancyKinds, Settings, fuse_2d, mapper_2d, store_2d,
+    ARTIFACTS, Artifacts, Derived, FusionReport, Limits, OccupancyKinds, Settings, fuse_2d, mapper_2d,
+    store_2d,
 };
 use crate::output::Output;
 use crate::progress::Progress;
@@ -62,6 +64,17 @@ pub(crate) struct Args {
 /// The textbook's: cells of 5 cm, truncation 15 cm.
 const RESOLUTION: f64 = 0.05;
 const TRUNCATION: f64 = 0.15;
+/// What is written beside the files of a map.
+const FILES: [&str; 8] = [
+    "gallery.json",
+    "gallery.png",
+    "gallery.txt",
+    "ghost.json",
+    "ghost.png",
+    "pose_graph.g2o",
+    "pose_graph.png",
+    "report.html",
+];
 /// Probes per direct question.
 const PROBES: usize = 100_000;
 
@@ -96,7 +109,8 @@ fn seed(text: &str) -> Result<u64, String> {
 
 /// Simulates the lap, builds every representation, writes everything.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    super::check_is_folder(&args.out)?;
+    let mut results = Results::claim(&args.out, "demo", &[&ARTIFACTS[..], &FILES].concat())?;
+    results.refuse_others()?;
     let mut run = Run::start();
     let config =
         LapConfig { scans: args.scans as usize, seed: args.seed.unwrap_or(SEED), ..Default::default() };
@@ -116,7 +130,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         run.timed("turned", || gallery::measure_turned(&scans, &grid, &settings, &world, &args.turn))?;
     gallery.turned = Some(turned);
 
-    gallery::make_folder(&args.out)?;
+    // The map first: the rest follows from it, or can be had again.
+    run.timed("save", || -> anyhow::Result<()> {
+        file.write(&results.map_file()?)?;
+        results.publish()
+    })?;
     let scene = Scene { gallery: &gallery, log: &scans, poses: drift.chosen.poses(), world: Some(&world) };
     let table = portolan_chapter::gallery::document(&gallery, "the simulated Apartment", scans.len());
     // The gallery is measured: from here on nobody minds a busy neighbour.
@@ -129,12 +147,17 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             run.files.extend(files);
             let title = format!("The Apartment · cells of 5 cm · {} scans", scans.len());
             let edge = RESOLUTION;
-            let artifacts =
-                Artifacts { file: &file, derived: &derived, dense: None, edge, camera: false, title };
-            let written = run.timed("map_files", || {
-                file.write(&args.out.join("map.portolan"))?;
-                artifacts.write(&args.out)
-            })?;
+            let artifacts = Artifacts {
+                file: &file,
+                derived: &derived,
+                dense: None,
+                edge,
+                camera: false,
+                movers: None,
+                sigma: None,
+                title,
+            };
+            let written = run.timed("map_files", || artifacts.write(&args.out))?;
             run.files.extend(written.files);
             let files = run.timed("drift_files", || write_drift(&args.out, &drift, &scene))?;
             run.files.extend(files);
@@ -152,7 +175,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         None => None,
     };
     run.files.extend(write_ghost(&args.out, forgetting.as_ref())?);
-    run.files.extend(["report.html", "summary.json"]);
+    run.files.extend(["report.html", "summary.json", Manifest::NAME]);
 
     let found = Found {
         config,
@@ -177,6 +200,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     write_atomic(args.out.join("report.html"), |w| w.write_all(page.as_bytes()))?;
     let mut summary = found.to_json(&run);
     write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{summary:#}"))?;
+    results.complete(&run.files)?;
     summary["gallery"] = table;
     args.output.print(&summary, found.report(&run, &args.out.display().to_string()))
 }

@@ -3,14 +3,17 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
+use portolan_io::MapHeader;
 use serde_json::{Value, json};
 
-use crate::dimension::{Given, ONLY_3D};
+use crate::dimension::{Dimension, Given, ONLY_3D};
+use crate::folder;
 use crate::log::{LimitArgs, LogArgs};
 use crate::output::Output;
 use crate::source::{Source, open};
 
 mod contour;
+mod halves;
 mod mesh;
 mod nearest;
 mod predict;
@@ -20,17 +23,17 @@ mod spread;
 #[command(
     after_help = "Examples:\n  portolan map intel.log.gz --resolution 0.05 --hold-out 10 --out intel\n  \
                   portolan eval intel --scans intel.log.gz\n  \
-                  portolan eval kitchen --reference kitchen.ply --crop"
+                  portolan eval kitchen --reference kitchen.ply --crop\n  portolan eval intel --scans intel.log.gz --halves"
 )]
 pub(crate) struct Args {
     #[command(flatten)]
     given: Given<()>,
     /// map.portolan or its folder
     map: PathBuf,
-    /// Log with scans that were not fused: the map predicts their ranges
+    /// Log with scans that were not fused: the map predicts their ranges. Not needed where --reference is given, which will do
     #[arg(long, value_name = "LOG", required_unless_present = "reference")]
     scans: Option<PathBuf>,
-    /// File to compare the surface with: a contour (GeoJSON) in 2-D; a mesh (PLY, OBJ, GLB) or points (PLY, PCD, E57, ..) in
+    /// File to compare the surface with, with or without --scans: a contour (GeoJSON) in 2-D; a mesh (PLY, OBJ, GLB) or points (PLY, PCD, E57, ..) in
     /// 3-D
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
@@ -44,6 +47,10 @@ pub(crate) struct Args {
     /// Predict only every N-th scan [default: those that the map held out, else all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), allow_negative_numbers = true)]
     hold_out: Option<u64>,
+    /// Tell how sure the surface is: map the first and the last two fifths of the log as the map was made, fit standard
+    /// deviations to how far their surfaces lie apart, and check them where they were not fitted
+    #[arg(long, requires = "scans")]
+    halves: bool,
     /// Leave out the parts of the reference that the map did not observe
     #[arg(long, requires = "reference", help_heading = ONLY_3D)]
     crop: bool,
@@ -68,10 +75,17 @@ struct Part {
 /// Evaluates the map.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let source = open(&args.map)?;
+    folder::warn(&args.map, args.output)?;
     source.check::<Args>(&args.given)?;
+    let with_halves = |mut parts: Vec<Part>, header: &MapHeader, dimension: Dimension| {
+        if let (true, Some(log)) = (args.halves, &args.scans) {
+            parts.push(halves::part(args, log, header, dimension)?);
+        }
+        anyhow::Ok(parts)
+    };
     let parts = match source {
-        Source::Map2(file) => contour::evaluate(args, &file)?,
-        Source::Map3(file) => mesh::evaluate(args, &file)?,
+        Source::Map2(file) => with_halves(contour::evaluate(args, &file)?, &file.header, Dimension::Two)?,
+        Source::Map3(file) => with_halves(mesh::evaluate(args, &file)?, &file.header, Dimension::Three)?,
         other => bail!(
             "{}: is {}; to evaluate it, give a map.portolan or its folder",
             args.map.display(),

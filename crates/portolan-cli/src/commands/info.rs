@@ -11,7 +11,7 @@ use portolan_io::{
 };
 use serde_json::{Value, json};
 
-use crate::arguments::shown_bytes;
+use crate::folder::half_written;
 use crate::json;
 use crate::log::describe;
 use crate::output::Output;
@@ -20,11 +20,14 @@ use crate::source::{Source, open};
 mod bags;
 mod logs;
 mod maps;
+mod text;
+mod written;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  portolan info intel.log.gz")]
 pub(crate) struct Args {
-    /// A log, a map, an image of a map, or a folder that `map` wrote
+    /// A log, a map, an image of a map, a folder that `map` wrote, or any file in it: mesh, field, tree, contour, pose graph (.g2o),
+    /// summary.json, gallery.json
     file: PathBuf,
     #[command(flatten)]
     output: Output,
@@ -34,7 +37,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let kind = detect(&args.file)?;
     let mut bag_text = None;
+    let beside = if args.file.is_file() { written::about(&args.file)? } else { None };
     let mut document = match kind {
+        _ if beside.is_some() => beside.unwrap_or_default(),
         FileKind::Bag => {
             let (mut document, text) = bags::about(&args.file)?;
             document["kind"] = json!(describe(&kind));
@@ -46,45 +51,25 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             let source = open(&args.file)?;
             let mut document = about(&source);
             document["kind"] = json!(source.describe());
-            document["warning"] = json!(source.warning());
+            let warnings = [half_written(&args.file), source.warning()];
+            let warnings: Vec<_> = warnings.into_iter().flatten().collect();
+            document["warning"] = json!((!warnings.is_empty()).then(|| warnings.join("; ")));
             document
         }
     };
     document["file"] = json!(args.file.display().to_string());
     document["bytes"] = json!(size(&args.file));
-    let mut text = format!("{}: {}\n", args.file.display(), document["kind"].as_str().unwrap_or_default());
+    let mut said = format!("{}: {}\n", args.file.display(), document["kind"].as_str().unwrap_or_default());
     match bag_text {
-        Some(about) => text.push_str(&about),
-        None => lines(&document, "  ", &mut text),
+        Some(about) => said.push_str(&about),
+        None => text::lines(&document, "  ", &mut said),
     }
-    args.output.print(&document, text)
+    args.output.print(&document, said)
 }
 
 fn size(path: &Path) -> Option<u64> {
     let file = if path.is_dir() { path.join("map.portolan") } else { path.to_owned() };
     std::fs::metadata(file).ok().map(|m| m.len())
-}
-
-/// The fields of a document for people: one a line.
-fn lines(value: &Value, indent: &str, text: &mut String) {
-    let Value::Object(fields) = value else { return };
-    for (key, value) in fields {
-        let name = key.replace('_', " ");
-        match value {
-            _ if indent == "  " && ["file", "kind"].contains(&key.as_str()) => {}
-            Value::Null => {}
-            Value::Object(inner) if inner.is_empty() => {}
-            Value::Object(_) => {
-                text.push_str(&format!("{indent}{name}:\n"));
-                lines(value, &format!("{indent}  "), text);
-            }
-            Value::String(s) => text.push_str(&format!("{indent}{name}: {s}\n")),
-            Value::Number(n) if key == "bytes" => {
-                text.push_str(&format!("{indent}{name}: {}\n", shown_bytes(n.as_f64().unwrap_or(0.0))));
-            }
-            other => text.push_str(&format!("{indent}{name}: {other}\n")),
-        }
-    }
 }
 
 fn about(source: &Source) -> Value {

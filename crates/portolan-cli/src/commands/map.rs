@@ -5,24 +5,27 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use portolan::geom::Aabb;
 use portolan::scan::ScanStats;
-use portolan_io::{detect_no_return, write_atomic};
+use portolan_io::{IoError, Manifest, detect_no_return, write_atomic};
 
 use crate::arguments::{box3, bytes, length_or_zero, shard};
 use crate::dimension::{Dimension, Given, ONLY_3D};
-use crate::error::bad_call;
+use crate::error::{self, bad_call};
 use crate::esdf::check_thin;
+use crate::folder::Results;
 use crate::json;
 use crate::log::{self, Log, LogArgs, Wanted};
 use crate::mapping::{
-    Artifacts, Derived, FusionReport, Limits, MapKind, Run, Settings, Summary, TOO_LARGE, Written, report,
-    title,
+    ARTIFACTS, Artifacts, Derived, FusionReport, Limits, Looking, MapKind, Run, Settings, Summary, TOO_LARGE,
+    Written, report, title,
 };
 use crate::output::Output;
 use crate::progress::Progress;
 use crate::saved::SavedMap;
+use crate::stop::{self, Signal};
+use crate::up::Up;
 
 #[derive(Clone, clap::Args)]
 #[command(after_help = "Examples:\n  portolan map intel-corrected.log.gz --resolution 0.05 --out intel\n  \
@@ -30,7 +33,7 @@ use crate::saved::SavedMap;
 pub(crate) struct Args {
     /// Log of range scans with poses, 2-D or 3-D; the format is detected
     log: PathBuf,
-    /// Folder for the results; created if missing
+    /// Folder for the results; created if missing. A map that is there is not replaced without --overwrite
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
@@ -41,6 +44,9 @@ pub(crate) struct Args {
     /// Add the log to the map in DIR. Settings that are not given are those of the map, except --bounds
     #[arg(long)]
     append: bool,
+    /// Replace the map in DIR, and what was written with it
+    #[arg(long, conflicts_with_all = ["append", "repose"])]
+    overwrite: bool,
     /// Map only part I of N of the log's scans, as sums (--ledger): `merge` adds the parts up to the map of the whole log,
     /// the same bytes. Writes the map alone
     #[arg(long, value_name = "I/N", value_parser = shard)]
@@ -65,36 +71,68 @@ pub(crate) struct Args {
     output: Output,
 }
 
+/// A log of which a larger share of scans cannot be read is damaged, or not what it is taken for; a smaller one is left out.
+const MOST_LOST: f64 = 0.5;
+
 /// Fuses the log.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let dimension = args.source.dimension(&args.log)?;
     dimension.check::<Args, _>(&args.settings, "the log")?;
     let mut stages = Stages::start();
     let threads = start_threads(args.threads)?;
+    // Whatever cannot work does not do so before the log is read, and nobody else writes until this run has ended.
+    let mut results = args.claim()?;
     let before = args.saved_map(dimension)?;
     let mut settings = args.settings(dimension, before.as_ref())?;
+    let told = settings.no_return.no_return;
     let log = args.open(&mut settings)?;
     stages.end("read");
 
     let (fused, held_out) = settings.selection().split(log.len());
-    let fused = args.part(fused);
+    let (whole, fused) = (fused.clone(), args.part(fused));
     let (log_name, map_name) = (args.log.display().to_string(), args.map_path().display().to_string());
     let memory = usize::try_from(args.memory).unwrap_or(usize::MAX);
     let limits = Limits { memory, log: &log_name, map: &map_name };
     let mut run = Run::new(&log, &fused, &settings, before, &limits)?;
     stages.end("prepare");
+    if let Some(pose_sigma) = settings.shape.movers {
+        // At all scans, whatever part is fused: parts of a log add up to the map of the whole.
+        let progress = Progress::new(whole.len(), "looking for what moved", args.output);
+        run.look(&Looking { pose_sigma, indices: &whole, memory, progress: &progress })?;
+        stages.end("movers");
+    }
 
+    // From here on there is something to save.
+    let mut hold = None;
     let (fusion, taken) = match &args.repose {
         Some(poses) => args.repose(poses, &mut run, &log, &settings)?,
         None => {
+            hold = Some(stop::hold());
             let progress = Progress::new(run.scans(), "fusing", args.output);
             (run.fuse(threads, &progress), ScanStats::default())
         }
     };
     stages.end("fuse");
+    if let Some(why) = &fusion.contradiction {
+        bail!("{log_name}: {why}; logs are known by their file names: give this one another name");
+    }
+    let scans = fusion.stats.scans;
+    let stopped = stop::asked();
+    if let Some(signal) = stopped {
+        args.check_worth_saving(signal, scans, fused.len(), settings.shape.ledger)?;
+    }
     if let (0, None, (_, Some(error))) = (fusion.stats.scans, &args.repose, &fusion.unreadable) {
         // Not one scan could be used: the first error is of more use than an empty map.
         bail!("{error}");
+    }
+    if let (lost, (_, Some(first))) = (fusion.damaged, &fusion.unreadable)
+        && lost as f64 > MOST_LOST * fused.len() as f64
+    {
+        bail!(
+            "{log_name}: {lost} of {} scans cannot be read, more than half (first: {first}); {}",
+            fused.len(),
+            args.as_it_was()
+        );
     }
     if let (0, Some(full)) = (fusion.stats.scans, &fusion.full)
         && settings.shape.ledger
@@ -106,30 +144,66 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let (mut file, extent, aside) = run.finish(&settings)?;
     stages.end("store");
     let mut bytes = file.bytes();
-    describe(&mut file, &settings, &log, &fusion.stats, &taken);
-    args.make_folder()?;
-    // Before anything is derived from it: whatever happens then, what was fused is saved.
-    match &aside {
-        Some(parts) => parts.add_up(&mut file, &args.map_path(), args.memory)?,
-        None => file.write(&args.map_path())?,
+    // What was found in a log is no setting of a map that may have others.
+    let mut noted = settings.clone();
+    if noted.shape.ledger {
+        noted.no_return.no_return = told;
+    } else if let (None, Log::Three(log), SavedMap::Three(file)) = (settings.up, &log, &file) {
+        settings.up = Some(Up::estimate(log, file));
+        noted.up = settings.up;
     }
+    describe(&mut file, &noted, &log, &fusion.stats, &taken);
+    // Before anything is derived from it: whatever happens then, what was fused is saved.
+    let path = results.map_file()?;
+    let copies = match &aside {
+        Some(parts) => parts.add_up(&mut file, &path, args.memory)?,
+        None => {
+            file.write(&path).map_err(|error| args.not_saved(error))?;
+            file.copies()
+        }
+    };
+    results.publish()?;
+    stop::leaves(format!("{map_name} is saved, the files around it are not whole"));
+    drop(hold);
     stages.end("save");
-    let alone = args.shard.is_some() || aside.is_some();
+    let stopped = stopped.or(stop::asked());
+    let alone = args.shard.is_some() || aside.is_some() || stopped.is_some();
 
-    let derived =
-        if args.shard.is_some() { Derived::default() } else { Derived::of(&file, &settings, memory) };
+    let derived = if alone { Derived::default() } else { Derived::of(&file, &settings, memory) };
     bytes.extend(derived.bytes());
     let header = file.header();
     let title = title(&header.logs, settings.resolution(), header.scans);
     let (dense, camera) = (args.dense, log.is_of_camera());
-    let artifacts =
-        Artifacts { file: &file, derived: &derived, dense, edge: settings.resolution(), camera, title };
-    let mut written = if alone { Written::of_map_alone(&args.out)? } else { artifacts.write(&args.out)? };
+    let artifacts = Artifacts {
+        file: &file,
+        derived: &derived,
+        dense,
+        edge: settings.resolution(),
+        camera,
+        movers: fusion.movers.as_ref(),
+        sigma: fusion.sigma.as_ref().and_then(|sigma| sigma.as_ref().ok()),
+        title,
+    };
+    let written = if alone {
+        let mut written = Written::of_map_alone();
+        artifacts.write_movers(&args.out, &mut written).map(|()| written)
+    } else {
+        artifacts.write(&args.out)
+    };
+    let mut written = written.map_err(|error| args.not_whole(&error))?;
+    written.notes.extend(copies);
     written.notes.extend(aside.as_ref().filter(|_| args.shard.is_none()).map(|_| TOO_LARGE.to_owned()));
+    written.notes.extend(stopped.map(|signal| {
+        format!(
+            "{} ended this run after {scans} of {} scans: the map was written alone",
+            signal.name(),
+            fused.len()
+        )
+    }));
     let mut seconds = stages.total();
     seconds.extend(fusion.seconds.iter().chain(&derived.seconds).chain(&written.seconds));
     let mut files = written.files;
-    files.push("summary.json");
+    files.extend(["summary.json", Manifest::NAME]);
     let summary = Summary {
         log: &log,
         settings: &settings,
@@ -141,11 +215,23 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         notes: written.notes,
         bytes,
         seconds,
-        files,
+        files: files.clone(),
     };
     let document = summary.to_json();
-    write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{document:#}"))?;
+    write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{document:#}"))
+        .map_err(|error| args.not_whole(&error.into()))?;
+    results.complete(&files).map_err(|error| args.not_whole(&error))?;
     args.output.print(&document, report(&summary, &args.out.display().to_string()))?;
+    if let Some(signal) = stopped {
+        return Err(error::stopped(
+            signal,
+            format!(
+                "{scans} of {} scans are fused and saved in {map_name}, alone: convert and mesh make the rest of it; for all \
+                 scans start again with --overwrite",
+                fused.len()
+            ),
+        ));
+    }
     if let Some(full) = &fusion.full {
         bail!(
             "{log_name}: {full}; {} of {} scans were fused and saved; start again with more --memory, a coarser \
@@ -206,10 +292,16 @@ impl Args {
         Ok((FusionReport { stats: done.added, moved, ..FusionReport::default() }, done.taken))
     }
 
-    /// The map to go on with. Without one, a folder that cannot be written to is found out before the work.
+    /// The map to go on with.
     fn saved_map(&self, dimension: Dimension) -> anyhow::Result<Option<SavedMap>> {
         if self.append || self.repose.is_some() {
             let file = SavedMap::read_to_append(&self.map_path(), self.memory, dimension)?;
+            if self.repose.is_some() && file.header().settings.contains_key("movers") {
+                bail!(
+                    "{}: was made with --movers, and what moved is another thing with other poses; map the log anew",
+                    self.map_path().display()
+                );
+            }
             if self.repose.is_some() && !file.is_ledger() {
                 bail!(
                     "{}: scans can be moved in maps made with --ledger only; clamped cells do not give them back",
@@ -218,13 +310,50 @@ impl Args {
             }
             return Ok(Some(file));
         }
-        super::check_is_folder(&self.out)?;
-        if let (Ok(out), Ok(log)) = (self.out.canonicalize(), self.log.canonicalize())
+        Ok(None)
+    }
+
+    /// Takes the folder, unless what is in it would be lost.
+    fn claim(&self) -> anyhow::Result<Results> {
+        let goes_on = self.append || self.repose.is_some();
+        if let (false, Ok(out), Ok(log)) = (goes_on, self.out.canonicalize(), self.log.canonicalize())
             && out == log
+            && out.is_dir()
         {
             return Err(bad_call("--out is the log's own folder; name another one"));
         }
-        Ok(None)
+        let results = Results::claim(&self.out, "map", &ARTIFACTS)?;
+        if !goes_on && !self.overwrite {
+            results.refuse_to_replace()?;
+        }
+        stop::leaves(self.as_it_was());
+        Ok(results)
+    }
+
+    /// What a run that writes nothing leaves.
+    fn as_it_was(&self) -> String {
+        match self.map_path().exists() {
+            true => format!("{} is as it was", self.map_path().display()),
+            false => "nothing was written".to_owned(),
+        }
+    }
+
+    /// Whether what was fused up to a signal is a map to keep. Scans that were added to clamped maps cannot be told from those
+    /// that are missing, so that nobody could go on with such a map; and a part of a log is merged as if it were whole.
+    fn check_worth_saving(&self, signal: Signal, scans: u64, of: usize, sums: bool) -> anyhow::Result<()> {
+        let whole = scans as usize == of;
+        if scans > 0 && (whole || self.shard.is_none() && (sums || !self.append)) {
+            return Ok(());
+        }
+        Err(error::stopped(signal, format!("{} after {scans} of {of} scans; start again", self.as_it_was())))
+    }
+
+    fn not_saved(&self, error: IoError) -> anyhow::Error {
+        anyhow!("{}: {error}; {}", self.map_path().display(), self.as_it_was())
+    }
+
+    fn not_whole(&self, error: &anyhow::Error) -> anyhow::Error {
+        anyhow!("{error:#}; {} is saved, the files around it are not whole", self.map_path().display())
     }
 
     /// What was given, else what the map to go on with was made with, else the defaults.
@@ -277,12 +406,6 @@ impl Args {
             *settings = settings.clone().without_rays(self.settings.has("maps"))?;
         }
         Ok(Log::Three(Box::new(log)))
-    }
-
-    fn make_folder(&self) -> anyhow::Result<()> {
-        std::fs::create_dir_all(&self.out).with_context(|| {
-            format!("{}: cannot create the folder; name one that can be written to", self.out.display())
-        })
     }
 }
 

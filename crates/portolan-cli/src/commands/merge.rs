@@ -5,19 +5,23 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use portolan::cell::Sign;
 use portolan_io::{
-    Container, LedgerFile, MapHeader, add_ledger_files, map_dimension, scans_of_sum, write_atomic,
+    Container, LedgerFile, Manifest, MapHeader, add_ledger_files, map_dimension, scans_of_sum, write_atomic,
 };
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 use crate::arguments::bytes;
 use crate::dimension::Dimension;
+use crate::folder::Results;
 use crate::json;
-use crate::mapping::{Artifacts, Derived, Settings, TOO_LARGE, Written, is_about_memory, peak_memory, title};
+use crate::mapping::{
+    ARTIFACTS, Artifacts, Derived, Settings, TOO_LARGE, Written, is_about_memory, peak_memory, title,
+};
 use crate::output::Output;
-use crate::saved::SavedMap;
+use crate::saved::{SavedMap, in_words_of_copies};
+use crate::stop;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  portolan map LOG --resolution 0.05 --shard 1/2 --out part1\n  \
@@ -30,9 +34,12 @@ pub(crate) struct Args {
     /// Take the scans of this map out; may be given several times
     #[arg(long, value_name = "MAP")]
     without: Vec<PathBuf>,
-    /// Folder for the results; created if missing
+    /// Folder for the results; created if missing. A map that is there is not replaced without --overwrite
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Replace the map in DIR, and what was written with it
+    #[arg(long)]
+    overwrite: bool,
     /// Write the map alone, without mesh, contour, distances and pictures
     #[arg(long)]
     map_only: bool,
@@ -45,21 +52,30 @@ pub(crate) struct Args {
 
 /// Adds maps up.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
-    super::check_is_folder(&args.out)?;
     let start = Instant::now();
+    let mut results = Results::claim(&args.out, "merge", &ARTIFACTS)?;
+    if !args.overwrite {
+        results.refuse_to_replace()?;
+    }
     let files: Vec<(PathBuf, Sign)> = args.files();
     let dimension = match map_dimension(&Container::open(&files[0].0)?)? {
         3 => Dimension::Three,
         _ => Dimension::Two,
     };
-    match dimension {
-        Dimension::Two => add::<2>(args, &files, dimension)?,
-        Dimension::Three => add::<3>(args, &files, dimension)?,
-    }
+    let copies = match dimension {
+        Dimension::Two => add::<2>(args, &files, dimension, &mut results)?,
+        Dimension::Three => add::<3>(args, &files, dimension, &mut results)?,
+    };
+    results.publish()?;
+    stop::leaves(format!(
+        "{} is saved, the files around it are not whole",
+        args.out.join("map.portolan").display()
+    ));
     let added = start.elapsed().as_secs_f64();
     let derived = Derivatives::of(args, dimension)?;
     let mut written = derived.written;
-    written.files.push("summary.json");
+    written.files.extend(["summary.json", Manifest::NAME]);
+    written.notes.extend(copies);
     let header = derived.header;
     let document = json!({
         "program": concat!("portolan ", env!("CARGO_PKG_VERSION")),
@@ -76,6 +92,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         "seconds": { "merge": added, "total": start.elapsed().as_secs_f64() },
     });
     write_atomic(args.out.join("summary.json"), |w| writeln!(w, "{document:#}"))?;
+    results.complete(&written.files)?;
     let text = format!(
         "{} scans of {}, added up in {added:.2} s\n{}wrote {} to {}\n",
         header.scans,
@@ -97,7 +114,13 @@ impl Args {
 }
 
 /// Writes the sum of the maps.
-fn add<const D: usize>(args: &Args, files: &[(PathBuf, Sign)], dimension: Dimension) -> anyhow::Result<()> {
+/// Returns what is to be said of its scans.
+fn add<const D: usize>(
+    args: &Args,
+    files: &[(PathBuf, Sign)],
+    dimension: Dimension,
+    results: &mut Results,
+) -> anyhow::Result<Option<String>> {
     let mut opened = Vec::new();
     for (path, sign) in files {
         let Some(file) = LedgerFile::<D>::open(path, args.memory)? else {
@@ -115,9 +138,8 @@ fn add<const D: usize>(args: &Args, files: &[(PathBuf, Sign)], dimension: Dimens
     let scans = scans_of_sum(&opened)?;
     header.logs = scans.logs().map(str::to_owned).collect();
     header.scans = scans.len() as u64;
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("{}: cannot create the folder", args.out.display()))?;
-    Ok(add_ledger_files(&opened, &header, &args.out.join("map.portolan"))?)
+    add_ledger_files(&opened, &header, &results.map_file()?)?;
+    Ok(in_words_of_copies(scans.copies()))
 }
 
 /// Settings must be the same, as far as they shape evidence; counts add up.
@@ -130,6 +152,7 @@ fn add_headers(
 ) -> anyhow::Result<()> {
     let ours = Settings::of_saved(&sum.settings).resolved(dimension);
     ours.check_agree(&part.settings, &path.display().to_string())?;
+    agree_on_the_rest(&mut sum.settings, &part.settings, path)?;
     if (sum.hold_out, sum.every) != (part.hold_out, part.every) {
         bail!("{}: other scans were left out than in the first map (--every, --hold-out)", path.display());
     }
@@ -138,6 +161,29 @@ fn add_headers(
         Sign::Plus => json::add_counts(&mut sum.statistics, &part.statistics),
     }
     Ok(())
+}
+
+/// What is said of how logs were read is left out of the sum where it differs; what is to be derived must be the same, or the sum
+/// would depend on the order of its parts.
+fn agree_on_the_rest(
+    sum: &mut Map<String, Value>,
+    part: &Map<String, Value>,
+    path: &Path,
+) -> anyhow::Result<()> {
+    const OF_LOGS: [&str; 3] = ["no_return", "no_return_free", "shift"];
+    for key in OF_LOGS {
+        if sum.get(key) != part.get(key) {
+            sum.remove(key);
+        }
+    }
+    let keys = sum.keys().chain(part.keys()).filter(|key| !OF_LOGS.contains(&key.as_str()));
+    match keys.into_iter().find(|key| sum.get(*key) != part.get(*key)) {
+        Some(key) => {
+            let [ours, theirs] = [sum, part].map(|s| s.get(key).unwrap_or(&Value::Null).clone());
+            bail!("{}: {key} is {theirs} there and {ours} in the first map", path.display())
+        }
+        None => Ok(()),
+    }
 }
 
 /// What follows from the sum.
@@ -169,8 +215,16 @@ impl Derivatives {
         let header = file.header().clone();
         let title = title(&header.logs, settings.resolution(), header.scans);
         let (dense, camera) = (None, false);
-        let artifacts =
-            Artifacts { file: &file, derived: &derived, dense, edge: settings.resolution(), camera, title };
+        let artifacts = Artifacts {
+            file: &file,
+            derived: &derived,
+            dense,
+            edge: settings.resolution(),
+            camera,
+            movers: None,
+            sigma: None,
+            title,
+        };
         let mut bytes = file.bytes();
         bytes.extend(derived.bytes());
         Ok(Self { header, bytes, written: artifacts.write(&args.out)? })
@@ -182,7 +236,10 @@ impl Derivatives {
             Dimension::Two => LedgerFile::<2>::open(&path, args.memory)?.map(|file| file.header),
             Dimension::Three => LedgerFile::<3>::open(&path, args.memory)?.map(|file| file.header),
         };
-        let written = Written::of_map_alone(&args.out)?;
-        Ok(Self { header: header.unwrap_or_default(), bytes: BTreeMap::new(), written })
+        Ok(Self {
+            header: header.unwrap_or_default(),
+            bytes: BTreeMap::new(),
+            written: Written::of_map_alone(),
+        })
     }
 }

@@ -10,6 +10,7 @@ use serde_json::json;
 use crate::arguments::weight_or_zero;
 use crate::dimension::{Given, ONLY_2D};
 use crate::error::bad_call;
+use crate::folder;
 use crate::mapping::{polylines, write_contour, write_mesh};
 use crate::output::Output;
 use crate::saved::no_tsdf;
@@ -39,6 +40,7 @@ pub(crate) struct Args {
 /// Extracts the surface.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let source = open(&args.map)?;
+    folder::warn(&args.map, args.output)?;
     source.check::<Args>(&args.given)?;
     match source {
         Source::Map2(file) => contour(args, &file),
@@ -66,6 +68,7 @@ fn contour(args: &Args, file: &MapFile<2>) -> anyhow::Result<()> {
     if !write_contour(&args.out, &lines)? {
         return Err(wrong_extension(args, ".geojson or .svg"));
     }
+    folder::forget(&args.out)?;
     let (segments, length) = (contour.segments.len(), contour.length() + 0.0); // the sum of nothing is -0.0
     let document = json!({
         "map": args.map.display().to_string(),
@@ -90,6 +93,7 @@ fn mesh(args: &Args, file: &MapFile<3>) -> anyhow::Result<()> {
     if !write_mesh(&args.out, &mesh)? {
         return Err(wrong_extension(args, ".ply, .glb or .obj"));
     }
+    folder::forget(&args.out)?;
     let (triangles, area) = (mesh.triangles.len(), mesh.area());
     let document = json!({
         "map": args.map.display().to_string(),

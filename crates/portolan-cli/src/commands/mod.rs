@@ -8,6 +8,7 @@ mod info;
 mod map;
 mod merge;
 mod mesh;
+mod pages;
 mod query;
 mod radiance;
 mod studio;
@@ -36,6 +37,10 @@ pub(crate) enum Command {
     Studio(studio::Args),
     /// Measure how good a map is: on scans that were not fused, or against a reference surface
     Eval(eval::Args),
+    /// What bash, zsh, fish, elvish or PowerShell need to complete commands and options
+    Completions(pages::CompletionsArgs),
+    /// Write manual pages
+    Man(pages::ManArgs),
 }
 
 impl Command {
@@ -52,14 +57,8 @@ impl Command {
             Self::Radiance(args) => radiance::run(args),
             Self::Studio(args) => studio::run(args),
             Self::Eval(args) => eval::run(args),
+            Self::Completions(args) => pages::completions(args),
+            Self::Man(args) => pages::man(args),
         }
     }
-}
-
-/// Refuses a file where results are to go into a folder.
-fn check_is_folder(out: &std::path::Path) -> anyhow::Result<()> {
-    if out.exists() && !out.is_dir() {
-        anyhow::bail!("{}: is a file, not a folder; name a folder for the results", out.display());
-    }
-    Ok(())
 }

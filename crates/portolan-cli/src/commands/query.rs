@@ -5,23 +5,26 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use portolan::Answer;
-use portolan::field::{Esdf, EsdfGrid, UnknownSpace};
+use portolan::cell::SignedDistance;
+use portolan::field::{Esdf, EsdfGrid, SurfaceNoise, UnknownSpace};
 use portolan::geom::Pose;
 use portolan::map;
 use portolan::store::Store;
+use portolan::uncertainty::SurfaceSigma;
 use portolan_io::{
-    AnswerRow, EsdfFile, HELD_BACK, Input, MapFile, MapServerMap, OctomapTree, QueryPoints, certified_reach,
-    write_answer, write_answer_header,
+    AnswerRow, EsdfFile, HELD_BACK, Input, Manifest, MapFile, MapServerMap, OctomapTree, QueryPoints,
+    SigmaColumns, certified_reach, write_answer, write_answer_header,
 };
 use serde_json::{Map, Value, json};
 
-use crate::arguments::{length, thin};
+use crate::arguments::{length, sigmas, thin};
 use crate::error::bad_call;
 use crate::esdf::{
     EsdfArg, FieldHow, PointsAlone, SURFACE_ALONE, check_thin, esdf_2d, esdf_3d, esdf_of_cells,
     esdf_of_points, is_of_points, keeps_thin,
 };
-use crate::mapping::Settings;
+use crate::folder;
+use crate::mapping::{SIGMA_FILE, Settings, read_sigma};
 use crate::output::Output;
 use crate::source::{Source, open};
 use crate::unknown::UnknownArg;
@@ -35,7 +38,7 @@ use crate::unknown::UnknownArg;
 /// `lower`, which counts unknown space as `unknown_as` has it (--unknown). The distance lies within its bounds; inside of
 /// obstacles all three are negative. `status` is known, unknown, saturated (obstacles are farther than `distance`, and
 /// `upper` is empty) or outside. gx,gy[,gz] is the gradient of the distance. Only a map.portolan with signed distances has
-/// bounds; of other files `distance` is interpolated.
+/// bounds; of other files `distance` is interpolated. Lengths are in meters.
 pub(crate) struct Args {
     /// A folder that `map` wrote, a map.portolan, an esdf.bin, a map_server yaml, or an OctoMap .bt or .ot
     map: PathBuf,
@@ -55,13 +58,29 @@ pub(crate) struct Args {
     /// What unknown space counts as: an obstacle (pessimistic) or free (optimistic) [default: pessimistic]
     #[arg(long, value_enum)]
     unknown: Option<UnknownArg>,
+    /// Give the standard deviation of each distance as well, by sigma.json beside the map: how sure the surface is, as `map
+    /// --ledger` found by the beginning and the end of the log. With K also the lower bound if every obstacle were nearer by K of
+    /// its standard deviations (lower_at_K_sigma)
+    #[arg(long, value_name = "K", value_parser = sigmas, num_args = 0..=1, require_equals = true)]
+    sigma: Option<Option<f64>>,
     #[command(flatten)]
     output: Output,
+}
+
+impl Args {
+    fn columns(&self) -> SigmaColumns {
+        match self.sigma {
+            None => SigmaColumns::No,
+            Some(None) => SigmaColumns::Sigma,
+            Some(Some(sigmas)) => SigmaColumns::LowerAt(sigmas),
+        }
+    }
 }
 
 /// Answers at all points.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let source = open(&args.map)?;
+    folder::warn(&args.map, args.output)?;
     if args.esdf.is_some() && !matches!(source, Source::Map2(_) | Source::Map3(_)) {
         return Err(bad_call(format!("--esdf is only for a map.portolan; this is {}", source.describe())));
     }
@@ -76,6 +95,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
             "--max-distance is only for a 3-D map.portolan; this is {}",
             source.describe()
         )));
+    }
+    if args.sigma.is_some() && !matches!(source, Source::Map2(_) | Source::Map3(_)) {
+        return Err(bad_call(format!("--sigma is only for a map.portolan; this is {}", source.describe())));
+    }
+    if matches!(args.sigma, Some(Some(_))) && args.esdf.unwrap_or_default() != EsdfArg::Accurate {
+        return Err(bad_call("--sigma=K is about lower bounds, which only accurate distances have"));
     }
     check_thin(args.thin.is_some(), args.esdf.unwrap_or_default())?;
     if surface_alone(&source, args) && !args.output.quiet {
@@ -92,8 +117,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
         QueryPoints::read(&args.points)?
     };
     match (field, points) {
-        (Fields::Two(field), QueryPoints::Two(points)) => write_answers(&field, &points, args.output),
-        (Fields::Three(field), QueryPoints::Three(points)) => write_answers(&field, &points, args.output),
+        (Fields::Two(field), QueryPoints::Two(points)) => write_answers(&field, &points, args),
+        (Fields::Three(field), QueryPoints::Three(points)) => write_answers(&field, &points, args),
         (Fields::Two(_), _) => {
             bail!("{}: the points are x,y,z; the map is 2-D: give x,y", shown(args))
         }
@@ -117,27 +142,23 @@ fn shown(args: &Args) -> String {
     args.points.display().to_string()
 }
 
-fn write_answers<const D: usize>(
-    field: &Field<D>,
-    points: &[[f64; D]],
-    output: Output,
-) -> anyhow::Result<()> {
-    let rows = points.iter().map(|&p| field.answer(p));
+fn write_answers<const D: usize>(field: &Field<D>, points: &[[f64; D]], args: &Args) -> anyhow::Result<()> {
+    let (rows, columns) = (points.iter().map(|&p| field.answer(p)), args.columns());
     let mut out = BufWriter::new(io::stdout().lock());
-    if output.json {
-        writeln!(out, "{:#}", json!({ "answers": rows.map(|r| row_json(&r)).collect::<Vec<_>>() }))?;
+    if args.output.json {
+        writeln!(out, "{:#}", json!({ "answers": rows.map(|r| row_json(&r, columns)).collect::<Vec<_>>() }))?;
     } else {
-        write_answer_header::<D>(&mut out)?;
+        write_answer_header::<D>(&mut out, columns)?;
         for row in rows {
-            write_answer(&mut out, &row)?;
+            write_answer(&mut out, &row, columns)?;
         }
     }
     out.flush()?;
     Ok(())
 }
 
-fn row_json<const D: usize>(row: &AnswerRow<D>) -> Value {
-    json!({
+fn row_json<const D: usize>(row: &AnswerRow<D>, columns: SigmaColumns) -> Value {
+    let mut value = json!({
         "point": row.point.to_vec(),
         "status": row.status.word(),
         "occupancy": row.occupancy,
@@ -146,7 +167,14 @@ fn row_json<const D: usize>(row: &AnswerRow<D>) -> Value {
         "upper": row.upper,
         "gradient": row.gradient.map(|g| g.to_vec()),
         "unknown_as": row.unknown.map(UnknownSpace::word),
-    })
+    });
+    if columns != SigmaColumns::No {
+        value["sigma"] = json!(row.sigma);
+    }
+    if let Some(name) = columns.lower_at() {
+        value[name] = json!(row.lower_at);
+    }
+    value
 }
 
 /// A map of either dimension.
@@ -162,9 +190,12 @@ struct Field<const D: usize> {
     occupancy: Occupancy<D>,
     /// For maps that are turned against the world.
     world_from_field: Pose<D>,
+    sigma: Option<Sigma<D>>,
 }
 
 type Occupancy<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<f64>>;
+/// The standard deviation of a distance with this gradient.
+type Sigma<const D: usize> = Box<dyn Fn([f64; D], f64, [f64; D]) -> Option<f64>>;
 /// Distance and gradient.
 type Distance<const D: usize> = Box<dyn Fn([f64; D]) -> Answer<(f64, [f64; D])>>;
 
@@ -176,6 +207,8 @@ struct Certified<const D: usize> {
     limit: f64,
     /// Whether it is of points without rays.
     of_points: bool,
+    /// What the surface is uncertain by, where that is asked for.
+    noise: Option<SurfaceNoise<D>>,
 }
 
 /// What unknown space counts as.
@@ -193,6 +226,7 @@ fn sparse<const D: usize>(field: Esdf<D>, limit: f64, args: &Args) -> (Distance<
         unknown: space(args),
         limit: limit.min(reach),
         of_points: false,
+        noise: None,
     });
     (Box::new(move |p| field.distance_and_gradient(p)), certified)
 }
@@ -232,10 +266,51 @@ fn how(args: &Args, saved: &Map<String, Value>) -> FieldHow {
     }
 }
 
+/// How sure the surface of a map is, where that was asked for.
+fn sigma_of(lacks_distances: bool, args: &Args) -> anyhow::Result<Option<SurfaceSigma>> {
+    if args.sigma.is_none() {
+        return Ok(None);
+    }
+    if lacks_distances {
+        bail!("{}: has no signed distances, whose standard deviation --sigma gives", args.map.display());
+    }
+    let folder =
+        if args.map.is_dir() { args.map.as_path() } else { args.map.parent().unwrap_or(Path::new("")) };
+    let file = folder.join(SIGMA_FILE);
+    // One of another run, or a damaged one, says nothing about this map.
+    folder::check_file(&file)?;
+    if file.is_file() && Manifest::read(folder).is_some_and(|set| !set.files.contains_key(SIGMA_FILE)) {
+        bail!("{}: was not written with the map beside it, and says nothing about it", file.display());
+    }
+    read_sigma(&file).map(Some)
+}
+
+/// The standard deviation of distances to the surface of a map.
+fn sigma_on<const D: usize, S: Store<SignedDistance, D> + Clone + 'static>(
+    map: &S,
+    curve: SurfaceSigma,
+) -> Sigma<D> {
+    let map = map.clone();
+    Box::new(move |p, distance, gradient| curve.of_distance(&map, p, distance, gradient))
+}
+
+/// What the obstacles of a field are uncertain by, where a number of standard deviations is asked for.
+fn noise_of<const D: usize>(
+    field: &Esdf<D>,
+    map: &(impl Store<SignedDistance, D> + Sync),
+    curve: Option<&SurfaceSigma>,
+    args: &Args,
+) -> Option<SurfaceNoise<D>> {
+    Some(field.surface_noise(map, curve?, args.sigma??))
+}
+
 fn of_map2(file: MapFile<2>, args: &Args) -> anyhow::Result<Field<2>> {
+    let curve = sigma_of(file.tsdf.is_none(), args)?;
     let of_tsdf = file.tsdf.as_ref().map(|t| {
         let field = esdf_2d(&file, t, &how(args, &file.header.settings))?.esdf;
+        let noise = noise_of(&field, t.store(), curve.as_ref(), args);
         let (distance, clearance) = sparse(field, f64::INFINITY, args);
+        let clearance = clearance.map(|c| Certified { noise, ..c });
         // A 2-D map is a box: what lies outside does not depend on where something was seen.
         let bounds = t.grid().aabb();
         let in_box: Distance<2> = Box::new(move |p| match distance(p) {
@@ -254,23 +329,28 @@ fn of_map2(file: MapFile<2>, args: &Args) -> anyhow::Result<Field<2>> {
         Some((distance, clearance)) => (Some(distance), clearance),
         None => (of_grid().map(dense), None),
     };
+    let sigma = file.tsdf.as_ref().zip(curve).map(|(map, curve)| sigma_on(map.store(), curve));
     let occupancy: Occupancy<2> = match (file.grid, file.tree, file.tsdf) {
         (Some(map), ..) => Box::new(move |p| map.probability(p)),
         (_, Some(map), _) => Box::new(move |p| map.probability(p)),
         (.., Some(map)) => Box::new(move |p| map.occupancy(p).map_or(Answer::Unknown, Answer::Known)),
         _ => Box::new(|_| Answer::Outside),
     };
-    Ok(Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY })
+    Ok(Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY, sigma })
 }
 
 fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
+    let curve = sigma_of(file.tsdf_bricks.is_none(), args)?;
     let mut how = how(args, &file.header.settings);
     let max_distance = how.max_distance;
     let field = file.tsdf_bricks.as_ref().map(|map| {
         if how.method == EsdfArg::Accurate {
             how.max_distance += HELD_BACK * map.store.lattice().resolution;
         }
-        anyhow::Ok(sparse(esdf_3d(&file, map, &how)?.esdf, max_distance, args))
+        let field = esdf_3d(&file, map, &how)?.esdf;
+        let noise = noise_of(&field, &map.store, curve.as_ref(), args);
+        let (distance, clearance) = sparse(field, max_distance, args);
+        anyhow::Ok((distance, clearance.map(|c| Certified { noise, ..c })))
     });
     let of_points = file.occupancy_bricks.as_ref().filter(|_| is_of_points(&file.header.settings));
     let field = match (field, of_points) {
@@ -283,6 +363,7 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
     };
     let (distance, clearance) =
         field.map_or((None, None), |(distance, clearance)| (Some(distance), clearance));
+    let sigma = file.tsdf_bricks.as_ref().zip(curve).map(|(map, curve)| sigma_on(&map.store, curve));
     let occupancy: Occupancy<3> = match (file.occupancy_bricks, file.tsdf_bricks) {
         (Some(map), _) => {
             let map = map::Occupancy::<3>::from_store(map.store, map.model)?;
@@ -297,12 +378,13 @@ fn of_map3(file: MapFile<3>, args: &Args) -> anyhow::Result<Field<3>> {
         }),
         (None, None) => Box::new(|_| Answer::Outside),
     };
-    Ok(Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY })
+    Ok(Field { distance, clearance, occupancy, world_from_field: Pose::IDENTITY, sigma })
 }
 
 fn of_esdf<const D: usize>(esdf: EsdfGrid<D>) -> Field<D> {
     let occupancy: Occupancy<D> = Box::new(|_| Answer::Unknown);
-    Field { distance: Some(dense(esdf)), clearance: None, occupancy, world_from_field: Pose::IDENTITY }
+    let (distance, world_from_field) = (Some(dense(esdf)), Pose::IDENTITY);
+    Field { distance, clearance: None, occupancy, world_from_field, sigma: None }
 }
 
 fn of_server(map: MapServerMap) -> Field<2> {
@@ -313,7 +395,7 @@ fn of_server(map: MapServerMap) -> Field<2> {
         Some(i) if map.occupancy[i].is_nan() => Answer::Unknown,
         Some(i) => Answer::Known(f64::from(map.occupancy[i])),
     });
-    Field { distance, clearance: None, occupancy, world_from_field }
+    Field { distance, clearance: None, occupancy, world_from_field, sigma: None }
 }
 
 /// Occupancy alone: a tree holds no distances.
@@ -325,7 +407,7 @@ fn of_octomap(file: OctomapTree) -> Field<3> {
             None => Answer::Outside,
             Some(cell) => tree.cell(cell).map_or(Answer::Unknown, |v| Answer::Known(logistic(v.0))),
         });
-    Field { distance: None, clearance: None, occupancy, world_from_field: Pose::IDENTITY }
+    Field { distance: None, clearance: None, occupancy, world_from_field: Pose::IDENTITY, sigma: None }
 }
 
 /// P(occupied) of log odds.
@@ -349,6 +431,12 @@ impl<const D: usize> Field<D> {
                 true => row.certify(&PointsAlone(&certified.field), p, unknown, limit),
                 false => row.certify(&certified.field, p, unknown, limit),
             }
+            if let Some(noise) = &certified.noise {
+                row.less_noise(&certified.field, noise, p);
+            }
+        }
+        if let (Some(sigma), Some((distance, gradient))) = (&self.sigma, distance.known()) {
+            row.sigma = sigma(p, distance, gradient);
         }
         row
     }

@@ -1,13 +1,15 @@
 //! `portolan radiance`: fits a radiance field on a line, shows what it became and why.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::io::Write;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use portolan_chapter::radiance::{Channels, Experiment, NAMED_SEEDS, Optimizer, PARKED, Settings};
 use portolan_chapter::radiance_report::{Comparison, Seed};
+use portolan_io::write_atomic;
 
 /// The differentiable renderer on a line, as in the textbook's last section.
 ///
@@ -91,7 +93,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         .with_context(|| format!("cannot make the folder {}: choose another --out", args.out.display()))?;
     let files = comparison.files()?;
     for (name, bytes) in &files {
-        write(&args.out.join(name), bytes)?;
+        write_atomic(args.out.join(name), |w| w.write_all(bytes))?;
     }
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
     if args.json {
@@ -112,16 +114,6 @@ fn chosen(args: &[ChannelsArg]) -> Vec<Channels> {
         }
     }
     channels
-}
-
-/// Writes a file under a temporary name and renames it, so that there is never half of one.
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".portolan.tmp");
-    let temporary = PathBuf::from(temporary);
-    let failed = || format!("cannot write {}: choose another --out", path.display());
-    fs::write(&temporary, bytes).with_context(failed)?;
-    fs::rename(&temporary, path).with_context(failed)
 }
 
 fn parse_seed(text: &str) -> Result<Seed, String> {

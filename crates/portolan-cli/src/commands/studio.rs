@@ -6,19 +6,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
-use portolan::map::{Tsdf3, TsdfConfig};
-use portolan_io::{FileKind, detect};
-use portolan_studio::engine::{Limits, Logs, Source2d, Source3d, check};
+use portolan::map::{Attenuation, Tsdf3, TsdfConfig};
+use portolan_io::{FileKind, Manifest, detect, read_ply_cloud};
+use portolan_studio::engine::{BesideMap, Limits, Logs, Source2d, Source3d, check};
 use portolan_studio::server::{Server, Settings};
 use serde_json::json;
 
 use crate::arguments::bytes;
-use crate::dimension::{Dimension, Given};
-use crate::error::bad_call;
+use crate::dimension::{Dimension, Given, ONLY_3D};
+use crate::error::{bad_call, stopped};
+use crate::folder;
 use crate::log::{self, LimitArgs, LogArgs, Selection, Wanted};
-use crate::mapping::with_outlier;
+use crate::mapping::{MOVERS_FILE, SIGMA_FILE, read_sigma, with_outlier};
 use crate::output::Output;
 use crate::saved::SavedMap;
+use crate::stop::{self, Signal};
+use crate::up::{Up, up};
 
 #[derive(clap::Args)]
 #[command(
@@ -40,9 +43,13 @@ pub(crate) struct Args {
     /// Port to listen on; 0 takes any free port
     #[arg(long, value_name = "PORT", default_value = "7700")]
     port: u16,
-    /// Address to listen on. With any but a loopback address, everyone who can reach this machine can use the studio
+    /// Address to listen on. With any but a loopback address, whoever can reach this machine and has the printed address, which
+    /// holds a token, can use the studio
     #[arg(long, value_name = "ADDRESS", value_parser = host, default_value = "127.0.0.1")]
     host: IpAddr,
+    /// Put a random token into the address, without which other users of this machine are not let in either
+    #[arg(long)]
+    token: bool,
     /// Largest number of tabs at the same time; further tabs wait
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), default_value = "8")]
     sessions: u16,
@@ -52,6 +59,10 @@ pub(crate) struct Args {
     /// Use only every N-th scan of the log
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     every: Option<u64>,
+    /// Which way is up: an axis like +z or -y, or a direction x,y,z [default: as the map says, or how the sensors of the log were
+    /// held]
+    #[arg(long, value_name = "AXIS|X,Y,Z", value_parser = up, allow_hyphen_values = true, requires = "log", help_heading = ONLY_3D)]
+    up: Option<Up>,
     #[command(flatten)]
     source: LogArgs,
     #[command(flatten)]
@@ -60,15 +71,24 @@ pub(crate) struct Args {
     output: Output,
 }
 
-/// Serves until Ctrl-C.
+/// Serves until Ctrl-C or SIGTERM.
 pub(crate) fn run(args: &Args) -> anyhow::Result<()> {
     let logs = Arc::new(args.logs()?);
     args.check_shown(&logs)?;
     let server = args.listen(logs.clone())?;
     args.warn_of_others()?;
     args.announce(&server, &logs)?;
-    server.wait()?;
-    Ok(())
+    match stop::wait() {
+        Some(signal) => {
+            server.close();
+            // Ctrl-C is how it is told to stop.
+            match signal {
+                Signal::Interrupt => Ok(()),
+                Signal::Terminate => Err(stopped(signal, "the studio is closed")),
+            }
+        }
+        None => Ok(server.wait()?),
+    }
 }
 
 /// `localhost`, or an address.
@@ -103,10 +123,12 @@ impl Args {
             return Err(bad_call("--every, --min-range and the like are options for logs; this is a map"));
         }
         let shown = path.display();
+        let mut beside = beside(if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) })?;
         let file = if path.is_dir() { path.join("map.portolan") } else { path.into() };
         let Some(file) = SavedMap::read(&file, self.memory)?.in_3d() else {
             bail!("{shown}: a 2-D map; give the log that it was made of, and the studio makes the map again");
         };
+        let up = self.up.or_else(|| Up::of_header(&file.header)).unwrap_or(Up::Z).0;
         let Some(held) = file.tsdf_bricks else {
             bail!("{shown}: the map has no tsdf, and so no surface; make it with --maps tsdf");
         };
@@ -117,8 +139,11 @@ impl Args {
             weights: held.weights,
             ..TsdfConfig::default()
         };
+        beside.attenuation =
+            file.attenuation.map(|held| Attenuation::from_store(held.store, held.rule)).transpose()?;
         let tsdf = Tsdf3::from_stores(held.store, file.color_bricks.map(|c| c.store), config)?;
-        let source_3d = Source3d::Map { name: name(path), tsdf: Box::new(tsdf) };
+        let source_3d =
+            Source3d::Map { name: name(path), tsdf: Box::new(tsdf), up, beside: Box::new(beside) };
         Ok(Logs { source_3d, ..Logs::default() })
     }
 
@@ -142,9 +167,10 @@ impl Args {
         let filter = self.limits.range.filter(Vec::new())?;
         let wanted = Wanted { color: true, deskew: true, points_only: false };
         let log = log::read_3d(path, &self.source, wanted)?;
+        let up = self.up.map_or_else(|| log.up(), |up| up.0);
         let every = usize::try_from(self.every.unwrap_or(1)).unwrap_or(usize::MAX);
         Ok(Logs {
-            source_3d: Source3d::Recorded { log: Box::new(log.every(every)), filter },
+            source_3d: Source3d::Recorded { log: Box::new(log.every(every)), filter, up },
             ..Logs::default()
         })
     }
@@ -179,6 +205,7 @@ impl Args {
             port: self.port,
             sessions: self.sessions.into(),
             limits: self.limits_of_a_tab(),
+            token: self.token,
             ..Settings::default()
         };
         let (host, port) = (self.host, self.port);
@@ -196,7 +223,8 @@ impl Args {
         }
         writeln!(
             io::stderr(),
-            "portolan: warning: everyone who can reach {} can use this studio and see its log: there is no password",
+            "portolan: warning: everyone who can reach {} and has the address with its token can use this studio and see \
+             its log; what is sent is not encrypted",
             self.host
         )
     }
@@ -220,6 +248,29 @@ impl Args {
         );
         self.output.print(&json!(null), text)
     }
+}
+
+/// What a run left in a folder beside its map. Files of another run, or damaged ones, say nothing about it: the folder's manifest
+/// tells.
+fn beside(folder: &Path) -> anyhow::Result<BesideMap> {
+    let Some(set) = Manifest::read(folder) else { return Ok(BesideMap::default()) };
+    let whole = |name: &str| {
+        let path = folder.join(name);
+        match set.files.contains_key(name) && path.is_file() {
+            true => folder::check_file(&path).map(|()| Some(path)),
+            false => Ok(None),
+        }
+    };
+    let sigma = whole(SIGMA_FILE)?.map(|path| read_sigma(&path)).transpose()?;
+    let movers = match whole(MOVERS_FILE)? {
+        Some(path) => {
+            let cloud = read_ply_cloud(path)?;
+            let wide = |p: &[f32; 3]| std::array::from_fn(|k| cloud.offset[k] + f64::from(p[k]));
+            cloud.points.iter().map(wide).collect()
+        }
+        None => Vec::new(),
+    };
+    Ok(BesideMap { sigma, movers, ..BesideMap::default() })
 }
 
 /// What the view of the renderer shows, whatever the log.

@@ -18,11 +18,11 @@ pub fn picture_2d(mapper: Mapper<2>, rest: MapFile<2>) -> anyhow::Result<Option<
     let resolution = mapper.settings().resolution;
     let file = in_file_2d(mapper, rest, Path::new("picture"))?;
     let derived = Derived::of_2d(&file, &Settings::of_saved(&file.header.settings));
-    Ok(picture::of_map(&file, &derived, &title(&file.header.logs, resolution, file.header.scans)))
+    Ok(picture::of_map(&file, &derived, &[], &title(&file.header.logs, resolution, file.header.scans)))
 }
 
 /// A mesh from sensible views as PNG bytes; `None`: it is empty. `poses` are those of sensors that look along z with y down
 /// where `camera`, else along x with z up.
 pub fn picture_of_mesh(mesh: &Mesh, poses: &[Pose<3>], camera: bool, title: &str) -> Option<Vec<u8>> {
-    preview::of_mesh(mesh, poses, camera, title)
+    preview::of_mesh(mesh, poses, camera, None, None, title)
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use portolan::geom::Pose;
 use portolan::scan::{Body, FrameFilter, RangeLimits};
 use portolan_io::poses3::PoseConvention;
@@ -149,8 +150,11 @@ impl LogArgs {
                 _ => Dimension::Three,
             },
             Some(_) => Dimension::Two,
-            None if matches!(detect(path)?, FileKind::ScanLog(_)) => Dimension::Three,
-            None => Dimension::Two,
+            None => match detect(path)? {
+                FileKind::ScanLog(_) => Dimension::Three,
+                FileKind::Unknown(what) if path.is_dir() => bail!("{}: {what}", path.display()),
+                _ => Dimension::Two,
+            },
         })
     }
 

@@ -8,15 +8,36 @@ use std::time::Instant;
 use portolan::cell::LogOddsRule;
 use portolan::geom::Aabb;
 use portolan_io::{
-    IoError, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server, write_octomap_bt,
+    IoError, MapFile, SvgStyle, write_atomic, write_esdf, write_geojson, write_map_server, write_octomap_bt,
     write_octomap_ot, write_svg,
 };
 
 use super::files::{dense_esdf, polylines, write_mesh};
+use super::movers::{FoundMovers, MOVERS_FILE};
+use super::preview::Over;
+use super::sigma::{Calibration, SIGMA_FILE};
 use super::{Derived, DistanceField, cells_for_map_server, picture, preview};
 use crate::esdf::status_plane;
 use crate::saved::SavedMap;
-use crate::stale::remove_stale;
+use crate::up::Up;
+
+/// Names of what may be written beside a map.
+pub(crate) const ARTIFACTS: [&str; 14] = [
+    "contour.geojson",
+    "contour.svg",
+    "esdf.bin",
+    "map.pgm",
+    "map.png",
+    "map.yaml",
+    "mesh.ply",
+    "movers.ply",
+    "obstacles.csv",
+    "octree.bt",
+    "octree.ot",
+    "preview.png",
+    "sigma.json",
+    "sigma.png",
+];
 
 /// Everything that is written.
 pub(crate) struct Artifacts<'a> {
@@ -28,6 +49,10 @@ pub(crate) struct Artifacts<'a> {
     pub(crate) edge: f64,
     /// Whether the sensor is a camera, which looks along z.
     pub(crate) camera: bool,
+    /// What moved and is not in the map.
+    pub(crate) movers: Option<&'a FoundMovers>,
+    /// How sure the surface is.
+    pub(crate) sigma: Option<&'a Calibration>,
     /// Title of the picture.
     pub(crate) title: String,
 }
@@ -42,17 +67,14 @@ pub(crate) struct Written {
 }
 
 impl Written {
-    /// Of a folder with the map alone: what an earlier run left beside it is removed.
-    pub(crate) fn of_map_alone(folder: &Path) -> anyhow::Result<Self> {
-        let written = Self { files: vec!["map.portolan"], ..Self::default() };
-        remove_stale(folder, &written.files)?;
-        Ok(written)
+    /// Of a folder with the map alone.
+    pub(crate) fn of_map_alone() -> Self {
+        Self { files: vec!["map.portolan"], ..Self::default() }
     }
 }
 
 impl Artifacts<'_> {
-    /// Writes all files but `map.portolan`, which was saved before anything was derived from it, and `summary.json`. What
-    /// an earlier run left in the folder and this one does not make is removed: it would belong to another map.
+    /// Writes all files but `map.portolan`, which was saved before anything was derived from it, and `summary.json`.
     pub(crate) fn write(&self, folder: &Path) -> anyhow::Result<Written> {
         let mut written = Written { notes: self.derived.notes.clone(), ..Written::default() };
         let start = Instant::now();
@@ -64,8 +86,44 @@ impl Artifacts<'_> {
         written.files.push("map.portolan");
         written.seconds.insert("write", start.elapsed().as_secs_f64());
         self.write_picture(folder, &mut written)?;
-        remove_stale(folder, &written.files)?;
+        self.write_movers(folder, &mut written)?;
+        self.write_sigma(folder, &mut written)?;
         Ok(written)
+    }
+
+    /// `movers.ply`: what moved.
+    pub(crate) fn write_movers(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        let Some(movers) = self.movers else { return Ok(()) };
+        movers.write(&folder.join(MOVERS_FILE))?;
+        written.files.push(MOVERS_FILE);
+        Ok(())
+    }
+
+    /// `sigma.json` and `sigma.png`: how sure the surface is.
+    fn write_sigma(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
+        let Some(calibration) = self.sigma else { return Ok(()) };
+        calibration.write(&folder.join(SIGMA_FILE))?;
+        written.files.push(SIGMA_FILE);
+        let sigma = calibration.sigma();
+        let png = match self.file {
+            SavedMap::Two(file) => picture::of_sigma(file, self.derived, sigma, &self.title),
+            SavedMap::Three(file) => {
+                let map = file.tsdf_bricks.as_ref().map(|map| Over::Sigma(sigma, &map.store));
+                self.preview(file, map)
+            }
+        };
+        if let Some(png) = png {
+            write_atomic(folder.join("sigma.png"), |w| w.write_all(&png))?;
+            written.files.push("sigma.png");
+        }
+        Ok(())
+    }
+
+    /// Views of the mesh.
+    fn preview(&self, file: &MapFile<3>, over: Option<Over<'_>>) -> Option<Vec<u8>> {
+        let up = Up::of_header(&file.header).map(|up| up.0);
+        let mesh = self.derived.mesh.as_ref()?;
+        preview::of_mesh(mesh, &file.poses, self.camera, up, over, &self.title)
     }
 
     fn write_surface(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
@@ -149,12 +207,13 @@ impl Artifacts<'_> {
     /// `map.png` of a 2-D map, `preview.png` of a mesh.
     fn write_picture(&self, folder: &Path, written: &mut Written) -> anyhow::Result<()> {
         let start = Instant::now();
+        let movers = self.movers.map_or(&[][..], FoundMovers::points);
         let (stage, name, png) = match self.file {
-            SavedMap::Two(file) => ("picture", "map.png", picture::of_map(file, self.derived, &self.title)),
+            SavedMap::Two(file) => {
+                ("picture", "map.png", picture::of_map(file, self.derived, movers, &self.title))
+            }
             SavedMap::Three(file) => {
-                let mesh = self.derived.mesh.as_ref();
-                let png = mesh.and_then(|mesh| preview::of_mesh(mesh, &file.poses, self.camera, &self.title));
-                ("preview", "preview.png", png)
+                ("preview", "preview.png", self.preview(file, Some(Over::Movers(movers, self.edge))))
             }
         };
         if let Some(png) = png {

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-use crate::saved::SavedMap;
+use crate::saved::{SavedMap, in_words_of_copies};
 
 /// Ledgers that did not fit into memory together, in files beside the map, which go when the run ends.
 pub(crate) struct Aside {
@@ -52,6 +52,11 @@ impl Aside {
         self.failed.take().map_or(Ok(self.files.is_empty()), Err)
     }
 
+    /// Whether everything fitted into memory.
+    pub(super) fn is_unused(&self) -> bool {
+        self.folder.is_none()
+    }
+
     /// A name for the next file.
     fn next(&mut self) -> anyhow::Result<PathBuf> {
         if self.folder.is_none() {
@@ -66,7 +71,13 @@ impl Aside {
     }
 
     /// The sum of all, as a file with this header, which gets the names of logs and the number of scans.
-    pub(crate) fn add_up(&self, file: &mut SavedMap, path: &Path, memory: u64) -> anyhow::Result<()> {
+    /// What is to be said of its scans is returned.
+    pub(crate) fn add_up(
+        &self,
+        file: &mut SavedMap,
+        path: &Path,
+        memory: u64,
+    ) -> anyhow::Result<Option<String>> {
         match file {
             SavedMap::Two(file) => self.add_up_in::<2>(&mut file.header, path, memory),
             SavedMap::Three(file) => self.add_up_in::<3>(&mut file.header, path, memory),
@@ -78,7 +89,7 @@ impl Aside {
         header: &mut MapHeader,
         path: &Path,
         memory: u64,
-    ) -> anyhow::Result<()> {
+    ) -> anyhow::Result<Option<String>> {
         let mut parts = Vec::new();
         for file in &self.files {
             let opened = LedgerFile::<D>::open(file, memory)?;
@@ -87,6 +98,7 @@ impl Aside {
         let scans = scans_of_sum(&parts)?;
         header.logs = scans.logs().map(str::to_owned).collect();
         header.scans = scans.len() as u64;
-        Ok(add_ledger_files(&parts, header, path)?)
+        add_ledger_files(&parts, header, path)?;
+        Ok(in_words_of_copies(scans.copies()))
     }
 }

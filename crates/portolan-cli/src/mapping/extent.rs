@@ -57,6 +57,29 @@ pub(crate) fn brick_extent<C: Cell, const D: usize>(store: &Bricks<C, D>) -> Aab
     extent
 }
 
+/// A hint where some bricks lie far from all others, as single returns from beyond windows do; `None`: there are none.
+pub(crate) fn strays<C: Cell>(store: &Bricks<C, 3>) -> Option<String> {
+    let last = store.len().checked_sub(1)?;
+    let edge = store.lattice().resolution * BLOCK_EDGE as f64;
+    let side = |k: usize| {
+        let mut all: Vec<i32> = store.bricks_by_age().map(|(key, _)| key.0[k]).collect();
+        let whole = f64::from(*all.iter().max()? - *all.iter().min()? + 1);
+        let stray = last / 100;
+        let low = *all.select_nth_unstable(stray).1;
+        let high = *all.select_nth_unstable(last - stray).1;
+        Some([whole * edge, f64::from(high - low + 1) * edge])
+    };
+    let sides = [side(0)?, side(1)?, side(2)?];
+    let [whole, usual] = sides.into_iter().max_by(|a, b| (a[0] - a[1]).total_cmp(&(b[0] - b[1])))?;
+    let diagonal = sides.iter().map(|s| s[1] * s[1]).sum::<f64>().sqrt().ceil();
+    (whole > 2.0 * usual && whole > usual + 20.0).then(|| {
+        format!(
+            "the map is {whole:.0} m wide, and all but a hundredth of it on each side lies within {usual:.0} m: single returns from \
+             far away decide its size; --max-range {diagonal} leaves them out"
+        )
+    })
+}
+
 /// Box of everything that the scans saw, free ends of beams and the sensor included.
 pub(crate) fn seen(scans: &[(Pose<2>, Scan<2>)]) -> Aabb<2> {
     let mut bounds = Aabb::EMPTY;
@@ -171,6 +194,20 @@ fn two_digits_up(v: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stray_bricks_are_told_with_a_remedy() {
+        let mut store =
+            Bricks::<portolan::cell::SignedDistance, 3>::new(portolan::geom::Lattice::new([0.0; 3], 0.1));
+        let brick = || portolan::cell::DistanceBrick::from_parts(&[0.0; 512], &[1.0; 512]).unwrap();
+        for i in 0..1000 {
+            store.insert(portolan::geom::BlockKey([i % 10, i / 10 % 10, i / 100]), brick()).unwrap();
+        }
+        assert_eq!(strays(&store), None);
+        store.insert(portolan::geom::BlockKey([550, 3, 3]), brick()).unwrap();
+        let hint = strays(&store).unwrap();
+        assert!(hint.contains("441 m wide") && hint.contains("--max-range 14"), "{hint}");
+    }
 
     #[test]
     fn joining_grids_keeps_the_lattice() {

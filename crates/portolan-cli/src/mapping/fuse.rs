@@ -13,8 +13,10 @@ use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
 use portolan_io::IoError;
 use portolan_io::scan_log::ScanLog;
 
-use super::OccupancyKinds;
+use super::movers::{FoundMovers, Judge, Looking};
+use super::{Calibration, OccupancyKinds};
 use crate::progress::Progress;
+use crate::stop;
 
 /// Frames that are read ahead.
 const AHEAD: usize = 3;
@@ -34,10 +36,18 @@ pub(crate) struct FusionReport {
     pub(crate) without_pixel: u64,
     /// Scans that could not be read or fused, and why the first could not.
     pub(crate) unreadable: (u64, Option<String>),
+    /// Of these, scans that could not be read.
+    pub(crate) damaged: u64,
     /// Why fusing ended early: the maps hold what was fused up to there.
     pub(crate) full: Option<String>,
+    /// Why nothing of this may be saved.
+    pub(crate) contradiction: Option<String>,
     /// Scans that were moved, and scans of the log in the map, where scans were to be moved.
     pub(crate) moved: Option<[u64; 2]>,
+    /// What moved and is not in the maps, where that was asked for.
+    pub(crate) movers: Option<FoundMovers>,
+    /// How sure the surface is, or why that is not known; `None` where the maps do not tell.
+    pub(crate) sigma: Option<Result<Calibration, String>>,
 }
 
 impl FusionReport {
@@ -72,10 +82,14 @@ impl FusionReport {
         }
     }
 
-    /// The maps did not take a scan; why. `false` where a map is full and fusing ends.
+    /// The maps did not take a scan; why. `false` where fusing ends: a map is full, or another log has the name of this one.
     fn refuse(&mut self, error: &LedgerError, log: &str, scan: usize) -> bool {
         if let LedgerError::Map(MapError::Full(_)) = error {
             self.full = Some(error.to_string());
+            return false;
+        }
+        if let LedgerError::OtherReadings { .. } = error {
+            self.contradiction = Some(error.to_string());
             return false;
         }
         self.leave_out(format!("{log}: scan {scan}: {error}"));
@@ -112,6 +126,9 @@ pub(crate) fn fuse_2d(
     let mut report = FusionReport::default();
     let start = Instant::now();
     for (k, batch) in scans.chunks(BATCH).enumerate() {
+        if stop::asked().is_some() {
+            break;
+        }
         let fused = mapper.integrate_all(batch, &|| start.elapsed().as_secs_f64());
         for (i, (fused, (pose, _))) in fused.into_iter().zip(batch).enumerate() {
             let before = report.stats.scans;
@@ -133,6 +150,8 @@ pub(crate) struct Frames<'a> {
     pub(crate) filter: FrameFilter,
     /// Whether points are inserted without their rays.
     pub(crate) points_only: bool,
+    /// Who knows what moved.
+    pub(crate) judge: Option<Box<Judge<3>>>,
 }
 
 /// A frame: its number, its pose, and what is left of its readings and what the filter counted, where they could be read.
@@ -145,8 +164,29 @@ impl Frames<'_> {
 
     /// What is left of the readings of a frame, and what the filter counted.
     pub(super) fn frame(&self, i: usize) -> Result<(Frame, BeamCounts), IoError> {
-        let (frame, counts) = self.log.filtered_frame(i, &self.filter)?;
+        let (frame, mut counts) = self.log.filtered_frame(i, &self.filter)?;
+        let frame = match &self.judge {
+            Some(judge) => judge.without_movers(i, self.log.pose(i), frame, &mut counts),
+            None => frame,
+        };
         Ok((if self.points_only { frame.without_rays() } else { frame }, counts))
+    }
+
+    /// Looks for what moved in these frames, so that it is left out of all from now on. Frames that cannot be read are told when
+    /// they are fused.
+    /// Returns the bytes that this takes from now on.
+    pub(super) fn look(&mut self, how: &Looking) -> anyhow::Result<usize> {
+        let first = how.indices.first().map_or([0.0; 3], |&i| self.log.pose(i).translation);
+        let mut judge = Judge::new(how, first)?;
+        for &i in how.indices {
+            if let Ok((frame, _)) = self.log.filtered_frame(i, &self.filter) {
+                judge.look(self.log.pose(i), &frame)?;
+            }
+            how.progress.add(1);
+        }
+        let bytes = judge.memory_bytes();
+        self.judge = Some(Box::new(judge));
+        Ok(bytes)
     }
 }
 
@@ -192,15 +232,17 @@ pub(crate) fn fuse_3d(
 ) -> FusionReport {
     let name = frames.log.path().display().to_string();
     let mut read = frames.indices.iter().map(|i| frames.read(i));
-    if threads == 1 {
-        return fuse(maps, read, &name, poses, progress);
-    }
-    std::thread::scope(|scope| {
-        let (send, receive) = sync_channel::<Read>(AHEAD);
-        // Sending fails where fusing has ended early.
-        scope.spawn(move || read.all(|frame| send.send(frame).is_ok()));
-        fuse(maps, receive.into_iter(), &name, poses, progress)
-    })
+    let report = if threads == 1 {
+        fuse(maps, read, &name, poses, progress)
+    } else {
+        std::thread::scope(|scope| {
+            let (send, receive) = sync_channel::<Read>(AHEAD);
+            // Sending fails where fusing has ended early.
+            scope.spawn(move || read.all(|frame| send.send(frame).is_ok()));
+            fuse(maps, receive.into_iter(), &name, poses, progress)
+        })
+    };
+    FusionReport { movers: frames.judge.as_ref().map(|judge| judge.found()), ..report }
 }
 
 /// The loop. Poses of frames that were fused are added to `poses`.
@@ -216,6 +258,9 @@ fn fuse(
     let clock = || start.elapsed().as_secs_f64();
     let mut waiting = clock();
     for (i, pose, read) in frames {
+        if stop::asked().is_some() {
+            break;
+        }
         *report.seconds.entry("frames").or_default() += clock() - waiting;
         match read.map(|(frame, counts)| (maps.take(i, &pose, &frame, &clock), frame, counts)) {
             Ok((Ok(fused), frame, counts)) => {
@@ -230,7 +275,10 @@ fn fuse(
             }
             Ok((Err(error), ..)) if report.refuse(&error, log, i) => {}
             Ok((Err(_), ..)) => break,
-            Err(error) => report.leave_out(error.to_string()),
+            Err(error) => {
+                report.damaged += 1;
+                report.leave_out(error.to_string());
+            }
         }
         progress.add(1);
         progress.holding(|| maps.memory_bytes());

@@ -1,13 +1,15 @@
 //! Maps of sums: scans into them, and the maps that other commands read out of them.
 
 use anyhow::{anyhow, bail};
-use portolan::Ledger;
+use portolan::cell::DistanceSum;
 use portolan::geom::vector::{distance, scale};
 use portolan::geom::{Grid, Pose};
 use portolan::ledger::LedgerError;
 use portolan::map::MapError;
 use portolan::mapper::{Fused, Mapper};
-use portolan::scan::{RangeLimits, ScanStats};
+use portolan::scan::{BeamCounts, RangeLimits, ScanStats};
+use portolan::store::Bricks;
+use portolan::{Ledger, MapperSettings};
 use portolan_io::scan_log::ScanLog;
 use portolan_io::{LaserLog, MapFile};
 use std::path::Path;
@@ -17,15 +19,18 @@ use super::aside::Aside;
 use super::extent::Extent;
 use super::fuse::{Frames, FusionReport};
 use super::mapper::{Limits, OccupancyKinds, store_2d, store_3d};
+use super::movers::{Judge, Looking, look_2d};
+use super::sigma::Calibration;
 use super::{MapKind, Settings, recipe};
 use crate::arguments::Shift;
 use crate::log::Log;
 use crate::progress::Progress;
 use crate::saved::SavedMap;
+use crate::stop;
 
 /// Scans that go into a ledger.
 pub(crate) enum LedgerRun<'a> {
-    Two { log: &'a LaserLog, limits: RangeLimits, part: Part<'a, 2> },
+    Two { log: &'a LaserLog, limits: RangeLimits, judge: Option<Box<Judge<2>>>, part: Part<'a, 2> },
     Three { frames: Frames<'a>, part: Part<'a, 3> },
 }
 
@@ -38,6 +43,12 @@ pub(crate) struct Part<'a, const D: usize> {
     file: Box<MapFile<D>>,
     /// What did not fit into memory.
     aside: Aside,
+    /// Distances of the first two fifths of the scans, and of the first three, once they are fused.
+    parts: Vec<Bricks<DistanceSum, D>>,
+    /// So many scans were added.
+    added: usize,
+    /// After so many scans a part is complete; `None`: parts are of no use.
+    ends: Option<[usize; 2]>,
 }
 
 impl<'a> LedgerRun<'a> {
@@ -59,7 +70,7 @@ impl<'a> LedgerRun<'a> {
                 let bounds = settings.bounds.map(|bounds| bounds.in_2d("the log")).transpose()?;
                 let how = recipe::mapper_settings(settings, None, bounds, limits.memory);
                 let part = Part::new(log.name(), indices, file, how, first, out)?;
-                Self::Two { log: laser, limits: settings.limits().limits(laser), part }
+                Self::Two { log: laser, limits: settings.limits().limits(laser), judge: None, part }
             }
             Log::Three(scans) => {
                 let file = before.and_then(SavedMap::in_3d).unwrap_or_default();
@@ -86,12 +97,18 @@ impl<'a> LedgerRun<'a> {
     /// Adds all scans.
     pub(crate) fn fuse(&mut self, threads: usize, progress: &Progress) -> FusionReport {
         match self {
-            Self::Two { log, limits, part } => {
+            Self::Two { log, limits, judge, part } => {
                 let mut report = FusionReport::default();
                 let start = Instant::now();
                 let clock = || start.elapsed().as_secs_f64();
                 for &i in part.indices {
-                    let (pose, scan) = (&log.raw(i).world_from_laser, log.scan(i, limits));
+                    if stop::asked().is_some() {
+                        break;
+                    }
+                    let (pose, mut scan) = (&log.raw(i).world_from_laser, log.scan(i, limits));
+                    if let Some(judge) = judge {
+                        scan = judge.without_movers(i, pose, scan, &mut BeamCounts::default());
+                    }
                     let added = part.add(i, pose, &scan, &clock);
                     if !report.note::<2>(added, &part.name, i) {
                         break;
@@ -99,12 +116,31 @@ impl<'a> LedgerRun<'a> {
                     progress.add(1);
                     progress.holding(|| part.ledger.memory_bytes());
                 }
+                report.movers = judge.as_ref().map(|judge| judge.found());
+                report.sigma = Some(part.calibration());
                 report
             }
             Self::Three { frames, part } => {
-                super::fuse::fuse_3d(part, frames, &mut Vec::new(), threads, progress)
+                let report = super::fuse::fuse_3d(part, frames, &mut Vec::new(), threads, progress);
+                FusionReport { sigma: Some(part.calibration()), ..report }
             }
         }
+    }
+
+    /// Looks for what moved, so that it is left out of all scans from now on. The sums have the memory that is left.
+    pub(crate) fn look(&mut self, how: &Looking) -> anyhow::Result<()> {
+        match self {
+            Self::Two { log, limits, judge, part } => {
+                let scans = how.indices.iter().map(|&i| (log.raw(i).world_from_laser, log.scan(i, limits)));
+                let judge = judge.insert(Box::new(look_2d(scans, how)?));
+                part.ledger.set_memory(how.memory.saturating_sub(judge.memory_bytes()));
+            }
+            Self::Three { frames, part } => {
+                let bytes = frames.look(how)?;
+                part.ledger.set_memory(how.memory.saturating_sub(bytes));
+            }
+        }
+        Ok(())
     }
 
     /// Moves the scans that are elsewhere in `moved`, the same log with other poses, by more than `tolerance` (meters).
@@ -117,7 +153,7 @@ impl<'a> LedgerRun<'a> {
         progress: &Progress,
     ) -> anyhow::Result<Reposed> {
         match (self, moved) {
-            (Self::Two { log, limits, part }, Log::Two(moved)) => {
+            (Self::Two { log, limits, part, .. }, Log::Two(moved)) => {
                 check_same_length(log.len(), moved.len(), &part.name)?;
                 let read =
                     |i: usize| (log.scan(i, limits), moved.raw(i).world_from_laser, moved.scan(i, limits));
@@ -189,21 +225,58 @@ impl<'a, const D: usize> Part<'a, D> {
         name: String,
         indices: &'a [usize],
         mut file: Box<MapFile<D>>,
-        how: portolan::MapperSettings<D>,
+        how: MapperSettings<D>,
         first: [f64; D],
         out: &Path,
     ) -> anyhow::Result<Self> {
+        // Only in a map of this log alone is the end all that was not there before.
+        let ends = file.ledger.is_none().then(|| [2, 3].map(|fifths| fifths * indices.len() / 5));
         let ledger = match file.ledger.take() {
             Some(mut ledger) => {
+                check_as_asked(&ledger, &how)?;
                 ledger.set_memory(how.memory);
                 ledger
             }
             None => {
                 let origin = Some(how.origin_near(first));
-                Ledger::new(portolan::MapperSettings { origin, ..how })?
+                Ledger::new(MapperSettings { origin, ..how })?
             }
         };
-        Ok(Self { name, indices, ledger: Box::new(ledger), file, aside: Aside::new(out) })
+        let (ledger, aside) = (Box::new(ledger), Aside::new(out));
+        Ok(Self { name, indices, ledger, file, aside, parts: Vec::new(), added: 0, ends })
+    }
+
+    /// Counts a scan, and keeps the distances where a part of the log ends: they share their bricks with the whole until that
+    /// changes them. Only where there may be memory for all three.
+    fn count_scan(&mut self) {
+        self.added += 1;
+        if self.ends.is_some_and(|ends| ends.contains(&self.added))
+            && self.ledger.memory_bytes() < self.ledger.settings().memory / 3
+        {
+            self.parts.extend(self.ledger.distance_sums().cloned());
+        }
+    }
+
+    /// How sure the surface is.
+    ///
+    /// # Errors
+    /// Why that is not known.
+    fn calibration(&self) -> Result<Calibration, String> {
+        let why = match (self.ledger.distance_sums(), &self.parts[..]) {
+            (Some(whole), [first, until]) if self.aside.is_unused() => {
+                return Calibration::of([first, until, whole], self.ledger.settings().truncation());
+            }
+            (None, _) => "there are no signed distances",
+            _ => match self.ends {
+                None => "it takes the beginning and the end of one log, mapped at once",
+                Some([first, until]) if first == 0 || first == until => {
+                    "so few scans are the log of one visit"
+                }
+                Some([_, until]) if self.added < until => "not all of the log was fused",
+                Some(_) => "--memory leaves no room for the parts of the log",
+            },
+        };
+        Err(why.to_owned())
     }
 
     /// Adds a scan; where there is no room for it, what is there is put aside first.
@@ -218,6 +291,9 @@ impl<'a, const D: usize> Part<'a, D> {
             return Err(LedgerError::Twice { log: self.name.clone(), index: index as u64 });
         }
         let added = self.ledger.add_timed(&self.name, index as u64, pose, scan, clock);
+        if added.is_ok() {
+            self.count_scan();
+        }
         match added {
             Err(LedgerError::Map(MapError::Full(_))) if !self.ledger.scans().is_empty() => {
                 if let Err(error) = self.put_aside() {
@@ -281,6 +357,30 @@ impl<'a, const D: usize> Part<'a, D> {
             bail!("{}: no scan of this log is in the map; logs are known by their file names", self.name);
         }
         Ok(done)
+    }
+}
+
+/// Refuses to go on with a ledger of another box or other maps than are asked for: it cannot get them any more.
+fn check_as_asked<const D: usize>(ledger: &Ledger<D>, how: &MapperSettings<D>) -> anyhow::Result<()> {
+    let held = ledger.settings();
+    if how.bounds.is_some_and(|bounds| held.bounds != Some(bounds)) {
+        bail!(
+            "--bounds: the map has others, or none, and keeps them; leave it out, or write to another folder"
+        );
+    }
+    if how.origin.is_some_and(|origin| held.origin != Some(origin)) {
+        bail!("--shift: the cells of the map begin elsewhere; leave it out, or write to another folder");
+    }
+    let missing = [
+        (how.occupancy.is_some() && held.occupancy.is_none(), "occupancy (grid, tree)"),
+        (how.distances && !held.distances, "tsdf"),
+        (how.attenuation.is_some() && held.attenuation.is_none(), "attenuation"),
+    ];
+    match missing.iter().find(|(missing, _)| *missing) {
+        Some((_, map)) => {
+            bail!("--maps: the map holds no {map}; leave it out of --maps, or write to another folder")
+        }
+        None => Ok(()),
     }
 }
 
@@ -362,6 +462,6 @@ fn describe<const D: usize>(ledger: &Ledger<D>, file: &mut MapFile<D>) {
 impl<'a> Frames<'a> {
     pub(crate) fn new(log: &'a ScanLog, indices: &'a [usize], settings: &Settings) -> anyhow::Result<Self> {
         let filter = settings.shape.range.filter(settings.shape.self_filter.clone())?;
-        Ok(Self { log, indices, filter, points_only: settings.shape.points_only })
+        Ok(Self { log, indices, filter, points_only: settings.shape.points_only, judge: None })
     }
 }

@@ -5,7 +5,7 @@ use portolan::Mapper;
 use portolan::geom::{Aabb, Grid, Pose};
 use portolan::map::{Attenuation, Occupancy, OccupancyGrid, OccupancyTree, Tsdf, Tsdf2};
 use portolan::mapper::MapperMaps;
-use portolan::scan::Scan;
+use portolan::scan::{BeamCounts, Scan};
 use portolan::store::{Bricks, Dense, Store, Tree};
 use portolan_io::scan_log::ScanLog;
 use portolan_io::{AttenuationBricks, ColorBricks, LaserLog, MapFile, OccupancyBricks, TsdfBricks};
@@ -14,6 +14,7 @@ use serde_json::Map;
 use super::extent::{Extent, check_memory, grid_over, seen, with_outlier};
 use super::fuse::{Frames, FusionReport, fuse_2d, fuse_3d};
 use super::map_server::grid_of;
+use super::movers::{FoundMovers, Looking, look_2d};
 use super::{Aside, LedgerRun, MapKind, Settings, recipe};
 use crate::arguments::Shift;
 use crate::log::{self, Log};
@@ -39,6 +40,8 @@ pub(crate) enum Run<'a> {
         kinds: OccupancyKinds,
         mapper: Box<Mapper<2>>,
         file: Box<MapFile<2>>,
+        /// What moved and was taken out of the scans.
+        movers: Option<FoundMovers>,
     },
     Three {
         frames: Frames<'a>,
@@ -46,7 +49,7 @@ pub(crate) enum Run<'a> {
         file: Box<MapFile<3>>,
     },
     /// Into sums.
-    Sums(LedgerRun<'a>),
+    Sums(Box<LedgerRun<'a>>),
 }
 
 impl<'a> Run<'a> {
@@ -59,7 +62,8 @@ impl<'a> Run<'a> {
         limits: &Limits,
     ) -> anyhow::Result<Self> {
         if settings.shape.ledger {
-            return LedgerRun::new(log, indices, settings, before, limits).map(Self::Sums);
+            return LedgerRun::new(log, indices, settings, before, limits)
+                .map(|run| Self::Sums(Box::new(run)));
         }
         match log {
             Log::Two(log) => Self::new_2d(log, indices, settings, before.and_then(SavedMap::in_2d), limits),
@@ -85,7 +89,7 @@ impl<'a> Run<'a> {
         let mut file = before.unwrap_or_default();
         let kinds = OccupancyKinds::of(settings, &file);
         let mapper = Box::new(mapper_2d(&mut file, settings, &grid, limits)?);
-        Ok(Self::Two { log: limits.log.to_owned(), scans, grid, kinds, mapper, file })
+        Ok(Self::Two { log: limits.log.to_owned(), scans, grid, kinds, mapper, file, movers: None })
     }
 
     /// Maps in bricks, which grow with what is seen: frames are read while they are fused.
@@ -114,8 +118,9 @@ impl<'a> Run<'a> {
     /// Fuses all scans, in order.
     pub(crate) fn fuse(&mut self, threads: usize, progress: &Progress) -> FusionReport {
         match self {
-            Self::Two { log, scans, kinds, mapper, file, .. } => {
+            Self::Two { log, scans, kinds, mapper, file, movers, .. } => {
                 let mut report = fuse_2d(mapper, scans, log, &mut file.poses, progress);
+                report.movers = movers.take();
                 report.name_occupancy(*kinds);
                 report
             }
@@ -124,6 +129,26 @@ impl<'a> Run<'a> {
             }
             Self::Sums(run) => run.fuse(threads, progress),
         }
+    }
+
+    /// Looks for what moved, so that it is left out of the maps, which have the memory that is left.
+    pub(crate) fn look(&mut self, how: &Looking) -> anyhow::Result<()> {
+        match self {
+            // Without sums all scans that are looked at are fused.
+            Self::Two { scans, movers, .. } => {
+                let judge = look_2d(scans.iter().cloned(), how)?;
+                for (i, (pose, scan)) in scans.iter_mut().enumerate() {
+                    *scan = judge.without_movers(i, pose, scan.clone(), &mut BeamCounts::default());
+                }
+                *movers = Some(judge.found());
+            }
+            Self::Three { frames, mapper, .. } => {
+                let bytes = frames.look(how)?;
+                mapper.set_memory(how.memory.saturating_sub(bytes));
+            }
+            Self::Sums(run) => run.look(how)?,
+        }
+        Ok(())
     }
 
     /// The maps as a file, the box that they cover, and what is larger than memory.

@@ -3,6 +3,7 @@
 use portolan::cell::{LogOdds8, LogOddsValue};
 use portolan::geom::vector::distance;
 use portolan::geom::{Aabb, Grid};
+use portolan::uncertainty::SurfaceSigma;
 use portolan_draw::{Anchor, Canvas, Color, Entry, Font, Pen, PixelRect, Swatch, View, color};
 use portolan_io::{MapCell, MapFile};
 
@@ -16,48 +17,124 @@ const MARGIN: f64 = 28.0;
 const TITLE: f64 = 40.0;
 const LEGEND: f64 = 46.0;
 
-/// The picture of a map as PNG bytes; `None` where there is no map to show.
-pub(crate) fn of_map(file: &MapFile<2>, derived: &Derived, title: &str) -> Option<Vec<u8>> {
-    let (grid, shown) = shown_part(file)?;
-    let [width, height] = shown.extent();
-    let r = grid.lattice.resolution;
-    // Whole pixels per cell where that is possible: cells stay squares.
-    let fitting = LARGEST / (width.max(height) / r);
-    let scale = if fitting >= 2.0 { fitting.floor().min(LARGEST_CELL) } else { fitting } / r;
-    let (w, h) = ((width * scale).round(), (height * scale).round());
-    let frame = PixelRect::new(MARGIN, MARGIN + TITLE, w.max(640.0), h);
-    let mut canvas = Canvas::new((frame.right() + MARGIN) as u32, (frame.bottom() + LEGEND + MARGIN) as u32);
-    let view = View::fit(shown.min, shown.max, frame);
-    canvas.fill_rect(frame, color::UNKNOWN);
-    let mut legend = vec![Entry::new(Swatch::Area(color::UNKNOWN), "not observed")];
-    let colors = cell_colors(file, &grid, &mut legend);
-    let [columns, _] = grid.shape;
-    canvas.raster(&view, grid.shape, grid.lattice.origin, r, |[x, y]| colors[y * columns + x]);
+/// The picture of a map as PNG bytes; `None` where there is no map to show. `movers`: points of what moved (world, meters).
+pub(crate) fn of_map(
+    file: &MapFile<2>,
+    derived: &Derived,
+    movers: &[[f64; 3]],
+    title: &str,
+) -> Option<Vec<u8>> {
+    let mut sheet = Sheet::of(file, true)?;
+    let (edge, width) = (sheet.edge, sheet.width);
+    let Sheet { canvas, view, legend, .. } = &mut sheet;
     if let Some(contour) = &derived.contour {
         let segments: Vec<_> = contour.contour.ends().collect();
-        let pen = Pen::new(color::SURFACE, (0.5 * scale * r).clamp(1.2, 2.5));
-        canvas.segments(&view, &segments, pen);
+        let pen = Pen::new(color::SURFACE, width);
+        canvas.segments(view, &segments, pen);
         legend.push(Entry::new(Swatch::Line(Pen::new(color::SURFACE, 2.5)), "contour"));
     }
     if let Some(DistanceField::Two { points, .. }) = &derived.esdf
         && !points.is_empty()
     {
         for (center, _) in points {
-            let corner = |sign: f64| center.map(|v| v + sign * 0.5 * r);
-            canvas.rect(&view, corner(-1.0), corner(1.0), Some(color::SURFACE), None);
+            let corner = |sign: f64| center.map(|v| v + sign * 0.5 * edge);
+            canvas.rect(view, corner(-1.0), corner(1.0), Some(color::SURFACE), None);
         }
         legend.push(Entry::new(Swatch::Area(color::SURFACE), "obstacle without a surface"));
     }
-    draw_path(&mut canvas, &view, file, &mut legend);
-    let heading = Font::new(24).bold();
-    canvas.text([MARGIN, MARGIN - 4.0], &heading.fit(title, frame.width), heading, Anchor::Left);
-    // The scale bar stands beside the legend, not on the map.
-    let below = PixelRect::new(MARGIN, frame.bottom() + 10.0, frame.width, LEGEND);
-    let [scale_x, scale_y] = view.scale();
-    let meters = [below.width / scale_x, below.height / scale_y];
-    canvas.scale_bar(&View::stretch([0.0; 2], meters, below.inset(0.0, 0.0, 0.0, 4.0)));
-    canvas.legend(below.inset(0.0, 4.0, 0.3 * below.width, 0.0), &legend, Font::new(16));
-    Some(canvas.encode_png())
+    if !movers.is_empty() {
+        let points: Vec<_> = movers.iter().map(|&[x, y, _]| [x, y]).collect();
+        canvas.dots(view, &points, 0.7 * width, MOVED);
+        legend.push(Entry::new(Swatch::Dot(MOVED), "moved, not in the map"));
+    }
+    draw_path(canvas, view, file, legend);
+    Some(sheet.finish(title))
+}
+
+/// How sure the contour is: its segments in the color of their standard deviation. `None` where there is none.
+pub(crate) fn of_sigma(
+    file: &MapFile<2>,
+    derived: &Derived,
+    sigma: &SurfaceSigma,
+    title: &str,
+) -> Option<Vec<u8>> {
+    let (map, contour) = (file.tsdf.as_ref()?, derived.contour.as_ref()?);
+    let mut sheet = Sheet::of(file, false)?;
+    let pen = |color| Pen::new(color, 2.0 * sheet.width);
+    for [a, b] in contour.contour.ends() {
+        let middle = [0, 1].map(|k| 0.5 * (a[k] + b[k]));
+        let color = sigma_color(sigma, sigma.of_distance(map.store(), middle, 0.0, [0.0; 2]));
+        sheet.canvas.segments(&sheet.view, &[[a, b]], pen(color));
+    }
+    let [least, most] = sigma.ends();
+    let entry = |at: f64| Entry::new(Swatch::Area(sigma_color(sigma, Some(at))), millimeters(at));
+    let entries = [least, (least * most).sqrt(), most].map(entry);
+    sheet.legend.extend(entries);
+    Some(sheet.finish(&format!("{title} · standard deviation of the surface")))
+}
+
+/// Returns of what moved.
+pub(super) const MOVED: Color = color::SERIES[4];
+
+/// A length in words.
+pub(super) fn millimeters(length: f64) -> String {
+    format!("{:.1} mm", 1e3 * length)
+}
+
+/// The color of a standard deviation, from the surest of a surface to the least sure; of `None`, nothing is known.
+pub(super) fn sigma_color(curve: &SurfaceSigma, sigma: Option<f64>) -> Color {
+    // The palest tones do not show on paper.
+    color::sequential(0.25 + 0.75 * sigma.map_or(f64::NAN, |sigma| curve.share(sigma)))
+}
+
+/// A picture of a 2-D map that is being drawn.
+struct Sheet {
+    canvas: Canvas,
+    view: View,
+    frame: PixelRect,
+    legend: Vec<Entry>,
+    /// Of a cell (meters).
+    edge: f64,
+    /// Of lines (pixels).
+    width: f64,
+}
+
+impl Sheet {
+    /// What is free and occupied, and with `distances` how far surfaces are.
+    fn of(file: &MapFile<2>, distances: bool) -> Option<Self> {
+        let (grid, shown) = shown_part(file)?;
+        let [width, height] = shown.extent();
+        let r = grid.lattice.resolution;
+        // Whole pixels per cell where that is possible: cells stay squares.
+        let fitting = LARGEST / (width.max(height) / r);
+        let scale = if fitting >= 2.0 { fitting.floor().min(LARGEST_CELL) } else { fitting } / r;
+        let (w, h) = ((width * scale).round(), (height * scale).round());
+        let frame = PixelRect::new(MARGIN, MARGIN + TITLE, w.max(640.0), h);
+        let mut canvas =
+            Canvas::new((frame.right() + MARGIN) as u32, (frame.bottom() + LEGEND + MARGIN) as u32);
+        let view = View::fit(shown.min, shown.max, frame);
+        canvas.fill_rect(frame, color::UNKNOWN);
+        let mut legend = vec![Entry::new(Swatch::Area(color::UNKNOWN), "not observed")];
+        let colors = cell_colors(file, &grid, distances, &mut legend);
+        let [columns, _] = grid.shape;
+        canvas.raster(&view, grid.shape, grid.lattice.origin, r, |[x, y]| colors[y * columns + x]);
+        Some(Self { canvas, view, frame, legend, edge: r, width: (0.5 * scale * r).clamp(1.2, 2.5) })
+    }
+
+    /// Title, legend and scale, and the bytes of the PNG.
+    fn finish(mut self, title: &str) -> Vec<u8> {
+        let heading = Font::new(24).bold();
+        let frame = self.frame;
+        let fitting = heading.fit(title, frame.width);
+        self.canvas.text([MARGIN, MARGIN - 4.0], &fitting, heading, Anchor::Left);
+        // The scale bar stands beside the legend, not on the map.
+        let below = PixelRect::new(MARGIN, frame.bottom() + 10.0, frame.width, LEGEND);
+        let [scale_x, scale_y] = self.view.scale();
+        let meters = [below.width / scale_x, below.height / scale_y];
+        self.canvas.scale_bar(&View::stretch([0.0; 2], meters, below.inset(0.0, 0.0, 0.0, 4.0)));
+        self.canvas.legend(below.inset(0.0, 4.0, 0.3 * below.width, 0.0), &self.legend, Font::new(16));
+        self.canvas.encode_png()
+    }
 }
 
 /// The box around all observed cells, a little larger, and the grid that it is cut from.
@@ -82,14 +159,19 @@ fn shown_part(file: &MapFile<2>) -> Option<(Grid<2>, Aabb<2>)> {
     Some((grid, seen.grown(6.0 * grid.lattice.resolution)))
 }
 
-/// The color of every cell: occupancy in light tones, and over it the signed distance near surfaces.
-fn cell_colors(file: &MapFile<2>, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Vec<Color> {
+/// The color of every cell: occupancy in light tones, and with `distances` over it the signed distance near surfaces.
+fn cell_colors(file: &MapFile<2>, grid: &Grid<2>, distances: bool, legend: &mut Vec<Entry>) -> Vec<Color> {
+    // What is drawn over them without distances must show.
+    let tone = |p: f64| match distances {
+        true => occupancy_color(p),
+        false => occupancy_color(p).mix(color::FREE, 0.8),
+    };
     let mut colors = vec![color::UNKNOWN; grid.len()];
     if let Some(map) = &file.grid {
         let table: Vec<Color> = (i8::MIN..=i8::MAX)
             .map(|v| match LogOdds8(v) {
                 v if v.is_unobserved() => color::UNKNOWN,
-                v => occupancy_color(v.probability(map.rule())),
+                v => tone(v.probability(map.rule())),
             })
             .collect();
         let cells = map.store().planes();
@@ -97,15 +179,15 @@ fn cell_colors(file: &MapFile<2>, grid: &Grid<2>, legend: &mut Vec<Entry>) -> Ve
     } else if let Some((_, cells)) = cells_for_map_server(file) {
         colors.iter_mut().zip(&cells).for_each(|(c, cell)| {
             *c = match cell {
-                MapCell::Free => occupancy_color(0.1),
-                MapCell::Occupied => occupancy_color(0.9),
+                MapCell::Free => tone(0.1),
+                MapCell::Occupied => tone(0.9),
                 MapCell::Unknown => color::UNKNOWN,
             }
         });
     }
-    legend.push(Entry::new(Swatch::Area(occupancy_color(0.1)), "free"));
-    legend.push(Entry::new(Swatch::Area(occupancy_color(0.9)), "occupied"));
-    if let Some(map) = &file.tsdf {
+    legend.push(Entry::new(Swatch::Area(tone(0.1)), "free"));
+    legend.push(Entry::new(Swatch::Area(tone(0.9)), "occupied"));
+    if let Some(map) = file.tsdf.as_ref().filter(|_| distances) {
         let (planes, truncation) = (map.store().planes(), map.config().truncation);
         let observed = planes.distances().iter().zip(planes.weights());
         for (c, (&d, _)) in colors.iter_mut().zip(observed).filter(|(_, (_, w))| **w >= 0.5) {

@@ -15,6 +15,7 @@ use crate::error::bad_call;
 use crate::esdf::EsdfArg;
 use crate::json::object;
 use crate::log::{LimitArgs, NoReturnArgs, RangeArgs, Selection};
+use crate::up::{Up, up};
 use portolan::map::{CARVE_WEIGHT, W_MAX};
 use portolan::mapper::{MapperSettings, THIN};
 
@@ -74,6 +75,12 @@ pub(crate) struct Shape {
     #[arg(long, conflicts_with_all = ["w_max", "half_life"])]
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(crate) ledger: bool,
+    /// Take out what moved: a first pass over all scans finds the space that was seen open at other times, a second one leaves
+    /// surfaces in it out of the maps, and lists them in movers.ply. SIGMA: standard deviation of the error of poses (meters)
+    /// [default without a value: 0.03]
+    #[arg(long, value_name = "SIGMA", value_parser = length, num_args = 0..=1, require_equals = true, default_missing_value = "0.03")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) movers: Option<f64>,
     /// Leave every N-th scan out of the map, for `eval --scans`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..), allow_negative_numbers = true)]
     pub(crate) hold_out: Option<u64>,
@@ -106,6 +113,11 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "auto|POINT|0", value_parser = shift, allow_hyphen_values = true, help_heading = ONLY_3D)]
     #[serde(skip_serializing_if = "Option::is_none", skip_deserializing)]
     pub(crate) shift: Option<Shift>,
+    /// Which way is up, for pictures, floor plans and the studio: an axis like +z or -y, or a direction x,y,z [default: how the
+    /// sensors were held, put right by the floor; with --ledger, and where neither says it, +z]
+    #[arg(long, value_name = "AXIS|X,Y,Z", value_parser = up, allow_hyphen_values = true, help_heading = ONLY_3D)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) up: Option<Up>,
     /// Maps to make, separated by commas; esdf, contour and mesh are derived from the tsdf, which is then made too
     /// [default: all: grid,tree,tsdf,attenuation,esdf,contour in 2-D; tree,tsdf,attenuation,esdf,mesh in 3-D]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
@@ -139,6 +151,7 @@ impl Default for Shape {
             self_filter: Vec::new(),
             points_only: false,
             ledger: false,
+            movers: None,
             hold_out: None,
         }
     }
@@ -156,6 +169,7 @@ impl Default for Settings {
             every: None,
             bounds: None,
             shift: None,
+            up: None,
             maps: Vec::new(),
             esdf: EsdfArg::default(),
             thin: THIN,
@@ -237,6 +251,11 @@ impl Settings {
                     kind.word()
                 )));
             }
+            if self.shape.movers.is_some() {
+                return Err(bad_call(
+                    "--movers needs rays, which say what was seen open, and points without rays have none",
+                ));
+            }
             if self.esdf != EsdfArg::Accurate {
                 return Err(bad_call(format!(
                     "--esdf {} is made of signed distances, which points without rays have not; leave it out",
@@ -296,6 +315,9 @@ impl Settings {
                 (100.0 * self.w_max()).round() / 100.0,
                 self.half_life()
             ),
+            false if self.shape.ledger => {
+                "sums: nothing is forgotten until it is taken out, and no colors are kept".to_owned()
+            }
             false => "W_max infinite: nothing is forgotten".to_owned(),
         }
     }

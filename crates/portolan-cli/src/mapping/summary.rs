@@ -8,9 +8,9 @@ use serde_json::{Value, json};
 
 use portolan::scan::{Way, WhyRays};
 
-use super::extent::Extent;
+use super::extent::{Extent, strays};
 use super::memory::peak_memory;
-use super::{Derived, FusionReport, Settings};
+use super::{Derived, FoundMovers, FusionReport, Settings};
 use crate::arguments::shown_bytes;
 use crate::dimension::Dimension;
 use crate::esdf::{EsdfArg, SURFACE_ALONE, keeps_thin};
@@ -61,6 +61,10 @@ impl Summary<'_> {
         if stats.hits_outside > 0 {
             warnings.push(format!("{} hits lie outside of --bounds", stats.hits_outside));
         }
+        if let SavedMap::Three(file) = self.file {
+            warnings.extend(file.tsdf_bricks.as_ref().and_then(|tsdf| strays(&tsdf.store)));
+        }
+        warnings.extend(self.fusion.movers.as_ref().and_then(FoundMovers::warning));
         warnings.extend(self.surface_warnings());
         let keeps = match self.file {
             SavedMap::Two(file) => keeps_thin(file),
@@ -134,6 +138,11 @@ impl Summary<'_> {
             "peak_memory": peak_memory(),
             "seconds": self.seconds,
             "scans_per_second": self.scans_per_second(),
+            "sigma": self.fusion.sigma.as_ref().map(|sigma| match sigma {
+                Ok(calibration) => calibration.to_json(),
+                Err(why) => json!({ "unknown": why }),
+            }),
+            "movers": self.fusion.movers.as_ref().map(FoundMovers::to_json),
             "logs": header.logs,
             "warnings": self.warnings(),
             "files": self.files,
@@ -238,6 +247,14 @@ pub(crate) fn report(summary: &Summary, folder: &str) -> String {
     );
     if let Some([moved, held]) = summary.fusion.moved {
         let _ = writeln!(text, "{moved} of the {held} scans of this log in the map were moved");
+    }
+    if let Some(movers) = &summary.fusion.movers {
+        let _ = writeln!(text, "{}", movers.in_words(stats.beams.hit));
+    }
+    match &summary.fusion.sigma {
+        Some(Ok(calibration)) => drop(writeln!(text, "{}", calibration.in_words())),
+        Some(Err(why)) => drop(writeln!(text, "how sure the surface is is not known: {why}")),
+        None => {}
     }
     for choice in summary.log.choices() {
         let _ = writeln!(text, "{choice}");

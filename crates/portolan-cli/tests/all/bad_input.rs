@@ -55,7 +55,7 @@ fn logs_that_are_none() {
     let missing = missing.with_file_name("missing.log");
     map_refused(&missing, &[], 1, &["missing.log", "check the path"]);
     let folder = tempfile::tempdir().unwrap();
-    map_refused(folder.path(), &[], 1, &[arg(folder.path()), "is a folder, not a file"]);
+    map_refused(folder.path(), &[], 1, &[arg(folder.path()), "an empty folder; give the folder or the file"]);
     let noise: Vec<u8> = (0..20_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     let (_f, random) = file("random.log", noise);
     map_refused(&random, &[], 1, &["random.log", "not a log: it starts with"]);

@@ -22,7 +22,7 @@ fn fused([x, y, z]: [f64; 3]) -> String {
 }
 
 fn map(log: &Path, out: &Path, more: &[&str]) -> String {
-    let call = ["map", arg(log), "--out", arg(out), "--resolution", "0.1"];
+    let call = ["map", arg(log), "--out", arg(out), "--resolution", "0.1", "--overwrite"];
     succeed(call.iter().copied().chain(more.iter().copied()))
 }
 

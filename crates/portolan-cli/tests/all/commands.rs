@@ -7,10 +7,11 @@ use std::process::{Command, Stdio};
 
 use crate::support::{arg, fail, json, log_lines, map, portolan, range, room, succeed};
 
-const FILES: [&str; 9] = [
+const FILES: [&str; 10] = [
     "contour.geojson",
     "contour.svg",
     "esdf.bin",
+    "manifest.json",
     "map.pgm",
     "map.png",
     "map.portolan",
@@ -51,7 +52,10 @@ fn fewer_maps_leave_fewer_files_and_no_stale_ones() {
     let out = folder.path().join("out");
     map(&log, &out, &[]);
     map(&log, &out, &["--maps", "tree"]);
-    assert_eq!(files_in(&out), ["map.pgm", "map.png", "map.portolan", "map.yaml", "summary.json"]);
+    assert_eq!(
+        files_in(&out),
+        ["manifest.json", "map.pgm", "map.png", "map.portolan", "map.yaml", "summary.json"]
+    );
     map(&log, &out, &["--maps", "esdf"]);
     assert!(files_in(&out).contains(&"esdf.bin".to_owned()));
     assert!(!files_in(&out).contains(&"contour.svg".to_owned()));
@@ -64,7 +68,7 @@ fn json_is_one_document_and_quiet_is_nothing() {
     let common = ["map", arg(&log), "--resolution", "0.1", "--out", arg(&out)];
     let summary = json(common.iter().chain(&["--json"]));
     assert_eq!(summary["extent"]["resolution"], 0.1);
-    assert_eq!(succeed(common.iter().chain(&["-q"])), "");
+    assert_eq!(succeed(common.iter().chain(&["-q", "--overwrite"])), "");
     let points = folder.path().join("p.csv");
     std::fs::write(&points, "1,1\n").unwrap();
     let (svg, out) = (folder.path().join("c.svg"), arg(&out));
@@ -294,7 +298,7 @@ fn threads_change_no_byte() {
         map(&log, &out, &["--threads", threads]);
         FILES
             .iter()
-            .filter(|n| **n != "summary.json")
+            .filter(|n| !["manifest.json", "summary.json"].contains(n))
             .map(|n| std::fs::read(out.join(n)).unwrap())
             .collect::<Vec<_>>()
     };
@@ -372,14 +376,15 @@ fn other_poses_and_every_second_scan() {
     assert!(summary["extent"]["min"][1].as_f64().unwrap() > 3_999_998.0);
     assert!((summary["contour"]["length"].as_f64().unwrap() - 24.0).abs() < 1.0);
     std::fs::write(&poses, "0 0 0\n").unwrap();
-    let arguments = ["map", arg(&log), "--resolution", "0.05", "--out", arg(&out), "--poses", arg(&poses)];
+    let arguments =
+        ["map", arg(&log), "--resolution", "0.05", "--out", arg(&out), "--overwrite", "--poses", arg(&poses)];
     let err = support::fail(1, arguments);
     assert!(err.contains("the number of poses is 1; give one for each of the 60 scans"), "{err}");
 }
 
 #[test]
 fn every_help_ends_with_an_example() {
-    for command in ["map", "query", "info", "convert", "mesh", "eval"] {
+    for command in ["map", "query", "info", "convert", "mesh", "eval", "man"] {
         let help = succeed([command, "--help"]);
         let last = help.trim_end().lines().last().unwrap();
         assert!(last.contains(&format!("portolan {command}")), "{help}");
@@ -519,8 +524,19 @@ fn distances_say_when_nothing_keeps_thin_things() {
     assert!(warned(&["--maps", "esdf"]).0);
     assert!(!warned(&["--maps", "esdf,attenuation"]).0);
     assert!(warned(&["--esdf", "mask"]).1.is_null());
-    let thin =
-        ["map", arg(&log), "--resolution", "0.05", "--out", arg(&out), "--esdf", "mask", "--thin", "0.2"];
+    let thin = [
+        "map",
+        arg(&log),
+        "--resolution",
+        "0.05",
+        "--overwrite",
+        "--out",
+        arg(&out),
+        "--esdf",
+        "mask",
+        "--thin",
+        "0.2",
+    ];
     assert!(fail(2, thin).contains("--thin is only for --esdf accurate"));
     let thin = ["query", arg(&out), "--points", arg(&points), "--esdf", "seeded", "--thin", "0.2"];
     assert!(fail(2, thin).contains("--thin is only for --esdf accurate"));
@@ -571,5 +587,21 @@ fn the_summary_counts_where_log_odds_and_counts_disagree() {
         let (text, summary) = run(options);
         assert!(summary["obstacles"]["occupied_by"].is_null(), "{options:?}");
         assert!(!text.contains("by log odds alone"), "{text}");
+    }
+}
+
+/// Drivers write the largest number for "no echo".
+#[test]
+fn readings_as_large_as_numbers_are_free_what_is_before_them() {
+    let (folder, _) = room();
+    let log = folder.path().join("max.log");
+    let lines = support::log_lines(0, 20).replace(" 81.830", &format!(" {:.1}", f32::MAX));
+    assert!(lines.contains("340282346638528"));
+    std::fs::write(&log, lines).unwrap();
+    for more in [&[][..], &["--no-return", "off"], &["--no-return", "off", "--max-range", "1e38"]] {
+        let out = folder.path().join("out");
+        let call = ["map", arg(&log), "--resolution", "0.1", "--bounds", "-1,-1,7,5", "--overwrite"];
+        let text = succeed([&call[..], &["--out", arg(&out)], more].concat());
+        assert!(text.contains("20 of 20 scans fused"), "{text}");
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::support::{arg, fail, json, room, succeed};
 use serde_json::Value;
 
-const FILES: [&str; 17] = [
+const FILES: [&str; 18] = [
     "contour.geojson",
     "contour.svg",
     "esdf.bin",
@@ -14,6 +14,7 @@ const FILES: [&str; 17] = [
     "gallery.txt",
     "ghost.json",
     "ghost.png",
+    "manifest.json",
     "map.pgm",
     "map.png",
     "map.portolan",

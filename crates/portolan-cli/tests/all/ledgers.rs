@@ -6,7 +6,7 @@ use crate::support::logs_3d::lidar_log;
 use crate::support::{arg, fail, flaser, json, log_lines, pose, range, room, succeed};
 
 fn map(log: &Path, out: &Path, more: &[&str]) {
-    let call = ["map", arg(log), "--resolution", "0.1", "--out", arg(out), "--quiet"];
+    let call = ["map", arg(log), "--resolution", "0.1", "--out", arg(out), "--overwrite", "--quiet"];
     succeed(call.iter().copied().chain(more.iter().copied()));
 }
 
@@ -15,7 +15,7 @@ fn bytes(out: &Path) -> Vec<u8> {
 }
 
 fn merge(parts: &[&Path], out: &Path, more: &[&str]) {
-    let call = ["merge", "--out", arg(out), "--quiet"];
+    let call = ["merge", "--out", arg(out), "--overwrite", "--quiet"];
     succeed(call.iter().copied().chain(parts.iter().map(|p| arg(p))).chain(more.iter().copied()));
 }
 
@@ -41,7 +41,7 @@ fn parts_add_up(log: &Path, folder: &Path, more: &[&str]) {
     merge(&[&out("1of3"), &out("3of3")], &out("two"), &["--map-only"]);
     assert!(bytes(&out("rest")) == bytes(&out("two")));
     let names: Vec<_> = std::fs::read_dir(out("rest")).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(names.len(), 2, "{names:?}");
+    assert_eq!(names.len(), 3, "{names:?}");
     // Nothing is left when all is taken out, and that is a map, too.
     merge(&[&out("merged")], &out("none"), &["--without", arg(&out("whole"))]);
     assert_eq!(json(["info", arg(&out("none")), "--json"])["scans"], 0);
@@ -71,7 +71,7 @@ fn memory_is_enough(log: &Path, folder: &Path, memory: &str) {
     let mut names: Vec<_> =
         std::fs::read_dir(out("small")).unwrap().map(|e| e.unwrap().file_name()).collect();
     names.sort();
-    assert_eq!(names, ["map.portolan", "summary.json"]);
+    assert_eq!(names, ["manifest.json", "map.portolan", "summary.json"]);
     // So little that one scan alone has no room: said, and nothing is half done.
     let call =
         ["map", arg(log), "--resolution", "0.1", "--ledger", "--memory", "1K", "--out", arg(&out("none"))]
@@ -215,4 +215,67 @@ fn logs_add_up_and_slips_are_told() {
         assert!(error.contains(part), "{part}: {error}");
     }
     assert!(!at("x").exists());
+}
+
+/// What would be wrong without a word.
+#[test]
+fn one_log_under_two_names_and_two_under_one_are_told() {
+    let (folder, log) = room();
+    let at = |name: &str| folder.path().join(name);
+    map(&log, &at("a"), &["--ledger"]);
+    std::fs::copy(&log, at("copy.log")).unwrap();
+    map(&at("copy.log"), &at("b"), &["--ledger"]);
+    let merged = succeed(["merge", arg(&at("a")), arg(&at("b")), "--out", arg(&at("ab"))]);
+    assert!(merged.contains("60 scans have the readings and poses of scans of another log"), "{merged}");
+    let appended = succeed(["map", arg(&at("copy.log")), "--out", arg(&at("a")), "--append"]);
+    assert!(appended.contains("60 scans have the readings and poses"), "{appended}");
+    assert!(bytes(&at("a")) == bytes(&at("ab")));
+    // Another log of the same name, half of whose numbers would be new.
+    std::fs::create_dir_all(at("other")).unwrap();
+    std::fs::write(at("other/copy.log"), log_lines(20, 110)).unwrap();
+    let before = bytes(&at("b"));
+    let error = fail(1, ["map", arg(&at("other/copy.log")), "--out", arg(&at("b")), "--append"]);
+    assert!(error.contains("has other readings") && error.contains("another name"), "{error}");
+    assert!(bytes(&at("b")) == before);
+    map(&at("other/copy.log"), &at("c"), &["--ledger"]);
+    let error = fail(1, ["merge", arg(&at("b")), arg(&at("c")), "--out", arg(&at("x"))]);
+    assert!(error.contains("has other readings"), "{error}");
+    // A ledger cannot get another box, or maps that it was not made with.
+    std::fs::write(at("more.log"), log_lines(60, 70)).unwrap();
+    map(&at("more.log"), &at("flat"), &["--ledger", "--maps", "grid"]);
+    for (out, more, part) in [
+        ("b", &["--bounds", "0,0,2,2"][..], "--bounds: the map has others"),
+        ("flat", &["--maps", "tsdf"], "--maps: the map holds no tsdf"),
+    ] {
+        let call = ["map", arg(&log), "--append", "--out", arg(&at(out))].map(str::to_owned);
+        let error = fail(1, call.into_iter().chain(more.iter().map(|&word| word.to_owned())));
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    map(&at("more.log"), &at("thin"), &["--ledger", "--thin", "0.5"]);
+    let error = fail(1, ["merge", arg(&at("b")), arg(&at("thin")), "--out", arg(&at("x"))]);
+    assert!(error.contains("thin is 0.5 there"), "{error}");
+    assert!(!at("x").exists());
+}
+
+/// What stands for "no echo" differs from sensor to sensor, and is no setting of their sum: any order, any way, back again.
+#[test]
+fn logs_of_different_sensors_add_up() {
+    let (folder, log) = room();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("far.log"), log_lines(60, 90).replace(" 81.830", " 50.000")).unwrap();
+    map(&log, &at("a"), &["--ledger"]);
+    map(&at("far.log"), &at("b"), &["--ledger"]);
+    let no_return = |out: &str| -> serde_json::Value {
+        let text = std::fs::read(at(out).join("summary.json")).unwrap();
+        serde_json::from_slice::<serde_json::Value>(&text).unwrap()["input"]["no_return"].clone()
+    };
+    assert!(no_return("a") != no_return("b"));
+    merge(&[&at("a"), &at("b")], &at("ab"), &[]);
+    merge(&[&at("b"), &at("a")], &at("ba"), &[]);
+    assert!(bytes(&at("ab")) == bytes(&at("ba")));
+    succeed(["map", arg(&at("far.log")), "--out", arg(&at("a")), "--append", "--quiet"]);
+    assert!(bytes(&at("a")) == bytes(&at("ab")));
+    merge(&[&at("ab")], &at("rest"), &["--without", arg(&at("b"))]);
+    map(&log, &at("again"), &["--ledger"]);
+    assert!(bytes(&at("rest")) == bytes(&at("again")));
 }

@@ -8,7 +8,7 @@ use crate::support::logs_3d::{camera_log, lidar_log};
 use crate::support::{arg, fail, json, succeed};
 
 fn map(log: &Path, out: &Path, more: &[&str]) -> String {
-    let call = ["map", arg(log), "--out", arg(out), "--resolution", "0.1"];
+    let call = ["map", arg(log), "--out", arg(out), "--resolution", "0.1", "--overwrite"];
     succeed(call.iter().copied().chain(more.iter().copied()))
 }
 
@@ -54,6 +54,7 @@ fn a_lidar_log_becomes_all_maps() {
         files_in(&out),
         [
             "esdf.bin",
+            "manifest.json",
             "map.portolan",
             "mesh.ply",
             "obstacles.csv",
@@ -179,10 +180,10 @@ fn bounds_ranges_and_the_robots_body() {
     map(&log, &out, &["--self-filter", "0,0,0,1.6", "--min-range", "0.5", "--maps", "tree"]);
     assert!(summary(&out)["beams"]["self_hit"].as_u64().unwrap() > 0);
 
-    let refused =
-        fail(2, ["map", arg(&log), "--out", arg(&out), "--resolution", "0.1", "--bounds", "0,0,1,1"]);
+    let again = ["map", arg(&log), "--out", arg(&out), "--resolution", "0.1", "--overwrite"];
+    let refused = fail(2, [&again[..], &["--bounds", "0,0,1,1"]].concat());
     assert!(refused.contains("six numbers"), "{refused}");
-    let refused = fail(2, ["map", arg(&log), "--out", arg(&out), "--resolution", "0.1", "--maps", "contour"]);
+    let refused = fail(2, [&again[..], &["--maps", "contour"]].concat());
     assert!(refused.contains("--maps contour is only for 2-D; the log is 3-D"), "{refused}");
 }
 
@@ -216,7 +217,7 @@ fn a_folder_keeps_what_is_not_of_an_earlier_run() {
     assert_eq!(std::fs::read(out.join("mesh.ply")).unwrap(), b"mine");
     map(&log, &out, &["--maps", "mesh"]);
     map(&log, &out, &["--maps", "tree"]);
-    assert_eq!(files_in(&out), ["map.portolan", "octree.bt", "octree.ot", "summary.json"]);
+    assert_eq!(files_in(&out), ["manifest.json", "map.portolan", "octree.bt", "octree.ot", "summary.json"]);
     let refused = fail(2, ["map", arg(&log), "--out", arg(&log), "--resolution", "0.1"]);
     assert!(refused.contains("the log's own folder"), "{refused}");
 }

@@ -12,6 +12,8 @@ pub struct Preview<'a> {
     pub mesh: MeshView<'a>,
     /// The poses of its sensors; may be empty.
     pub sensors: &'a [Sensor],
+    /// Unit vector upward; `None`: that of the sensors, put right by the floor.
+    pub up: Option<[f32; 3]>,
     /// First line.
     pub title: &'a str,
     /// Second line.
@@ -29,7 +31,7 @@ const GAP: usize = 24;
 pub fn preview(what: &Preview<'_>) -> Canvas {
     let normals = if what.mesh.normals.is_empty() { what.mesh.smooth_normals() } else { Vec::new() };
     let mesh = if normals.is_empty() { what.mesh } else { MeshView { normals: &normals, ..what.mesh } };
-    let scene = MeshScene::of(&mesh, what.sensors);
+    let scene = MeshScene::of(&mesh, what.sensors, what.up);
     let aspect = |[width, height]: [u32; 2]| width as f32 / height as f32;
     let mut small = scene.inside_views(2);
     if small.is_empty() {

@@ -46,7 +46,7 @@ const STRAYS: f32 = 0.015;
 
 impl MeshScene {
     /// Analyzes a mesh and the poses of its sensors. O(size of the subsets + sensors).
-    pub(super) fn of(mesh: &MeshView<'_>, sensors: &[Sensor]) -> Self {
+    pub(super) fn of(mesh: &MeshView<'_>, sensors: &[Sensor], up: Option<[f32; 3]>) -> Self {
         let every = mesh.triangles.len().div_ceil(THINNED).max(1);
         let faces: Vec<Face> = (0..mesh.triangles.len())
             .step_by(every)
@@ -58,7 +58,7 @@ impl MeshScene {
                 (area > 0.0 && area.is_finite()).then(|| Face { middle, normal: n.map(|v| v / area), area })
             })
             .collect();
-        let up = upwards(&faces, sensors);
+        let up = up.unwrap_or_else(|| upwards(&faces, sensors));
         let mut scene =
             Self { up, inside: false, ceiling: None, sample: Vec::new(), faces, sensors: sensors.to_vec() };
         scene.sample = scene.without_strays();
@@ -363,7 +363,7 @@ mod tests {
         let (vertices, triangles) = room([4.0, 7.0, 2.5]);
         let mesh = MeshView { vertices: &vertices, triangles: &triangles, normals: &[], colors: &[] };
         let sensors = [sensor([1.0, 2.0, 1.2], [0.0, 1.0, 0.0]), sensor([2.0, 4.0, 1.4], [0.0, 1.0, 0.0])];
-        let scene = MeshScene::of(&mesh, &sensors);
+        let scene = MeshScene::of(&mesh, &sensors, None);
         assert!(scene.inside);
         assert!(scene.up[2] > 0.9999, "{:?}", scene.up);
         assert!((scene.ceiling.unwrap() - 2.5).abs() < 0.01);
@@ -395,20 +395,20 @@ mod tests {
             .map(|i| 0.2 * i as f32 - 0.8)
             .map(|a| sensor([4.0 * a.cos(), 4.0 * a.sin(), 1.0], [-a.cos(), -a.sin(), -0.2]))
             .collect();
-        let scene = MeshScene::of(&mesh, &sensors);
+        let scene = MeshScene::of(&mesh, &sensors, None);
         assert!(!scene.inside && scene.ceiling.is_none());
         let camera = scene.overview(1.0);
         assert!(camera.eye[0] > 2.0 && camera.eye[1].abs() < 1.0 && camera.eye[2] > 0.5, "{camera:?}");
         assert!(!camera.cull_back && scene.inside_views(2).is_empty());
         assert_eq!(scene.other_sides(1.0).len(), 2);
         // Without any sensor too.
-        assert!(!MeshScene::of(&mesh, &[]).inside);
+        assert!(!MeshScene::of(&mesh, &[], None).inside);
     }
 
     #[test]
     fn an_empty_mesh_has_views_too() {
         let empty = MeshView { vertices: &[], triangles: &[], normals: &[], colors: &[] };
-        let scene = MeshScene::of(&empty, &[sensor([0.0; 3], [1.0, 0.0, 0.0])]);
+        let scene = MeshScene::of(&empty, &[sensor([0.0; 3], [1.0, 0.0, 0.0])], None);
         assert!(scene.overview(1.0).eye.iter().all(|v| v.is_finite()));
     }
 }

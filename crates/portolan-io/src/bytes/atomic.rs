@@ -3,45 +3,102 @@
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::temporary::{Temporary, sweep_once};
 use crate::{IoError, Result};
 
 /// So many characters of a file's name (at most four bytes each) are in its temporary one.
 const MOST_OF_NAME: usize = 50;
-/// Temporary names that are tried where others are in the way.
-const MOST_TRIED: u64 = 1 << 20;
-
-/// Removes the temporary file unless it was renamed.
-struct Temporary(Option<PathBuf>);
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        if let Some(path) = self.0.take() {
-            // Nothing better can be done here: the first error is the one to report.
-            let _ = fs::remove_file(path);
-        }
-    }
-}
 
 /// Writes a file under a temporary name in the same folder and renames it when all of it is written, so that
-/// a run that fails or is killed leaves no half file under `path`, and an older file stays until then.
+/// a run that fails or is killed leaves no half file under `path`, and an older file stays until then. What killed runs
+/// left under temporary names in that folder is removed, and is in nobody's way.
 ///
 /// Devices and pipes (`/dev/stdout`) are written straight to. The data is handed to the system, not forced to
-/// the disk.
+/// the disk: [`write_durable`] does that.
 ///
 /// # Errors
 /// [`IoError::IsFolder`] where `path` is a folder, [`IoError::Os`] where writing fails.
 pub fn write_atomic(
     path: impl AsRef<Path>,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
 ) -> Result<()> {
     let mut write = Some(write);
     // Not generic from here on: compiled once, not once for each thing that is written.
-    replace(path.as_ref(), &mut |file| write.take().map_or(Ok(()), |write| write(file)))
+    replace(path.as_ref(), false, &mut |file| write.take().map_or(Ok(()), |write| write(file)))
 }
 
-fn replace(path: &Path, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
+/// [`write_atomic`], and the file is on the disk when it has its name, and its name when this returns: of what a power
+/// failure leaves, it is whole, the old or the new one.
+///
+/// # Errors
+/// As [`write_atomic`].
+pub fn write_durable(
+    path: impl AsRef<Path>,
+    write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
+) -> Result<()> {
+    let mut write = Some(write);
+    replace(path.as_ref(), true, &mut |file| write.take().map_or(Ok(()), |write| write(file)))
+}
+
+/// Renames a file, and the new name is on the disk when this returns.
+///
+/// # Errors
+/// [`IoError::Os`] where that fails.
+pub fn rename_durable(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<()> {
+    let to = to.as_ref();
+    fs::rename(from, to).and_then(|()| sync_folder_of(to)).map_err(|e| IoError::os(to, "write it", e))
+}
+
+/// Forces the names in the folder of a file to the disk, where the system has a way to.
+fn sync_folder_of(path: &Path) -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        match File::open(folder).and_then(|folder| folder.sync_all()) {
+            // Some network file systems sync files alone.
+            Err(e) if matches!(e.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => {}
+            synced => synced?,
+        }
+    }
+    #[cfg(not(unix))]
+    let _ = path;
+    Ok(())
+}
+
+/// A file that is written and has not got its name yet.
+pub(crate) struct Prepared<'a> {
+    path: &'a Path,
+    durable: bool,
+    /// `None`: a device or pipe, which has got its bytes already.
+    temporary: Option<(Temporary, PathBuf)>,
+}
+
+impl Prepared<'_> {
+    /// Gives it its name.
+    pub(crate) fn publish(self) -> Result<()> {
+        let Some((temporary, target)) = self.temporary else { return Ok(()) };
+        let synced = |()| if self.durable { sync_folder_of(&target) } else { Ok(()) };
+        temporary.name(&target).and_then(synced).map_err(|e| IoError::os(self.path, "write it", e))
+    }
+}
+
+/// Writes a file as [`write_atomic`] does, and leaves it without its name: what fails does so before others are replaced.
+pub(crate) fn prepare(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
+) -> Result<Prepared<'_>> {
+    let mut write = Some(write);
+    prepared(path, false, &mut |file| write.take().map_or(Ok(()), |write| write(file)))
+}
+
+type Writes<'a> = &'a mut dyn FnMut(&mut BufWriter<&File>) -> io::Result<()>;
+
+fn replace(path: &Path, durable: bool, write: Writes) -> Result<()> {
+    prepared(path, durable, write)?.publish()
+}
+
+fn prepared<'a>(path: &'a Path, durable: bool, write: Writes) -> Result<Prepared<'a>> {
     let failed = |e| IoError::os(path, "write it", e);
     // Through a symbolic link the file behind it is replaced, not the link.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -49,7 +106,8 @@ fn replace(path: &Path, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Resul
         Ok(about) if about.is_dir() => return Err(IoError::IsFolder { path: path.into() }),
         Ok(about) if !about.is_file() => {
             let file = OpenOptions::new().write(true).open(&target).map_err(failed)?;
-            return finish(file, write).map_err(failed);
+            finish(&file, write).map_err(failed)?;
+            return Ok(Prepared { path, durable, temporary: None });
         }
         _ => {}
     }
@@ -57,27 +115,19 @@ fn replace(path: &Path, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Resul
         let advice = "name a file in an existing folder";
         return Err(IoError::unwritable(path, "the file name", "missing", advice));
     };
-    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    sweep_once(folder);
     // Names may have 255 bytes: of a long one the beginning is enough.
     let name: String = name.to_string_lossy().chars().take(MOST_OF_NAME).collect();
-    let (file, temporary) = loop {
-        let unique = COUNT.fetch_add(1, Ordering::Relaxed);
-        let hidden = format!(".{name}.{}.{unique}.tmp", std::process::id());
-        let temporary = target.with_file_name(hidden);
-        match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-            // Left by a run of the same number that was killed: in a container all are number 1.
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && unique < MOST_TRIED => {}
-            file => break (file.map_err(failed)?, temporary),
-        }
-    };
-    let mut guard = Temporary(Some(temporary.clone()));
-    finish(file, write).map_err(failed)?;
-    fs::rename(&temporary, &target).map_err(failed)?;
-    guard.0 = None;
-    Ok(())
+    let temporary = Temporary::beside(&target, &name).map_err(failed)?;
+    finish(temporary.file(), write).map_err(failed)?;
+    if durable {
+        temporary.file().sync_all().map_err(failed)?;
+    }
+    Ok(Prepared { path, durable, temporary: Some((temporary, target)) })
 }
 
-fn finish(file: File, write: &mut dyn FnMut(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+fn finish(file: &File, write: Writes) -> io::Result<()> {
     let mut writer = BufWriter::with_capacity(1 << 16, file);
     write(&mut writer)?;
     writer.flush()
@@ -106,7 +156,7 @@ mod tests {
             (fs::read(&path).unwrap(), names(folder.path())),
             (b"old".to_vec(), vec!["map.bin".into()])
         );
-        write_atomic(&path, |w| w.write_all(b"new")).unwrap();
+        write_durable(&path, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
     }
 
@@ -114,11 +164,13 @@ mod tests {
     fn what_a_killed_run_left_and_long_names_are_not_in_the_way() {
         let (folder, path) = temporary("map.bin");
         for i in 0..200 {
-            let left = folder.path().join(format!(".map.bin.{}.{i}.tmp", std::process::id()));
-            fs::write(left, b"").unwrap();
+            for left in [format!(".map.bin.{}.{i}.tmp", std::process::id()), format!(".a.portolan-{i}.tmp")] {
+                fs::write(folder.path().join(left), b"").unwrap();
+            }
         }
         write_atomic(&path, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert!(!names(folder.path()).iter().any(|name| name.contains(".portolan-")), "not swept");
         let long = folder.path().join("é".repeat(127));
         write_atomic(&long, |w| w.write_all(b"long")).unwrap();
         assert_eq!(fs::read(&long).unwrap(), b"long");

@@ -7,7 +7,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::{HEADER, LONGEST_CHUNK, LONGEST_NAME, MAGIC, MOST_CHUNKS, VERSION, tag_bytes};
-use crate::{IoError, Result, write_atomic};
+use crate::{IoError, Result, write_durable};
 
 /// zstd's own default: small gains above it, at several times the cost.
 const LEVEL: i32 = 3;
@@ -121,12 +121,12 @@ impl ContainerWriter {
         [&self.header()[..], &self.blocks, &self.entries].concat()
     }
 
-    /// Writes the file.
+    /// Writes the file, and it is on the disk when this returns: what follows from a map can be made again, the map cannot.
     ///
     /// # Errors
-    /// As [`write_atomic`].
+    /// As [`write_durable`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
-        write_atomic(path, |w| {
+        write_durable(path, |w| {
             w.write_all(&self.header())?;
             w.write_all(&self.blocks)?;
             if let Some(mut file) = self.spooled.as_ref() {

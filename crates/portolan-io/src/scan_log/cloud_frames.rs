@@ -7,7 +7,7 @@ use portolan::geom::Pose;
 use portolan::scan::{Frame, OrganisedPoints, Origin, PointScan, orthographic_image};
 
 use super::parts::FrameSource;
-use crate::points::{CloudGrid, PointCloudFile, PointFormat, read_points_as};
+use crate::points::{CloudGrid, PointCloudFile, PointFormat, RefusedPoints, read_points_as};
 use crate::poses3::TimedPoses;
 use crate::{IoError, Result};
 
@@ -39,15 +39,22 @@ impl CloudFrames {
     pub(super) fn new(files: Vec<PathBuf>, format: Option<PointFormat>, rays: Rays) -> Result<Self> {
         // These are never far: they hold nothing but floats.
         let looked_at = if format == Some(PointFormat::KittiBin) { &[][..] } else { &files };
-        let mut base = [0.0; 3];
+        let (mut base, mut damaged, mut read) = ([0.0; 3], None, 0);
         for file in looked_at {
-            let cloud = read_points_as(file, format)?;
-            if !cloud.points.is_empty() {
-                base = cloud.offset;
-                break;
+            match read_points_as(file, format) {
+                Ok(cloud) if !cloud.points.is_empty() => {
+                    (base, damaged) = (cloud.offset, None);
+                    break;
+                }
+                Ok(_) => read += 1,
+                // A scan less: whoever asks for it is told.
+                Err(error) => damaged = damaged.or(Some(error)),
             }
         }
-        Ok(Self { files, format, rays, base })
+        match damaged {
+            Some(error) if read == 0 => Err(error),
+            _ => Ok(Self { files, format, rays, base }),
+        }
     }
 
     /// The same frames without rays.
@@ -74,6 +81,10 @@ pub(crate) fn file_from_frames(base: [f64; 3]) -> Option<Pose<3>> {
 impl FrameSource for CloudFrames {
     fn frame(&self, i: usize) -> Result<Frame> {
         let cloud = about(read_points_as(&self.files[i], self.format)?, self.base, &self.files[i])?;
+        if cloud.points.is_empty() && cloud.refused == RefusedPoints::default() {
+            let advice = "nothing was seen, or nothing was written; the scan is left out";
+            return Err(IoError::layout(&self.files[i], "the number of points", "0", advice));
+        }
         Ok(Frame::Points(match &self.rays {
             Rays::From(origins) => scan_from(cloud, origins[i]),
             Rays::Parallel => range_scan(cloud, &self.files[i])?,

@@ -391,8 +391,13 @@ fn viewpoints(
     if format != PointFormat::Pcd {
         return Ok(missing());
     }
-    let found: Vec<Option<Viewpoint>> = files.iter().map(|f| read_viewpoint(f)).collect::<Result<_, _>>()?;
-    let Some(all) = found.into_iter().collect::<Option<Vec<Viewpoint>>>() else { return Ok(missing()) };
+    let mut found: Vec<Result<Option<Viewpoint>>> = files.iter().map(|f| read_viewpoint(f)).collect();
+    let Some(good) = found.iter().find_map(|read| read.as_ref().ok().copied()) else {
+        return found.pop().map_or_else(|| Ok(missing()), |damaged| damaged.map(|_| missing()));
+    };
+    // A file that cannot be read is a scan less: whoever asks for it is told. Until then it may be anywhere.
+    let found = found.into_iter().map(|read| read.unwrap_or(good));
+    let Some(all) = found.collect::<Option<Vec<Viewpoint>>>() else { return Ok(missing()) };
     let all_equal = all.windows(2).all(|w| w[0] == w[1]);
     if all_equal && (all.len() > 1 || all.first() == Some(&Viewpoint::NONE)) {
         return Ok(missing());
@@ -414,7 +419,7 @@ fn viewpoints(
 fn check_viewpoints(files: &[PathBuf], viewpoints: &[Viewpoint]) -> Result<()> {
     let (mut in_place, mut moved) = (Vec::new(), Vec::new());
     for i in (0..files.len()).step_by(files.len().div_ceil(LOOKED_AT).max(1)) {
-        let cloud = read_points_as(&files[i], None)?;
+        let Ok(cloud) = read_points_as(&files[i], None) else { continue };
         let Some(pose) = viewpoints[i].pose() else { return Ok(()) };
         let (count, position) = (cloud.points.len(), pose.translation);
         in_place.push(Placed::thinned(count, |k| cloud.position(k), position));

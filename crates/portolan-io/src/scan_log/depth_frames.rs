@@ -75,7 +75,9 @@ impl DepthFrames {
     ) -> Result<Self> {
         let units_per_metre = options.depth_scale.unwrap_or(units_per_metre);
         let (mut first_size, mut first_sources) = (None, None);
-        if let Some(first) = frames.first() {
+        // A picture that is damaged is a scan less, also where it is the first.
+        let looked_at = frames.iter().position(|frame| depth_image_size(&frame.depth).is_ok()).unwrap_or(0);
+        if let Some(first) = frames.get(looked_at) {
             if !(units_per_metre > 1e-6 && units_per_metre < 1e9) {
                 let advice = "give the units of a metre: 1000 for millimetres";
                 let value = units_per_metre.to_string();
@@ -94,7 +96,7 @@ impl DepthFrames {
                 camera.check_size(&first.depth, size)?;
             }
         }
-        if let Some(first) = frames.first() {
+        if let Some(first) = frames.get(looked_at) {
             let size = depth_image_size(&first.depth)?;
             first_size = Some(size);
             first_sources = first.lens.sources(size).map(|all| (first.lens, size, all));
@@ -181,7 +183,7 @@ fn why_no_colors(frames: &[DepthFrame], camera: &Camera, options: &ScanLogOption
                 };
             }
             Ok([x, y]) => {
-                let [w, h] = depth_image_size(depth)?;
+                let Ok([w, h]) = depth_image_size(depth) else { continue };
                 let other = [w, h] != [x, y];
                 return Ok(other.then(|| {
                     format!(

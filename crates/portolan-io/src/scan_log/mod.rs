@@ -66,6 +66,7 @@ mod testing;
 pub(crate) use testing::png_of;
 mod transforms;
 mod tum_rgbd;
+mod up;
 mod views;
 
 pub(crate) use cloud_frames::{about, file_from_frames, scan_from};

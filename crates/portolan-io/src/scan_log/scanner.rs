@@ -42,8 +42,16 @@ pub(super) fn open(
     options: &ScanLogOptions,
 ) -> Result<Parts> {
     let (mut places, mut scans, mut poses, mut notes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut damaged = Vec::new();
     for file in files {
-        for (number, scan) in posed_clouds(file, format, LOOKED_AT)?.into_iter().enumerate() {
+        let clouds = match posed_clouds(file, format, LOOKED_AT) {
+            Ok(clouds) => clouds,
+            Err(error) => {
+                damaged.push(error);
+                continue;
+            }
+        };
+        for (number, scan) in clouds.into_iter().enumerate() {
             let base = scan.cloud.offset;
             let stated = scan.origin.filter(|_| options.poses.is_none());
             // A name for a message: of several scans the first is enough.
@@ -73,6 +81,13 @@ pub(super) fn open(
         if format == PointFormat::E57 {
             notes.extend(told(file, &crate::e57_about(file)?));
         }
+    }
+    let (lost, of) = (damaged.len(), files.len());
+    if let Some(first) = damaged.into_iter().next() {
+        if 2 * lost > of {
+            return Err(first);
+        }
+        notes.push(format!("{lost} of {of} files could not be read and are left out (first: {first})"));
     }
     let mut posed_from_sensor = None;
     if options.poses.is_some() {

@@ -30,6 +30,7 @@ from ._portolan import (
     MapFull,
     Mapper,
     Mesh,
+    Movers,
     Occupancy,
     PathCheck,
     Scan,
@@ -55,6 +56,7 @@ __all__ = [
     "MapFull",
     "Mapper",
     "Mesh",
+    "Movers",
     "Occupancy",
     "PathCheck",
     "Scan",
@@ -96,6 +98,8 @@ class BeamKind(_IntEnum):
     DROPPED = 3
     #: The robot that carries the sensor.
     SELF_HIT = 4
+    #: Something that was not there at other times.
+    MOVER = 5
 
 
 def _words(options: "dict[str, _Any]") -> "list[str]":

@@ -166,6 +166,36 @@ class Mapper:
     def _repr_png_(self) -> Optional[bytes]: ...
 
 @final
+class Movers:
+    """What moved, told from what stands still: space that half of the looks found open, with all its neighbors, is no wall.
+
+    Look at all scans first, then split each: `split` gives the scan without the returns of people, doors and chairs, which frees
+    the space up to them, and these returns. Cells have an edge of five times `pose_sigma`, the standard deviation of the error of
+    a pose along a line (meters). `memory`: bytes that the counts may take.
+    """
+
+    def __new__(cls, pose_sigma: float = 0.03, *, memory: Optional[int] = None) -> Movers: ...
+    def look(
+        self,
+        scan: Union[ArrayLike, Scan, None] = None,
+        pose: Optional[ArrayLike] = None,
+        **readings: Any,
+    ) -> None:
+        """Looks at a scan: a `Scan` of a log, points, or `ranges`, `depth` and so on as in `Mapper.integrate`. Raises `ValueError`,
+        `MapFull`.
+        """
+
+    def split(
+        self,
+        scan: Union[ArrayLike, Scan, None] = None,
+        pose: Optional[ArrayLike] = None,
+        **readings: Any,
+    ) -> tuple[Scan, _Floats]:
+        """The scan without what moved, for `Mapper.integrate` and `Ledger.add`, and the points that moved, (N, D) in the world
+        (meters). Nothing moved before a scan was looked at. Raises `ValueError`.
+        """
+
+@final
 class Ledger:
     """Evidence that adds up: sums of whole numbers, and the list of the scans in them.
 
@@ -595,6 +625,8 @@ class Scan:
 
 def load(path: _Path, *, memory: Optional[int] = None) -> Mapper:
     """Reads a `map.portolan`, or the one in a folder, as a mapper that goes on with it. `memory`: bytes that its maps may take.
+    Of a map of sums, the maps that follow from them: what is fused then forgets nothing, and is saved as clamped cells, without the
+    list of scans; `Ledger.load` goes on with the sums.
 
     Raises `OSError`, `ValueError`.
     """
@@ -671,6 +703,7 @@ def marching_cubes(
     *,
     normals: Literal[True] = True,
     values: Literal[True] = True,
+    parallel: Optional[int] = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.float32], NDArray[np.float32]]:
     """The surface at which a volume crosses a level, as triangles: ``(verts, faces, normals, values)``.
 
@@ -693,7 +726,9 @@ def marching_cubes(
 
     Raises ``ValueError`` for what cannot be, and for a level beyond the values; ``RuntimeError`` where there is no surface.
 
-    O(samples), and some 40 to 120 ns a vertex; on all cores (``RAYON_NUM_THREADS``). Some 10 bytes a vertex on the way
+    ``parallel``: threads at most; ``None`` and 0: all (``RAYON_NUM_THREADS``). The result is the same bytes.
+
+    O(samples), and some 40 to 120 ns a vertex and thread. Some 10 bytes a vertex on the way
     beside the result; some 50 where a sample is not finite, or with ``mask``.
     """
 
@@ -707,6 +742,7 @@ def marching_cubes(
     *,
     normals: bool = True,
     values: bool = True,
+    parallel: Optional[int] = None,
 ) -> tuple[
     NDArray[np.float32], NDArray[np.int32], Optional[NDArray[np.float32]], Optional[NDArray[np.float32]]
 ]: ...

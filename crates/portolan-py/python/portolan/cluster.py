@@ -70,6 +70,7 @@ def map(
     ray: "_Any" = False,
     progress: "_Optional[_Callable[[int, int], None]]" = None,
     retries: int = 3,
+    overwrite: bool = False,
     **options: _Any,
 ) -> None:
     """Maps a log in parts, and writes what ``portolan map --ledger`` writes into the folder ``out``.
@@ -80,6 +81,7 @@ def map(
     connected to, else of a local one that is started; a dict: the arguments of ``ray.init``.
     progress: called with the number of tasks done and of all (parts and merges).
     retries: how often Ray starts a task again whose worker was lost; it changes no byte.
+    overwrite: whether a map that is in ``out`` already is replaced; else that is an error, before anything is computed.
 
     Each worker holds its part's map alone, but the last merge holds the whole.
     Raises ``ValueError`` with file, place and value.
@@ -90,7 +92,9 @@ def map(
     for word in ("ledger", "shard", "append", "repose", "out"):
         if word in options:
             raise ValueError(f"{word}: is not an option of parts that are merged")
-    words = [f"--resolution={resolution}", *_words(options)]
+    if not overwrite and _os.path.exists(_os.path.join(out, "map.portolan")):
+        raise ValueError(f"{_os.fspath(out)}: holds a map already; give overwrite=True to replace it, or another folder")
+    words = [f"--resolution={resolution}", *_words(_absolute(options))]
     log = _os.path.abspath(_os.fspath(log))
     engine = _Ray(ray, retries) if ray else _Processes()
     try:
@@ -101,7 +105,17 @@ def map(
         name = _os.path.join(folder, "whole.portolan")
         with open(name, "wb") as file:
             file.write(whole)
-        _portolan.call(["portolan", "merge", "--quiet", name, "--out", _os.fspath(out)])
+        replace = ["--overwrite"] if overwrite else []
+        _portolan.call(["portolan", "merge", "--quiet", name, "--out", _os.fspath(out), *replace])
+
+
+def _absolute(options: "dict[str, _Any]") -> "dict[str, _Any]":
+    """Files among the options by their whole names: workers are elsewhere."""
+    files = ("poses", "intrinsics", "color_intrinsics")
+    return {
+        name: _os.path.abspath(value) if name in files and isinstance(value, (str, _os.PathLike)) and _os.path.exists(value) else value
+        for name, value in options.items()
+    }
 
 
 def _tree(engine: "_Any", log: str, count: int, words: "list[str]", progress: "_Any") -> bytes:

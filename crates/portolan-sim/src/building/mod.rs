@@ -4,6 +4,7 @@
 //! | question | start at |
 //! |---|---|
 //! | scans with poses, in one call | [`building_log`] |
+//! | the same while people walk about, point by point | [`walkers_log`] |
 //! | the world | [`building_world`], [`World3`], [`Body`], [`Shape`] |
 //! | sensors and their noise | [`SpinningLidar`], [`DepthCamera`] |
 
@@ -15,6 +16,7 @@ mod log;
 mod shape;
 mod tree;
 mod walk;
+mod walkers;
 mod world;
 
 pub use camera::{DepthCamera, camera_frame};
@@ -22,4 +24,5 @@ pub use floor_plan::{Building, building_world};
 pub use lidar::{SpinningLidar, lidar_frame, moving_lidar_frame};
 pub use log::{BuildingConfig, BuildingLog, BuildingSensor, building_log, building_poses};
 pub use shape::Shape;
+pub use walkers::{WalkersConfig, WalkersScan, walkers_log};
 pub use world::{Body, CHECKER, DEPTH_TOLERANCE, RayHit3, World3};

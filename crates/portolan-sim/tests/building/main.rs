@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests too")]
 
+mod movers;
+mod sigma;
 mod truth;
 
 use portolan::field::{ClearanceField, Esdf, EsdfSettings, UnknownSpace};

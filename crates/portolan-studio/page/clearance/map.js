@@ -2,10 +2,10 @@
 import { Cells, diverging, step, STEPS, word } from "../canvas2d/cells.js";
 import { colors, rgb } from "../ui/theme.js";
 
-/** @typedef {"euclidean" | "truncated"} Which */
+/** @typedef {"euclidean" | "truncated" | "pessimistic"} Which */
 
 /**
- * Both fields of the map as an image, one of them shown. Cells of which nothing is known are left
+ * The fields of the map as an image, one of them shown. Cells of which nothing is known are left
  * transparent.
  */
 export class FieldImage {
@@ -14,10 +14,14 @@ export class FieldImage {
     this.grid = grid;
     this.cells = new Cells(grid);
     /** @type {Record<Which, Float32Array>} */
-    this.samples = { euclidean: new Float32Array(), truncated: new Float32Array() };
+    this.samples = {
+      euclidean: new Float32Array(),
+      truncated: new Float32Array(),
+      pessimistic: new Float32Array(),
+    };
     /** @type {Which} */
     this.which = "euclidean";
-    /** Distance at the ends of the ramp (metres), the same for both fields. */
+    /** Distance at the ends of the ramp (metres), the same for all fields. */
     this.reach = 1;
   }
 

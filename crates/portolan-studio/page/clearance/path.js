@@ -57,7 +57,10 @@ export class Path {
   /** A waypoint where the probe is. */
   add() {
     const { probe } = this.view.scene;
-    if (probe && this.waypoints.length < MOST) this.#edit(() => this.waypoints.push(probe));
+    if (!probe || this.waypoints.length >= MOST) return;
+    // To the millimetre, as links hold it: a link is about the same path.
+    const [x, y] = probe.map((v) => Math.round(1000 * v) / 1000);
+    this.#edit(() => this.waypoints.push([x, y]));
   }
 
   removeLast() {

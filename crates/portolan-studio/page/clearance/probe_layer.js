@@ -99,7 +99,7 @@ export function drawProbe(g, camera, s) {
       stroked(g, c.ink, 1.25);
       g.setLineDash([]);
     }
-    const gradient = last[s.image?.which ?? "euclidean"].gradient;
+    const gradient = last[s.image?.which === "truncated" ? "truncated" : "euclidean"].gradient;
     if (gradient && Math.hypot(gradient[0], gradient[1]) >= NONE) {
       const length = 44 * Math.min(1, MOST / Math.hypot(gradient[0], gradient[1]));
       g.beginPath();

@@ -1,7 +1,7 @@
 // @ts-check
 import { el } from "../ui/controls.js";
 
-/** @typedef {import("./map.js").Which} Which */
+/** @typedef {import("./shown_panel.js").Field} Which */
 
 /**
  * Rows of the table: id, label, and its text of a field's answer.

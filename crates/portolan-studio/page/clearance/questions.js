@@ -49,7 +49,7 @@ export class Questions {
   rings() {
     const { map, scene, shown } = this.view;
     if (map && scene.visible.rings)
-      this.askRings({ op: "rings", field: shown.field, spacing: shown.spacing });
+      this.askRings({ op: "rings", field: shown.picture, spacing: shown.spacing });
   }
 
   /** Arrows where the canvas shows something, 30 pixels apart. */
@@ -59,7 +59,7 @@ export class Questions {
     if (!map || !scene.visible.arrows || w === 0) return;
     const camera = canvas2d.camera();
     const bounds = [camera.toWorld(0, h), camera.toWorld(w, 0)];
-    this.askArrows({ op: "arrows", field: shown.field, bounds, spacing: roundUp(30 / camera.scale) });
+    this.askArrows({ op: "arrows", field: shown.picture, bounds, spacing: roundUp(30 / camera.scale) });
   }
 
   path() {

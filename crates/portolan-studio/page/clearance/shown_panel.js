@@ -4,6 +4,7 @@ import { pair } from "./pair.js";
 
 /**
  * @typedef {import("./map.js").Which} Which
+ * @typedef {"euclidean" | "truncated"} Field
  * @typedef {"pessimistic" | "optimistic"} Unknown
  */
 
@@ -15,7 +16,7 @@ const RAMP = "background: linear-gradient(90deg, var(--negative), var(--paper), 
 /** What is shown, and how unknown space counts. */
 export class ShownPanel {
   /**
-   * @param {{visible: Record<string, boolean>, field: (which: Which) => void, unknown: () => void, spacing:
+   * @param {{visible: Record<string, boolean>, field: () => void, unknown: () => void, spacing:
    *   () => void, toggled: () => void}} o
    */
   constructor(o) {
@@ -28,7 +29,7 @@ export class ShownPanel {
         ["truncated", "Truncated"],
       ],
       value: "euclidean",
-      onchange: (v) => o.field(/** @type {Which} */ (v)),
+      onchange: o.field,
     });
     this.unknownPair = pair({
       id: "unknown",
@@ -81,7 +82,15 @@ export class ShownPanel {
   }
 
   get field() {
-    return /** @type {Which} */ (this.fieldPair.value);
+    return /** @type {Field} */ (this.fieldPair.value);
+  }
+
+  /**
+   * What the picture has the colors of: of the Euclidean field, what is certified of it, where unknown space
+   * counts as an obstacle. @returns {Which}
+   */
+  get picture() {
+    return this.field === "euclidean" && this.unknown === "pessimistic" ? "pessimistic" : this.field;
   }
 
   get unknown() {
@@ -97,9 +106,14 @@ export class ShownPanel {
     document.getElementById(`clearance-${what}`)?.click();
   }
 
-  /** @param {any} body of a map @param {number} length at the ends of the ramp (metres) */
-  showMap(body, length) {
-    this.reach.textContent = `−${length.toFixed(2)} to ${length.toFixed(2)} m`;
+  /** @param {number} length at the ends of the ramp (metres) */
+  showRamp(length) {
+    const what = { euclidean: "distance", truncated: "distance along beams", pessimistic: "certified" };
+    this.reach.textContent = `${what[this.picture]}: −${length.toFixed(2)} to ${length.toFixed(2)} m`;
+  }
+
+  /** @param {any} body of a map */
+  showMap(body) {
     this.toggles.truth.node.hidden = body.truth === null;
   }
 

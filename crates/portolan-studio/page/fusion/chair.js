@@ -1,5 +1,5 @@
 // @ts-check
-import { el, facts, group } from "../ui/controls.js";
+import { el, facts, group, legend } from "../ui/controls.js";
 import { plot } from "../ui/plot.js";
 
 const HINT =
@@ -39,10 +39,17 @@ export class ChairPanel {
       x: "re-observations of a cell",
       y: "error left",
       height: 150,
-      series: [{ label: "median over cells", color: "chair", width: 2 }],
+      series: [
+        { label: "median over cells", color: "chair", width: 2 },
+        { label: "by the gain alone", color: "truth", dashed: true, width: 1.8 },
+      ],
     });
     this.text = el("p", { class: "note", id: "ghost-note" }, HINT);
-    this.details = el("div", { class: "group", hidden: true }, this.numbers.node, this.curve.node);
+    const lines = legend([
+      { color: "chair", text: "measured" },
+      { color: "truth", text: "predicted by the gain alone", dashed: true },
+    ]);
+    this.details = el("div", { class: "group", hidden: true }, this.numbers.node, this.curve.node, lines);
     const button = el("button", { type: "button", id: "move-chair", onclick: move }, "Move the chair");
     this.node = group(
       "Move the chair",
@@ -78,7 +85,7 @@ export class ChairPanel {
       "ghost-laps": number(ghost.laps),
     });
     const column = (/** @type {number} */ k) => m.curve.map((/** @type {number[]} */ p) => p[k]);
-    this.curve.set([column(0), column(1)]);
+    this.curve.set([column(0), column(1), column(2)]);
     this.text.textContent = m.cells ? PREDICTED : UNPREDICTED;
   }
 

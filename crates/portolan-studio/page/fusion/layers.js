@@ -67,8 +67,17 @@ function chair(g, camera, s) {
   g.setLineDash([]);
   g.lineWidth = 2;
   if (s.truth) {
-    outline(g, camera, s.held ?? s.truth.chair);
-    label(g, camera, s.held ?? s.truth.chair, "chair");
+    const box = s.held ?? s.truth.chair;
+    const why = s.held && s.heldRefused;
+    if (why) g.strokeStyle = colors().bad;
+    if (s.held) {
+      g.fillStyle = why ? colors().bad : colors().good;
+      g.globalAlpha = 0.3;
+      fill(g, camera, box);
+      g.globalAlpha = 1;
+    }
+    outline(g, camera, box);
+    label(g, camera, box, why ? `not here: ${why}` : "chair");
   }
 }
 
@@ -114,6 +123,16 @@ function chosen(g, camera, s) {
 function outline(g, camera, { min, max }) {
   const [x, y] = camera.toScreen(min[0], max[1]);
   g.strokeRect(x, y, (max[0] - min[0]) * camera.scale, (max[1] - min[1]) * camera.scale);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} g
+ * @param {import("../canvas2d/canvas2d.js").Camera} camera
+ * @param {Box} box
+ */
+function fill(g, camera, { min, max }) {
+  const [x, y] = camera.toScreen(min[0], max[1]);
+  g.fillRect(x, y, (max[0] - min[0]) * camera.scale, (max[1] - min[1]) * camera.scale);
 }
 
 /**

@@ -1,5 +1,6 @@
 // @ts-check
 import { choice, el, facts, group, legend, toggle } from "../ui/controls.js";
+import { bytes as inThousands } from "../ui/units.js";
 
 const RAMP =
   "linear-gradient(90deg, var(--negative), transparent, " +
@@ -76,7 +77,7 @@ export class ScanPanel {
       "scan-cells": String(beams.cells),
       "scan-beams": `${beams.hit}, ${beams.max_range}, ${beams.no_return + beams.dropped}`,
       observed: String(observed),
-      "map-bytes": `${(bytes / 1024).toFixed(0)} KiB`,
+      "map-bytes": inThousands(bytes),
       "step-ms": `${(1000 * seconds).toFixed(2)} ms`,
     });
   }

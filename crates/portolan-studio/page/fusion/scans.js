@@ -20,6 +20,8 @@ export class Scans {
     this.most = 1;
     /** Scans that should have been fused by now. */
     this.due = 0;
+    /** Where it stops by itself. */
+    this.until = Infinity;
     const start = () => this.seek(0);
     const back = () => this.seek(this.at - 1);
     const on = () => this.seek(this.at + 1);
@@ -34,6 +36,7 @@ export class Scans {
       step,
       ontoggle: (playing) => {
         this.due = 1;
+        if (!playing) this.until = Infinity;
         ontoggle(playing);
       },
     });
@@ -69,6 +72,12 @@ export class Scans {
     this.player.ask(() => this.seekTo(to));
   }
 
+  /** Plays a lap for who has just come. */
+  arrive() {
+    this.until = this.lap;
+    this.player.arrive();
+  }
+
   /** The end of the lap that scan `scan` is in. @param {number} scan */
   lapEnd(scan) {
     return this.lap * Math.max(1, Math.ceil(scan / this.lap));
@@ -76,10 +85,11 @@ export class Scans {
 
   /** @param {number} seconds @param {number} rate @param {boolean} idle */
   #due(seconds, rate, idle) {
-    if (this.at >= this.most) return null;
+    const end = Math.min(this.most, this.until);
+    if (this.at >= end) return null;
     // What a slow machine is behind is not made up for: a picture would take long.
     this.due = Math.min(this.due + seconds * rate, rate >= FASTEST ? 12 : Math.max(1, rate / 8));
-    const n = idle ? Math.min(Math.floor(this.due), this.most - this.at) : 0;
+    const n = idle ? Math.min(Math.floor(this.due), end - this.at) : 0;
     this.due -= n;
     return n;
   }
@@ -87,6 +97,8 @@ export class Scans {
   /** Shows where the engine is. @param {number} at @param {number} lap @param {number} most */
   show(at, lap, most) {
     [this.at, this.lap, this.most] = [at, lap, most];
+    // The bar is one lap, as the text is.
+    this.scrub.min = String(this.lapEnd(at) - lap);
     this.scrub.max = String(Math.min(most, this.lapEnd(at)));
     this.scrub.value = String(at);
     const inLap = at ? ((at - 1) % lap) + 1 : 0;

@@ -30,6 +30,8 @@ export class Scene {
     this.ghost = undefined;
     /** Where the chair is being dragged to. @type {Box | undefined} */
     this.held = undefined;
+    /** Why it cannot be put there. @type {string | null} */
+    this.heldRefused = null;
     /** The cell that is followed. @type {[number, number] | undefined} */
     this.cell = undefined;
     this.visible = { beams: true, contour: true, truth: true };

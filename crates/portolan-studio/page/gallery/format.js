@@ -1,7 +1,6 @@
 // @ts-check
 
-/** About three digits. @param {number} v */
-const three = (v) => v.toFixed(v >= 100 ? 0 : v >= 10 ? 1 : 2);
+import { three } from "../ui/units.js";
 
 /** A power of ten of bytes. @param {number} power */
 export const bytesOf = (power) =>
@@ -22,10 +21,6 @@ export const timeOf = (power) =>
       : power >= -6
         ? `${10 ** (power + 6)} µs`
         : `${10 ** (power + 9)} ns`;
-
-/** Bytes, in thousands. @param {number} n */
-export const bytes = (n) =>
-  n >= 1e9 ? `${three(n / 1e9)} GB` : n >= 1e6 ? `${three(n / 1e6)} MB` : `${three(n / 1e3)} kB`;
 
 /** Seconds in the unit that suits them. @param {number} s */
 export function time(s) {

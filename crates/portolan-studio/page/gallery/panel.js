@@ -1,7 +1,8 @@
 // @ts-check
 import { Canvas2d } from "../canvas2d/canvas2d.js";
 import { el } from "../ui/controls.js";
-import { bytes, time, times } from "./format.js";
+import { bytes } from "../ui/units.js";
+import { time, times } from "./format.js";
 
 /** Meters of a panel, memory and then times. @type {[string, string][]} */
 const METERS = [

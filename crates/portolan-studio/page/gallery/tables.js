@@ -1,7 +1,8 @@
 // @ts-check
 import { el } from "../ui/controls.js";
 import { plot } from "../ui/plot.js";
-import { bytes, millimetres, time, whole } from "./format.js";
+import { bytes } from "../ui/units.js";
+import { millimetres, time, whole } from "./format.js";
 
 /**
  * A table of texts.

@@ -5,6 +5,7 @@ import { byId } from "./status.js";
 /** @type {[string, string][]} */
 const SHELL_KEYS = [
   ["1 … 5", "the views"],
+  ["Back", "the view before"],
   ["L", "copy a link to what is shown"],
   ["P", "save the view as PNG"],
   ["T", "theme: light, dark, as the system"],
@@ -34,15 +35,14 @@ export function showKeys(keys) {
  */
 export function handleKeys(shell) {
   document.addEventListener("keydown", (event) => {
-    const dialog = /** @type {HTMLDialogElement} */ (byId("keys"));
-    if (dialog.open || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (document.querySelector("dialog[open]") || event.ctrlKey || event.metaKey || event.altKey) return;
     const on = /** @type {HTMLElement} */ (event.target);
     if (on.matches("select, textarea, input:not([type=checkbox]):not([type=range])")) return;
     if (OWN_KEYS[on.tagName]?.includes(event.key)) return;
     const tool = TOOLS[event.key];
     const view = shell.views[Number(event.key) - 1];
     if (tool) byId(tool).click();
-    else if (view) shell.open(view);
+    else if (view) shell.choose(view);
     else if (!shell.shown?.key(event)) return;
     event.preventDefault();
   });

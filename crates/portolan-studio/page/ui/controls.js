@@ -140,8 +140,11 @@ export function legend(items) {
     "ul",
     { class: "legend", "aria-label": "Legend" },
     ...items.map(({ color, text, dashed, ramp }) => {
-      const sign = el("i", { class: ramp ? "ramp" : dashed ? "dashed" : "", "aria-hidden": "true" });
-      if (ramp) sign.style.background = ramp;
+      // What covers an area has a box; a line of its color would not be seen on the panel.
+      const box = color === "unknown" ? `var(--${color})` : undefined;
+      const shape = ramp ? "ramp" : box ? "box" : dashed ? "dashed" : "";
+      const sign = el("i", { class: shape, "aria-hidden": "true" });
+      if (ramp || box) sign.style.background = ramp ?? box ?? "";
       else sign.style.borderTopColor = `var(--${color})`;
       return el("li", {}, sign, text);
     }),

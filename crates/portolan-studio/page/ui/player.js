@@ -65,6 +65,11 @@ export class Player {
     requestAnimationFrame(this.#tick);
   }
 
+  /** Plays for who has just come, but not for who has asked their system for less motion. */
+  arrive() {
+    if (!this.playing && !matchMedia("(prefers-reduced-motion: reduce)").matches) this.toggle();
+  }
+
   pause() {
     if (this.playing) this.toggle();
   }

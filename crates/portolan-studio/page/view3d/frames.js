@@ -13,6 +13,8 @@ export class Frames {
   /** @param {import("./state.js").Core} core */
   constructor(core) {
     this.core = core;
+    /** Most pieces of the mesh that were to come since all were there. */
+    this.largest = 0;
     this.player = new Player({
       id: "3d-",
       label: "Speed",
@@ -82,10 +84,14 @@ export class Frames {
   }
 
   show() {
-    const { at, frames, goal } = this.core.state;
+    const { at, frames, goal, body } = this.core.state;
+    const { pending } = body.mesh;
+    this.largest = pending > 0 ? Math.max(this.largest, pending) : 0;
     this.scrub.max = String(frames);
     if (document.activeElement !== this.scrub || goal === null) this.scrub.value = String(at);
-    this.at.textContent = frames ? `${at} of ${frames}` : "";
+    const drawn = `drawn ${Math.floor(100 * (1 - pending / this.largest))} %`;
+    if (pending > 0) this.at.textContent = frames ? `${at} fused, ${drawn}` : drawn;
+    else this.at.textContent = frames ? `${at} of ${frames}` : "";
   }
 
   /** @param {KeyboardEvent} event @returns {boolean} whether it was one of its keys */

@@ -7,6 +7,8 @@ const NAMES = /** @type {Record<string, string>} */ ({
   height: "Height ",
   color: "Color as it was seen",
   weight: "Weight ",
+  sigma: "Standard deviation of the surface ",
+  passed: "Looks that passed ",
   error: "Distance to the true surface ",
 });
 const LABEL =
@@ -23,15 +25,22 @@ export class Overlay {
     this.ramp = el("i", { class: "swatch", "aria-hidden": "true" });
     this.low = el("span", { id: "3d-low" });
     this.high = el("span", { id: "3d-high" });
+    this.progress = el("div", { id: "3d-recoloring", hidden: true });
     this.slice = el("div", { id: "3d-slice-legend", hidden: true });
     const surface = el("div", {}, this.text, this.low, this.ramp, this.high);
-    this.legend = el("div", { class: "overlay" }, surface, this.slice);
+    this.legend = el("div", { class: "overlay" }, surface, this.progress, this.slice);
     this.cross = el("div", { class: "crosshair", "aria-hidden": "true", hidden: true });
     this.node = el("div", { class: "canvas" }, this.canvas, this.flat, this.legend, this.cross);
     this.canvas.addEventListener("focus", () => {
       this.cross.hidden = !this.canvas.matches(":focus-visible");
     });
     this.canvas.addEventListener("blur", () => (this.cross.hidden = true));
+  }
+
+  /** How far colors of another kind are. @param {string} by @param {number | null} share `null`: they are there */
+  showProgress(by, share) {
+    this.progress.hidden = share === null;
+    this.progress.textContent = share === null ? "" : `Next by ${by}: ${Math.floor(100 * share)} %`;
   }
 
   withoutWebGL() {
@@ -53,6 +62,7 @@ export class Overlay {
     this.ramp.style.background = gradient(stops(by));
     const end = (/** @type {number | null} */ v) => {
       if (v === null) return "";
+      if (by === "sigma") return cm(v);
       if (by === "error") return `${v > 0 ? "+" : "−"}${cm(Math.abs(v))}`;
       return `${by === "height" ? (v + ground).toFixed(2) : v.toFixed(0)}${ramp.unit && ` ${ramp.unit}`}`;
     };

@@ -1,12 +1,15 @@
 // @ts-check
-import { choice, el, facts, group } from "../ui/controls.js";
+import { choice, el, facts, group, toggle } from "../ui/controls.js";
 import { saveAnswer } from "../ui/files.js";
-import { bytes, count, ms } from "./format.js";
+import { bytes } from "../ui/units.js";
+import { count, ms } from "./format.js";
 
 const COLORS = /** @type {[string, string][]} */ ([
   ["height", "height"],
   ["color", "color"],
   ["weight", "weight"],
+  ["sigma", "standard deviation"],
+  ["passed", "looks that passed"],
   ["error", "error"],
 ]);
 
@@ -22,6 +25,7 @@ export class MapPanel {
       ["3d-bytes-occupancy", "Occupancy"],
       ["3d-bytes-esdf", "ESDF"],
       ["3d-bytes-mesh", "Mesh"],
+      ["3d-movers", "Moved, not in the map"],
       ["3d-time", "Fused in"],
       ["3d-time-mesh", "Meshed in"],
     ]);
@@ -42,6 +46,7 @@ export class MapPanel {
       "3d-bytes-occupancy": bytes(body.bytes.occupancy),
       "3d-bytes-esdf": bytes(body.bytes.esdf),
       "3d-bytes-mesh": bytes(body.bytes.mesh),
+      "3d-movers": all.movers ? `${count(all.movers)} returns` : "—",
       "3d-time": `${ms(seconds.tsdf)}${occupancy}`,
       "3d-time-mesh": ms(seconds.mesh),
     });
@@ -54,13 +59,18 @@ export class MapPanel {
 
 /** How the surface is colored. */
 export class SurfacePanel {
-  /** @param {import("./state.js").Core} core @param {() => void} fit shows all of the surface */
-  constructor(core, fit) {
+  /**
+   * @param {import("./state.js").Core} core
+   * @param {{fit: () => void, movers: (shown: boolean) => void}} does shows all of the surface, and what moved
+   */
+  constructor(core, { fit, movers }) {
     this.core = core;
+    this.moved = toggle({ id: "3d-show-movers", label: "Show what moved", value: true, onchange: movers });
+    this.moved.node.hidden = true;
     this.colors = el("div", {});
     this.note = el("p", { class: "note", id: "3d-color-note" });
     const all = el("button", { type: "button", id: "3d-fit", title: "F", onclick: fit }, "See all");
-    this.node = group("Surface", this.colors, this.note, el("div", { class: "row" }, all));
+    this.node = group("Surface", this.colors, this.moved.node, this.note, el("div", { class: "row" }, all));
   }
 
   /** The choices that this log has. */
@@ -76,6 +86,7 @@ export class SurfacePanel {
       onchange: (by) => ((state.color = by), drive()),
     });
     this.colors.replaceChildren(made.node);
+    this.moved.node.hidden = state.all.movers === 0;
     this.note.textContent = refused.map((/** @type {any} */ c) => `No ${c.by}: ${c.refused}.`).join(" ");
   }
 }

@@ -10,6 +10,8 @@ export function stops(by) {
   const c = colors();
   const dark = document.documentElement.dataset.theme === "dark";
   if (by === "error") return [c.negative, dark ? "#d9dbdf" : "#ececea", c.positive];
+  if (by === "sigma" || by === "passed")
+    return dark ? ["#3a3f4a", "#3e8cc2", "#f6fafd"] : ["#dbe9f4", "#3e8cc2", "#123a63"];
   if (by === "weight") return dark ? ["#3a3f4a", "#6d5fb8", "#d7c9ff"] : ["#e9e7f2", "#a58fe6", "#4c2bb8"];
   return ["#3b4f8f", "#2f7f9e", "#4fa98a", "#a8c66c", "#f1d98a"];
 }

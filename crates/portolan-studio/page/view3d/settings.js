@@ -4,6 +4,11 @@ import { cm, numbers } from "./format.js";
 
 const RESOLUTIONS = [0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3];
 const CLAMPS = [1, 2, 4, 8, 16, 32, 64, 128, 256];
+/** @type {[string, string][]} */
+const SENSORS = [
+  ["lidar", "lidar"],
+  ["camera", "depth camera"],
+];
 
 /** How frames are fused. A change begins the run again. */
 export class SettingsPanel {
@@ -41,12 +46,8 @@ export class SettingsPanel {
 
   /** @param {any} settings */
   #sensor({ sensor }) {
-    const options = /** @type {[string, string][]} */ ([
-      ["lidar", "lidar"],
-      ["camera", "depth camera"],
-    ]);
     const onchange = (/** @type {string} */ v) => this.#set({ sensor: v });
-    return choice({ id: "3d-sensor", label: "Sensor", value: sensor, options, onchange }).node;
+    return choice({ id: "3d-sensor", label: "Sensor", value: sensor, options: SENSORS, onchange }).node;
   }
 
   /** @param {any} settings */
@@ -104,20 +105,19 @@ export class SettingsPanel {
     return { settings: values.map((v) => Number(v.toFixed(4))).join(","), sensor: s.sensor };
   }
 
-  /** @param {URLSearchParams} link */
+  /** @param {URLSearchParams} link @returns {boolean} whether it has settings other than there are */
   restore(link) {
     const { state } = this.core;
+    const { fixed, simulated, settings } = state.all;
     const values = numbers(link.get("settings"), 5);
-    if (!values || state.all.fixed) return;
-    const [resolution, truncation, w_max, carve, occupancy] = values;
-    const sensor = link.get("sensor") ?? state.all.settings.sensor;
-    state.settings = {
-      resolution,
-      truncation,
-      w_max,
-      carve: carve !== 0,
-      occupancy: occupancy !== 0,
-      sensor,
-    };
+    const asked = link.get("sensor");
+    if (fixed) return false;
+    const sensor = simulated && asked && SENSORS.some(([id]) => id === asked) ? asked : settings.sensor;
+    const [resolution, truncation, w_max, carve, occupancy] = values ?? [];
+    const said = values && { resolution, truncation, w_max, carve: carve !== 0, occupancy: occupancy !== 0 };
+    const wanted = { ...settings, ...said, sensor };
+    if (JSON.stringify(wanted) === JSON.stringify(settings)) return false;
+    state.settings = wanted;
+    return true;
   }
 }

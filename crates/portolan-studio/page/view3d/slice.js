@@ -187,14 +187,16 @@ export class Slice {
     return q ? { slice: `${q.field},${q.axis},${q.at.toFixed(3)}` } : {};
   }
 
-  /** @param {string | null} text of a link */
+  /** @param {string | null} text of a link @returns {boolean} whether it can be shown */
   restore(text) {
+    if (text === null) return true;
     const [field, axis, place] = (text ?? "").split(",");
     const at = Number(place);
     const known = FIELDS.some(([id]) => id === field) && AXES.some(([id]) => id === axis);
-    if (!known || !Number.isFinite(at)) return;
+    if (!known || !Number.isFinite(at)) return false;
     Object.assign(this, { field, axis: Number(axis), at, due: true });
     this.fields.value = field;
     this.axes.value = axis;
+    return true;
   }
 }

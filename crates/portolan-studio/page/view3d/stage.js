@@ -34,6 +34,11 @@ export class Stage {
       new THREE.BufferGeometry(),
       new THREE.PointsMaterial({ size: 2, sizeAttenuation: false }),
     );
+    /** What moved and is not in the map. */
+    this.movers = new THREE.Points(
+      new THREE.BufferGeometry(),
+      new THREE.PointsMaterial({ size: 3, sizeAttenuation: false }),
+    );
     this.sensor = new THREE.Points(
       new THREE.BufferGeometry(),
       new THREE.PointsMaterial({ size: 9, sizeAttenuation: false }),
@@ -44,7 +49,7 @@ export class Stage {
     );
     this.voxel.renderOrder = 3;
     this.cut.quad.renderOrder = 1;
-    for (const o of [this.way, this.points, this.sensor, this.voxel]) {
+    for (const o of [this.way, this.points, this.movers, this.sensor, this.voxel]) {
       o.frustumCulled = false;
       o.visible = false;
     }
@@ -54,6 +59,7 @@ export class Stage {
       this.cut.frame,
       this.way,
       this.points,
+      this.movers,
       this.sensor,
       this.voxel,
     );
@@ -116,6 +122,18 @@ export class Stage {
     line(this.sensor, sensor ?? []);
   }
 
+  /** @param {Float32Array} points of what moved @param {boolean} shown */
+  setMovers(points, shown) {
+    line(this.movers, points);
+    this.movers.visible = shown;
+  }
+
+  /** @param {boolean} shown */
+  showMovers(shown) {
+    this.movers.visible = shown && this.movers.geometry.drawRange.count > 0;
+    this.draw();
+  }
+
   /** The edges of a voxel. @param {number[] | null} corner @param {number} edge */
   showVoxel(corner, edge) {
     /** @type {number[]} */
@@ -138,6 +156,7 @@ export class Stage {
     const set = (/** @type {any} */ o, /** @type {string} */ name) => o.material.color.setRGB(...raw(name));
     set(this.way, "truth");
     set(this.points, "beam");
+    set(this.movers, "negative");
     set(this.sensor, "robot");
     set(this.voxel, "chair");
     const [r, g, b] = raw("paper");

@@ -8,7 +8,7 @@ import { stops, texels } from "./ramps.js";
  * longer than it.
  */
 export const LARGE = 800_000;
-const MODES = ["height", "color", "weight", "error"];
+const MODES = ["height", "color", "weight", "error", "sigma", "passed"];
 /** Parts of the buffers that lie no further apart than this are sent to the graphics card in one go. */
 const GAP = 4096;
 
@@ -83,6 +83,15 @@ export class Surface {
     this.mesh = new THREE.Mesh(this.geometry, this.material);
     this.mesh.frustumCulled = false;
     this.by = "height";
+    /** What the colors mean that are drawn. @type {any} */
+    this.color = null;
+    /**
+     * Colors of another kind, while they come in: the old ones are drawn until all of the new ones are there.
+     * @type {Uint8Array | null}
+     */
+    this.coming = null;
+    /** Pieces that were still to come when they began to, and now. */
+    this.awaited = [0, 0];
     /** Vertices and indices that there is room for. */
     this.rooms = [0, 0];
     this.position = new Float32Array();
@@ -96,6 +105,13 @@ export class Surface {
     this.rooms = [0, 0];
     this.#allocate(1024, 4096);
     this.geometry.setDrawRange(0, 0);
+    this.coming = null;
+  }
+
+  /** The share of the new colors that is there; `null`: none are awaited. */
+  get recolored() {
+    const [all, left] = this.awaited;
+    return this.coming && all > 0 ? 1 - left / all : null;
   }
 
   /** @param {number} vertices @param {number} indices */
@@ -114,6 +130,11 @@ export class Surface {
       this.position.set(old.position);
       this.normal.set(old.normal);
       this.shade.set(old.shade);
+      if (this.coming) {
+        const longer = new Uint8Array(4 * vertices);
+        longer.set(this.coming);
+        this.coming = longer;
+      }
       this.index.set(old.index);
     }
     const attribute = (
@@ -142,6 +163,7 @@ export class Surface {
     const { holes, runs, positions, normals, shades } = /** @type {any} */ (arrays);
     const pieces = /** @type {Uint16Array} */ (/** @type {any} */ (arrays.indices));
     if (fresh) this.clear();
+    this.#expect(body, fresh);
     if (vertices > this.rooms[0] || indices > this.rooms[1]) {
       // A large mesh comes with its whole size; one that grows gets more room than it needs now.
       const more = (/** @type {number} */ need, /** @type {number} */ has) =>
@@ -163,7 +185,7 @@ export class Surface {
       const [v0, count, t0, triangles, room] = [runs[i], runs[i + 1], runs[i + 2], runs[i + 3], runs[i + 4]];
       this.position.set(positions.subarray(3 * v, 3 * (v + count)), 3 * v0);
       this.normal.set(normals.subarray(4 * v, 4 * (v + count)), 4 * v0);
-      this.shade.set(shades.subarray(4 * v, 4 * (v + count)), 4 * v0);
+      (this.coming ?? this.shade).set(shades.subarray(4 * v, 4 * (v + count)), 4 * v0);
       for (let k = 0; k < triangles; k++) index[t0 + k] = v0 + pieces[t + k];
       index.fill(0, t0 + triangles, t0 + room);
       moved.push([v0, v0 + count]);
@@ -178,10 +200,28 @@ export class Surface {
     }
     for (const [start, end] of together(joined)) this.#touch("index", start, end - start);
     this.geometry.setDrawRange(0, indices);
+    if (this.coming && body.mesh.pending === 0) this.#arrive();
     // Whatever else is drawn meanwhile must not wait for triangles that are still to come.
     this.mesh.visible = body.mesh.pending === 0 || body.mesh.triangles < LARGE;
-    this.#color(body.color);
+    if (!this.coming) this.#color(body.color);
     return fresh || runs.length > 0 || holes.length > 0;
+  }
+
+  /** Colors of another kind than are drawn are kept apart. @param {any} body @param {boolean} fresh */
+  #expect({ color, mesh }, fresh) {
+    if (fresh || this.color === null || (color.by === this.by && !this.coming)) return;
+    if (!this.coming) {
+      this.coming = new Uint8Array(this.shade.length);
+      this.awaited[0] = 0;
+    }
+    this.awaited = [Math.max(this.awaited[0], mesh.pending), mesh.pending];
+  }
+
+  /** All new colors are there. */
+  #arrive() {
+    this.shade.set(/** @type {Uint8Array} */ (this.coming));
+    this.coming = null;
+    this.#touch("shade", 0, this.shade.length);
   }
 
   /** @param {string} name @param {number} start @param {number} count */
@@ -192,7 +232,8 @@ export class Surface {
   }
 
   /** @param {{by: string, ramp: {low: number | null, high: number | null} | null}} color */
-  #color({ by, ramp }) {
+  #color(color) {
+    const { by, ramp } = (this.color = color);
     const { uniforms } = this.material;
     if (by === "height" && ramp && ramp.low !== null && ramp.high !== null)
       uniforms.range.value = [ramp.low, ramp.high];

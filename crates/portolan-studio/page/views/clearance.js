@@ -64,11 +64,11 @@ export class Clearance {
     const { questions, app } = this;
     return new ShownPanel({
       visible: this.scene.visible,
-      field: (which) => this.#showField(which),
+      field: () => this.#showField(),
       unknown: () => {
         questions.probe();
         questions.path();
-        app.changed();
+        this.#showField();
       },
       spacing: () => {
         questions.rings();
@@ -96,17 +96,21 @@ export class Clearance {
     canvas2d.ondrag = (from) => this.path.drag(from);
   }
 
+  #showRamp() {
+    if (this.scene.image) this.shown.showRamp(this.scene.image.reach);
+  }
+
   /** Draws everything anew. */
   drawAll() {
     this.still.changed();
     this.canvas2d.draw();
   }
 
-  /** @param {import("../clearance/map.js").Which} which */
-  #showField(which) {
-    const { scene } = this;
-    scene.image?.show(which);
-    this.probe.mark(which);
+  #showField() {
+    const { scene, shown } = this;
+    scene.image?.show(shown.picture);
+    this.probe.mark(shown.field);
+    this.#showRamp();
     scene.rings = scene.arrows = undefined;
     this.questions.rings();
     this.questions.arrows();
@@ -137,8 +141,9 @@ export class Clearance {
     const before = scene.image?.grid;
     this.map = body;
     const image = new FieldImage(body.grid);
-    image.samples = { euclidean: arrays.euclidean, truncated: arrays.truncated };
-    image.which = shown.field;
+    const { euclidean, truncated, pessimistic } = /** @type {any} */ (arrays);
+    image.samples = { euclidean, truncated, pessimistic };
+    image.which = shown.picture;
     image.reach = Math.max(body.truncation, body.usual_length);
     image.paint();
     scene.image = image;
@@ -147,7 +152,8 @@ export class Clearance {
     if (JSON.stringify(before) !== JSON.stringify(body.grid)) this.canvas2d.setHome(image.box());
     scene.probe ??= body.start ?? undefined;
     this.path.follow();
-    shown.showMap(body, image.reach);
+    shown.showMap(body);
+    this.#showRamp();
     this.meter.show(body.meter);
     const took = `both fields made in ${(1000 * body.seconds).toFixed(0)} ms`;
     this.app.say(`${body.name} after ${body.at} scans: ${took}. Move the pointer, click a path.`);
@@ -210,7 +216,8 @@ export class Clearance {
     if (probe) scene.probe = probe;
     this.probe.mark(shown.field);
     if (!this.map) return;
-    scene.image?.show(shown.field);
+    scene.image?.show(shown.picture);
+    this.#showRamp();
     this.drawAll();
     this.questions.all();
   }
@@ -261,4 +268,12 @@ export class Clearance {
  * @typedef {import("./view.js").Shown} Shown
  * @type {import("./view.js").View}
  */
-export default { id: "clearance", title: "Clearance", mount: (root, app) => new Clearance(root, app) };
+export default {
+  id: "clearance",
+  title: "Clearance",
+  lead:
+    "The {Euclidean field} says at every place how far the nearest obstacle is, within bounds that are {certified}: what a robot " +
+    "must know before it drives there.",
+  in_3d: false,
+  mount: (root, app) => new Clearance(root, app),
+};

@@ -8,6 +8,7 @@ import { ScanPanel, ShownPanel } from "../fusion/panels.js";
 import { middleOf, movedBy, Scene } from "../fusion/scene.js";
 import { Scans } from "../fusion/scans.js";
 import { SettingsPanel } from "../fusion/settings.js";
+import { latest } from "../clearance/latest.js";
 import { el } from "../ui/controls.js";
 import { exportPanel } from "../ui/exports.js";
 import { compose } from "../ui/picture.js";
@@ -84,12 +85,21 @@ export class Fusion {
       const cell = p && scene.field?.cellAt(p);
       this.scan.showCell(cell && scene.field?.at(cell));
     };
+    const fits = latest(
+      (/** @type {[number, number]} */ to) => this.app.engine.ask("fusion", { op: "chair_fits", to }),
+      ({ body }) => {
+        scene.heldRefused = body.refused;
+        canvas2d.draw();
+      },
+      this.app.fail,
+    );
     canvas2d.ondrag = (from) => {
       const box = scene.truth?.chair;
       if (!box || !scene.onChair(from)) return undefined;
       scans.player.pause();
       return (p, done) => {
         scene.held = movedBy(box, [p[0] - from[0], p[1] - from[1]]);
+        fits(middleOf(scene.held));
         canvas2d.draw();
         if (done) this.#moveChair(middleOf(scene.held));
       };
@@ -218,6 +228,7 @@ export class Fusion {
       await this.ask({ op: "open" });
       this.takeIn();
       await restore(this, link);
+      if (link.has("play")) this.scans.arrive();
     }
     this.canvas2d.draw();
   }
@@ -264,4 +275,12 @@ export class Fusion {
  * @typedef {import("./view.js").Shown} Shown
  * @type {import("./view.js").View}
  */
-export default { id: "fusion", title: "Fusion", mount: (root, app) => new Fusion(root, app) };
+export default {
+  id: "fusion",
+  title: "Fusion",
+  lead:
+    "A robot fuses its range scans one by one into {signed distance|signed distances}, blue in front of walls and orange " +
+    "behind them; every cell runs a {filter} that you can look into, so that you see why a map believes what it believes.",
+  in_3d: false,
+  mount: (root, app) => new Fusion(root, app),
+};

@@ -205,4 +205,12 @@ export class Gallery {
  * @typedef {import("./view.js").Shown} Shown
  * @type {import("./view.js").View}
  */
-export default { id: "gallery", title: "Gallery", mount: (root, app) => new Gallery(root, app) };
+export default {
+  id: "gallery",
+  lead:
+    "The same scans in six {representation|representations}, each with what it weighs and what its answers cost: none is best at " +
+    "everything, and here you see which is best at what you need.",
+  in_3d: false,
+  title: "Gallery",
+  mount: (root, app) => new Gallery(root, app),
+};

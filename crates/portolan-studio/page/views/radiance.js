@@ -241,4 +241,11 @@ export class Radiance {
  * @typedef {import("./view.js").Shown} Shown
  * @type {import("./view.js").View}
  */
-export default { id: "radiance", title: "Radiance", mount: (root, app) => new Radiance(root, app) };
+export default {
+  id: "radiance",
+  title: "Radiance",
+  lead:
+    "Seven rays of light are all that is known of a line; {gradient descent} fits a {density field} to them, and you see why it may " +
+    "settle on a wrong one.",
+  mount: (root, app) => new Radiance(root, app),
+};

@@ -11,6 +11,8 @@
  * @property {string} id also in the address
  * @property {string} [formerly] what older links call it
  * @property {string} title on its tab
+ * @property {string} lead the sentence above its picture, with `{terms}` that explain themselves
+ * @property {boolean} [in_3d] which scans it shows; left out: none
  * @property {(root: HTMLElement, app: App) => Shown} mount fills `root`, a section that is not on the page
  *   yet
  *
@@ -32,6 +34,8 @@
  * @property {import("../ui/meter.js").Meter} meter measures the work per picture
  * @property {(text: string) => void} say in the status line
  * @property {(error: unknown) => void} fail in the status line, in red
+ * @property {import("../shell/start.js").About} about what the studio was given
+ * @property {(what: string) => void} strange says what of a link cannot be shown
  * @property {() => void} changed call it when `state` has changed: the address follows
  */
 

@@ -49,7 +49,10 @@ class View3d {
     this.core = core;
     this.frames = new Frames(core);
     this.map = new MapPanel();
-    this.surface = new SurfacePanel(core, () => this.#fit());
+    this.surface = new SurfacePanel(core, {
+      fit: () => this.#fit(),
+      movers: (shown) => this.stage?.showMovers(shown),
+    });
     this.slice = new Slice(core, this.overlay);
     this.voxel = new Voxel(core, this.slice);
     this.settings = new SettingsPanel(core);
@@ -60,8 +63,15 @@ class View3d {
     this.drawn = 0;
     this.keys = KEYS;
     voxel.listen(this.overlay.canvas);
-    // For measurements: `document.getElementById("3d-canvas").load`.
-    Object.assign(this.overlay.canvas, { load: this.loop.load, info: () => this.stage?.renderer.info });
+    // For measurements and tests: `document.getElementById("3d-canvas").load`.
+    Object.assign(this.overlay.canvas, {
+      load: this.loop.load,
+      info: () => this.stage?.renderer.info,
+      up: () => this.stage?.eye.up.toArray(),
+      coloredBy: () => this.stage?.surface.by,
+      shadeOf: (/** @type {number} */ vertex) => this.stage?.surface.shade[4 * vertex],
+      movers: () => (this.stage?.movers.visible ? this.stage.movers.geometry.drawRange.count : 0),
+    });
     const panels = [this.map, this.surface, slice, voxel.inspector, this.settings, this.files];
     root.append(
       el("div", { class: "field" }, this.overlay.node, frames.node),
@@ -89,15 +99,25 @@ class View3d {
     const body = answer.body;
     state.body = body;
     if (body.all) this.#takeAll(body.all);
+    const movers = /** @type {Float32Array} */ (answer.arrays.movers);
+    if (movers.length > 0) stage?.setMovers(movers, this.surface.moved.value);
     const news = stage?.surface.apply(answer) ?? false;
     stage?.showScan(/** @type {Float32Array} */ (answer.arrays.points), body.pose);
     if (stage?.eye.fitted && body.surface && String(before?.surface) !== String(body.surface))
       stage.eye.fit(body.surface);
     this.frames.show();
     this.map.show(state);
-    this.overlay.showColor(body.color, state.all.height);
+    this.#showColor();
     this.voxel.take(body);
     this.#draw(news || !before);
+  }
+
+  /** What the colors mean that are drawn, not those that are still to come. */
+  #showColor() {
+    const { stage, overlay } = this;
+    const { body, all } = this.state3d;
+    overlay.showColor(stage?.surface.color ?? body.color, all.height);
+    overlay.showProgress(body.color.by, stage?.surface.recolored ?? null);
   }
 
   /** @param {any} all */
@@ -141,17 +161,17 @@ class View3d {
     const { state3d: state, app } = this;
     state.visible = true;
     const first = !state.all;
-    this.slice.restore(link.get("slice"));
+    if (!this.slice.restore(link.get("slice"))) app.strange(`a slice “${link.get("slice")}”`);
     const eye = numbers(link.get("eye"), 6);
     if (eye) this.stage?.eye.set(eye);
     this.voxel.restore(link.get("voxel"));
-    if (first) await this.#open(link);
+    if (first) await this.#open();
+    // Settings come first: by them it is decided what colors there are.
+    if (this.settings.restore(link)) await this.#set();
     const frame = link.has("frame") ? Number(link.get("frame")) : NaN;
     if (Number.isInteger(frame)) state.seek(frame);
     else if (first && state.frames > 0 && !this.frames.player.playing) this.frames.player.toggle();
-    const color = link.get("color");
-    // A link may come from another log, whose surface can be colored in other ways.
-    if (state.all.colors.some((/** @type {any} */ c) => c.by === color && !c.refused)) state.color = color;
+    this.#restoreColor(link.get("color"));
     if (first) {
       const { all, frames } = state;
       app.say(all.fixed ? `${all.name}: a map read from a file.` : `${all.name}: ${frames} frames.`);
@@ -160,12 +180,25 @@ class View3d {
     this.stage?.draw();
   }
 
-  /** @param {URLSearchParams} link */
-  async #open(link) {
+  async #open() {
     this.loop.load.started = performance.now();
     const answer = await this.core.ask({ op: "open" });
     this.app.meter.measure(() => this.#take(answer));
-    this.settings.restore(link);
+  }
+
+  async #set() {
+    const { settings } = this.state3d;
+    this.state3d.settings = null;
+    const answer = await this.core.ask({ op: "set", settings });
+    this.app.meter.measure(() => this.#take(answer));
+  }
+
+  /** A link may come from another log, whose surface can be colored in other ways. @param {string | null} color */
+  #restoreColor(color) {
+    if (color === null) return;
+    const known = this.state3d.all.colors.find((/** @type {any} */ c) => c.by === color);
+    if (known && !known.refused) this.state3d.color = color;
+    else this.app.strange(`colors by “${color}”${known ? `, as ${known.refused}` : ""}`);
   }
 
   hide() {
@@ -210,9 +243,8 @@ class View3d {
   redraw() {
     this.stage?.redraw();
     this.voxel.inspector.plot.redraw();
-    const { body, all } = this.state3d;
-    if (!body) return;
-    this.overlay.showColor(body.color, all.height);
+    if (!this.state3d.body) return;
+    this.#showColor();
     this.slice.redraw();
     this.stage?.draw();
   }
@@ -223,4 +255,11 @@ class View3d {
  * @typedef {import("./view.js").Shown} Shown
  * @type {import("./view.js").View}
  */
-export default { id: "3d", formerly: "space", title: "3-D", mount: (root, app) => new View3d(root, app) };
+export default {
+  id: "3d",
+  formerly: "space",
+  title: "3-D",
+  lead: "Scans become a {mesh}, {brick} by brick; click the surface, and you see what one {voxel} has observed and how sure it is.",
+  in_3d: true,
+  mount: (root, app) => new View3d(root, app),
+};

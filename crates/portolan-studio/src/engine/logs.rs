@@ -1,8 +1,9 @@
 //! What the studio shows: a 2-D log and a 3-D log or map, recorded or simulated.
 
 use portolan::geom::Pose;
-use portolan::map::Tsdf3;
+use portolan::map::{Attenuation, Tsdf3};
 use portolan::scan::{FrameFilter, Scan};
+use portolan::uncertainty::SurfaceSigma;
 use portolan_io::scan_log::ScanLog;
 
 /// The two logs that every session looks at. They never change.
@@ -41,6 +42,8 @@ pub enum Source3d {
         log: Box<ScanLog>,
         /// Which readings are used.
         filter: FrameFilter,
+        /// Unit vector upward in its world.
+        up: [f64; 3],
     },
     /// A map that was made before: nothing is left to fuse, all can be looked at.
     Map {
@@ -48,5 +51,32 @@ pub enum Source3d {
         name: String,
         /// Every session has a snapshot of it.
         tsdf: Box<Tsdf3>,
+        /// Unit vector upward in its world.
+        up: [f64; 3],
+        /// What its run found out beside it.
+        beside: Box<BesideMap>,
     },
+}
+
+/// What is known of a map beside its cells.
+#[derive(Default)]
+pub struct BesideMap {
+    /// How sure its surface is.
+    pub sigma: Option<SurfaceSigma>,
+    /// Returns of what moved, which are not in it (world, meters).
+    pub movers: Vec<[f64; 3]>,
+    /// Which share of the looks its cells stop.
+    pub attenuation: Option<Attenuation<3>>,
+}
+
+impl Logs {
+    /// The name of what was given, and whether it is in 3-D; `None`: all is simulated.
+    pub(super) fn given(&self) -> Option<(&str, bool)> {
+        match (&self.source_2d, &self.source_3d) {
+            (_, Source3d::Recorded { log, .. }) => Some((log.name(), true)),
+            (_, Source3d::Map { name, .. }) => Some((name, true)),
+            (Source2d::Recorded { name, .. }, _) => Some((name, false)),
+            (Source2d::Apartment, Source3d::Building) => None,
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! What answers the page: one [`Session`] per tab, a view of it per folder.
 
+mod about;
 mod clearance;
 mod clock;
 mod exports;
@@ -13,6 +14,6 @@ mod session;
 mod view3d;
 
 pub use clock::Clock;
-pub use logs::{Logs, Source2d, Source3d};
+pub use logs::{BesideMap, Logs, Source2d, Source3d};
 pub use protocol::{Array, Refusal, Reply, Values, Wire};
 pub use session::{Limits, Session, check};

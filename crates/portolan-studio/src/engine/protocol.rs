@@ -32,6 +32,8 @@ pub(super) struct Message {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum View {
+    /// The studio itself.
+    Studio,
     Fusion,
     Gallery,
     Clearance,

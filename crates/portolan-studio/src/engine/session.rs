@@ -8,7 +8,7 @@ use super::gallery::Gallery;
 use super::protocol::{Message, Refusal, Reply, View, Wire, encode};
 use super::radiance::Radiance;
 use super::view3d::View3d;
-use super::{Clock, Logs};
+use super::{Clock, Logs, about};
 
 /// What one session may take.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +35,7 @@ pub fn check(logs: &Arc<Logs>, limits: Limits) -> Result<(), Refusal> {
 /// The maps of one tab of the browser and what the page has of them. Dropping it frees them.
 pub struct Session {
     limits: Limits,
+    logs: Arc<Logs>,
     fusion: Fusion,
     gallery: Gallery,
     clearance: Clearance,
@@ -47,6 +48,7 @@ impl Session {
     pub fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
         Self {
             limits,
+            logs: logs.clone(),
             fusion: Fusion::new(logs, limits, clock),
             gallery: Gallery::new(limits, clock),
             clearance: Clearance::new(limits, clock),
@@ -66,6 +68,7 @@ impl Session {
     fn dispatch(&mut self, message: &Message) -> Result<Reply, Refusal> {
         let ask = message.ask.get();
         let reply = match message.view {
+            View::Studio => about::answer(&serde_json::from_str(ask)?, &self.logs),
             View::Fusion => self.fusion.ask(serde_json::from_str(ask)?),
             View::Gallery => self.gallery.ask(serde_json::from_str(ask)?, &mut self.fusion),
             View::Clearance => self.clearance.ask(serde_json::from_str(ask)?, &mut self.fusion),
@@ -96,6 +99,7 @@ impl Session {
 
     fn forget(&mut self, view: View) {
         match view {
+            View::Studio => {}
             View::Fusion => self.fusion.forget(),
             View::Gallery => self.gallery.forget(),
             View::Clearance => self.clearance.forget(),

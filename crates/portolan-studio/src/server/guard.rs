@@ -21,6 +21,9 @@ pub(super) async fn check(State(shared): State<Shared>, request: Request, next: 
     if let Err(why) = allowed(request.headers(), shared.address.ip(), shared.address.port()) {
         return (StatusCode::FORBIDDEN, why).into_response();
     }
+    if let Some(refusal) = shared.token.as_ref().and_then(|token| token.refusal(&request)) {
+        return refusal;
+    }
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     let mut set = |name, value| headers.insert(name, HeaderValue::from_static(value));
@@ -39,7 +42,8 @@ fn allowed(headers: &HeaderMap, ip: IpAddr, port: u16) -> Result<(), &'static st
     }
     match headers.get(header::ORIGIN).map(|o| o.to_str().ok().and_then(|o| o.strip_prefix("http://"))) {
         None => Ok(()),
-        Some(Some(origin)) if names_this_machine(origin, ip, port) => Ok(()),
+        // The page that was asked for under this very name: another server of this machine may be a stranger's.
+        Some(Some(origin)) if origin.eq_ignore_ascii_case(host) => Ok(()),
         Some(_) => Err("pages of other sites may not drive the studio\n"),
     }
 }
@@ -84,7 +88,10 @@ mod tests {
     fn only_this_machines_names_and_pages() {
         assert!(ask("127.0.0.1:7700", None));
         assert!(ask("localhost:7700", Some("http://localhost:7700")));
-        assert!(ask("[::1]:7700", Some("http://127.0.0.1:7700")));
+        assert!(ask("[::1]:7700", Some("http://[::1]:7700")));
+        assert!(ask("Localhost:7700", Some("http://localhost:7700")));
+        assert!(!ask("[::1]:7700", Some("http://127.0.0.1:7700")));
+        assert!(!ask("localhost:7700", Some("http://127.0.0.1:7700")));
         for host in
             ["evil.example:7700", "127.0.0.1:80", "127.0.0.1", "localhost.evil.example:7700", "10.0.0.1:7700"]
         {
@@ -102,5 +109,12 @@ mod tests {
         let everywhere: IpAddr = Ipv4Addr::UNSPECIFIED.into();
         assert!(names_this_machine("192.168.1.4:7700", everywhere, 7700));
         assert!(!names_this_machine("evil.example:7700", everywhere, 7700));
+        // A page at another address, be it one of ours, is another site.
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, "192.168.1.4:7700".parse().unwrap());
+        for (origin, fits) in [("http://192.168.1.4:7700", true), ("http://6.6.6.6:7700", false)] {
+            headers.insert(header::ORIGIN, origin.parse().unwrap());
+            assert_eq!(allowed(&headers, everywhere, 7700).is_ok(), fits, "{origin}");
+        }
     }
 }

@@ -3,17 +3,19 @@
 //! | what a hostile or broken peer does | what happens |
 //! |---|---|
 //! | another web page sends its visitors here | refused: `Host` and `Origin` are checked (`guard.rs`) |
+//! | another machine asks, where it can | refused, unless it has the token of the printed address (`token.rs`) |
 //! | a message is no JSON, of no view, of impossible values, or too long | an error in words, or the socket is closed |
 //! | too many tabs | refused with a reason, the others go on |
 //! | a tab asks for too large maps | refused before they are made |
 //! | a tab is closed | its session is dropped; where it is at work, when that is done |
-//! | a peer opens connections and sends nothing, or half of a request | they are closed after a while, and are not many at a time |
+//! | a peer opens connections and sends nothing, or half of a request | they are closed after a while, or when there are many and another one comes |
 //! | a peer opens a session and is gone, or reads no answers | it is asked, and its session is dropped |
 
 mod assets;
 mod connections;
 mod guard;
 mod socket;
+mod token;
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -26,6 +28,7 @@ use axum::middleware::from_fn_with_state;
 use axum::routing::get;
 use tokio::sync::Semaphore;
 
+use self::token::Token;
 use crate::engine::{Clock, Limits, Logs};
 
 /// How the studio is served.
@@ -41,10 +44,12 @@ pub struct Settings {
     pub limits: Limits,
     /// How long a peer may keep the server waiting.
     pub patience: Duration,
+    /// Whether the address has a random token without which nobody is let in. So it is always where other machines can ask.
+    pub token: bool,
 }
 
 impl Default for Settings {
-    /// 127.0.0.1, any port, eight sessions, half a minute.
+    /// 127.0.0.1, any port, eight sessions, half a minute, no token.
     fn default() -> Self {
         Self {
             address: Ipv4Addr::LOCALHOST.into(),
@@ -52,6 +57,7 @@ impl Default for Settings {
             sessions: 8,
             limits: Limits::default(),
             patience: Duration::from_secs(30),
+            token: false,
         }
     }
 }
@@ -66,6 +72,7 @@ struct Shared {
     seats: Arc<Semaphore>,
     held: Arc<AtomicUsize>,
     address: SocketAddr,
+    token: Option<Arc<Token>>,
 }
 
 /// A studio that listens.
@@ -74,6 +81,7 @@ pub struct Server {
     address: SocketAddr,
     seats: (Arc<Semaphore>, usize),
     held: Arc<AtomicUsize>,
+    token: Option<Arc<Token>>,
 }
 
 impl Server {
@@ -89,6 +97,8 @@ impl Server {
         let started = Instant::now();
         let seats = Arc::new(Semaphore::new(settings.sessions));
         let held = Arc::new(AtomicUsize::new(0));
+        let wants_token = settings.token || !address.ip().is_loopback();
+        let token = wants_token.then(|| Arc::new(Token::random(address.port())));
         let shared = Shared {
             logs: logs.into(),
             limits: settings.limits,
@@ -97,6 +107,7 @@ impl Server {
             seats: seats.clone(),
             held: held.clone(),
             address,
+            token: token.clone(),
         };
         let app = Router::new()
             .route("/engine", get(socket::open))
@@ -108,14 +119,15 @@ impl Server {
             tokio::net::TcpListener::from_std(listener)?
         };
         runtime.spawn(connections::accept(listener, app, settings.patience));
-        Ok(Self { runtime, address, seats: (seats, settings.sessions), held })
+        Ok(Self { runtime, address, seats: (seats, settings.sessions), held, token })
     }
 
-    /// Where the page is.
+    /// Where the page is, with the token, where there is one.
     pub fn url(&self) -> String {
         let ip = self.address.ip();
         let host = if ip.is_unspecified() { Ipv4Addr::LOCALHOST.into() } else { ip };
-        format!("http://{}/", SocketAddr::new(host, self.address.port()))
+        let query = self.token.as_ref().map(|token| token.query()).unwrap_or_default();
+        format!("http://{}/{query}", SocketAddr::new(host, self.address.port()))
     }
 
     /// Where it listens.
@@ -139,8 +151,12 @@ impl Server {
     /// Where interruptions cannot be listened for.
     pub fn wait(self) -> io::Result<()> {
         let interrupted = self.runtime.block_on(tokio::signal::ctrl_c());
-        // Work of the sessions that is under way is dropped.
-        self.runtime.shutdown_background();
+        self.close();
         interrupted
+    }
+
+    /// Stops serving. Work of the sessions that is under way is dropped.
+    pub fn close(self) {
+        self.runtime.shutdown_background();
     }
 }

@@ -107,6 +107,17 @@
     return bad;
   },
 
+  /** Numbers that stick out of their panel, or have no room in their place. */
+  clipped() {
+    const bad = [];
+    for (const node of document.querySelectorAll(".panel output, .panel dt, .panel h2, .facts dd")) {
+      if (!node.checkVisibility() || !node.textContent.trim()) continue;
+      const [inner, outer] = [node, node.closest(".panel, .side")].map((e) => e.getBoundingClientRect());
+      if (inner.right > outer.right + 0.5 || inner.left < outer.left - 0.5 || node.scrollWidth > node.clientWidth + 1) bad.push(`#${node.id || node.closest("[id]")?.id}: ${node.textContent}`);
+    }
+    return bad;
+  },
+
   /** Whether something is wider than the page. */
   overflow() {
     const { scrollWidth, clientWidth } = document.documentElement;

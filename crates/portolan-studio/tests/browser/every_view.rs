@@ -9,12 +9,14 @@ use serde_json::{Value, json};
 
 use super::{Page, Screen, Studio};
 
-/// What a laptop and half of its screen show, by day and by night.
-const SCREENS: [Screen; 4] = [
+/// What a laptop, half of its screen and a phone show, by day and by night.
+const SCREENS: [Screen; 6] = [
     Screen::LIGHT,
     Screen::DARK,
     Screen { size: [800, 900], ..Screen::LIGHT },
     Screen { size: [800, 900], ..Screen::DARK },
+    Screen { size: [390, 844], ..Screen::LIGHT },
+    Screen { size: [1000, 700], ..Screen::DARK },
 ];
 
 fn audit(page: &Page, what: &str) -> Value {
@@ -29,13 +31,14 @@ fn complaints(page: &Page, what: &str) -> Vec<String> {
 fn opens_without_errors_and_can_be_read_on_every_screen() {
     let Some(studio) = Studio::start() else { return };
     for screen in SCREENS {
-        let page = studio.open_on("", screen);
+        let page = studio.open_on("view=fusion", screen);
         for view in page.views() {
             let at = format!("{view} on {}", screen.name());
             page.show(&view);
             assert_eq!(complaints(&page, "contrast"), [""; 0], "text of {at} has too little contrast");
             assert_eq!(complaints(&page, "nameless"), [""; 0], "{at} has controls without a name");
             assert_eq!(audit(&page, "overflow"), 0, "{at} is wider than the screen");
+            assert_eq!(complaints(&page, "clipped"), [""; 0], "{at} has no room for its numbers");
             page.screenshot(&format!("{view}-{}", screen.name()));
         }
         page.assert_no_errors();
@@ -67,7 +70,7 @@ fn follows_the_systems_theme_and_the_button() {
 #[test]
 fn number_keys_and_arrows_switch_views() {
     let Some(studio) = Studio::start() else { return };
-    let page = studio.open("");
+    let page = studio.open("view=fusion");
     let views = page.views();
     for (i, view) in views.iter().enumerate() {
         page.press(&(i + 1).to_string());
@@ -90,7 +93,7 @@ fn number_keys_and_arrows_switch_views() {
 #[test]
 fn the_keyboard_reaches_every_control_and_gets_away_again() {
     let Some(studio) = Studio::start() else { return };
-    let page = studio.open("");
+    let page = studio.open("view=fusion");
     for view in page.views() {
         page.show(&view);
         page.eval("document.activeElement?.blur()");
@@ -122,7 +125,7 @@ fn the_keyboard_reaches_every_control_and_gets_away_again() {
 fn canvases_stay_sharp() {
     let Some(studio) = Studio::start() else { return };
     for ratio in [1.0, 1.5, 2.0] {
-        let page = studio.open_on("", Screen { ratio, ..Screen::LIGHT });
+        let page = studio.open_on("view=fusion", Screen { ratio, ..Screen::LIGHT });
         for view in page.views() {
             page.show(&view);
             for size in [[1440, 900], [1000, 700], [700, 900], [1440, 900]] {

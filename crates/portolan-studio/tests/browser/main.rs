@@ -10,7 +10,10 @@ mod fusion;
 mod gallery;
 mod keys;
 mod page;
+mod pictures;
 mod radiance;
+mod start;
+mod true_pictures;
 mod view3d;
 
 use portolan_studio::engine::Logs;

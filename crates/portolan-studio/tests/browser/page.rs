@@ -73,8 +73,8 @@ const BEFORE: &str = r#"
 }
 "#;
 
-/// The page has shown its first view: the status line says what there is, or what is wrong.
-const READY: &str = r#"document.querySelector("[role=tab][aria-selected=true]") && !document.getElementById("status").textContent.startsWith("Connecting")"#;
+/// The page has shown its first view, or says that it cannot: the status line says what there is, or what is wrong.
+const READY: &str = r#"document.querySelector("[role=tab][aria-selected=true], .alone") && !document.getElementById("status").textContent.startsWith("Connecting")"#;
 
 impl Page {
     /// Opens what comes after the `#` of the studio's address, and waits until it is shown.
@@ -328,7 +328,8 @@ impl Page {
     /// The content of a file that the page saves, when it is there.
     pub(crate) fn wait_saved(&self, path: &Path) -> Vec<u8> {
         let start = Instant::now();
-        while !path.is_file() {
+        // The browser holds the name with an empty file until what it fetched takes its place.
+        while std::fs::metadata(path).map_or(0, |file| file.len()) == 0 {
             assert!(start.elapsed() < SOON, "{} was never saved; {:#?}", path.display(), self.errors());
             std::thread::sleep(Duration::from_millis(30));
         }

@@ -4,7 +4,8 @@ use portolan::cell::DistanceBrick;
 use portolan::geom::{BlockKey, Lattice};
 use portolan::map::{Tsdf3, TsdfConfig};
 use portolan::store::Bricks;
-use portolan_studio::engine::{Logs, Source3d};
+use portolan::uncertainty::SurfaceSigma;
+use portolan_studio::engine::{BesideMap, Logs, Source3d};
 use portolan_studio::server::Settings;
 use serde_json::{Value, json};
 
@@ -119,12 +120,11 @@ fn a_link_shows_the_same_and_files_can_be_taken_away() {
     strange.assert_no_errors();
 }
 
-/// A surface that fills a cube, of four million triangles.
-fn gyroid() -> Tsdf3 {
-    const CELLS: i32 = 184;
+/// A surface that fills a cube of so many cells along each side; of 184, it is of four million triangles.
+pub(super) fn gyroid(cells: i32) -> Tsdf3 {
     const PERIOD: f64 = 16.0;
     let mut store = Bricks::new(Lattice::new([0.0; 3], 0.05));
-    let bricks = CELLS / 8;
+    let bricks = cells / 8;
     for i in 0..bricks * bricks * bricks {
         let key = BlockKey([i % bricks, i / bricks % bricks, i / bricks / bricks]);
         let value = |i: usize| {
@@ -138,8 +138,48 @@ fn gyroid() -> Tsdf3 {
 }
 
 #[test]
+fn what_moved_and_how_sure_the_surface_is_are_shown() {
+    let beside = BesideMap {
+        sigma: SurfaceSigma::through([[1.0, 0.02], [100.0, 0.002]]),
+        movers: (0..500).map(|i| [0.01 * f64::from(i), 0.5, 0.5]).collect(),
+        ..BesideMap::default()
+    };
+    let source_3d = Source3d::Map {
+        name: "a gyroid".into(),
+        tsdf: Box::new(gyroid(48)),
+        up: [0.0, 0.0, 1.0],
+        beside: Box::new(beside),
+    };
+    let Some(studio) = Studio::with(Logs { source_3d, ..Logs::default() }, &Settings::default()) else {
+        return;
+    };
+    let page = studio.open("view=3d");
+    page.wait_for("document.getElementById('3d-canvas').dataset.pending === '0'");
+    page.wait_text("3d-movers", "500 returns");
+    assert_eq!(page.eval("document.getElementById('3d-canvas').movers()"), 500);
+    page.choose("3d-color", "sigma");
+    page.wait_for("document.getElementById('3d-canvas').coloredBy() === 'sigma'");
+    page.wait_text("3d-legend", "Standard deviation");
+    assert_eq!([page.text("3d-low"), page.text("3d-high")], ["0.2 cm", "2 cm"]);
+    // Weights of 4 are between the ends, nearer to the upper one.
+    let shade = page.eval("document.getElementById('3d-canvas').shadeOf(0)");
+    let shade = shade.as_u64().unwrap();
+    assert!((150..220).contains(&shade), "{shade}");
+    page.rest();
+    page.screenshot("3d-sigma");
+    page.click("3d-show-movers");
+    page.wait_for("document.getElementById('3d-canvas').movers() === 0");
+    page.assert_no_errors();
+}
+
+#[test]
 fn millions_of_triangles_are_one_draw_call() {
-    let source_3d = Source3d::Map { name: "a gyroid".into(), tsdf: Box::new(gyroid()) };
+    let source_3d = Source3d::Map {
+        name: "a gyroid".into(),
+        tsdf: Box::new(gyroid(184)),
+        up: [0.0, 0.0, 1.0],
+        beside: Box::default(),
+    };
     let Some(studio) = Studio::with(Logs { source_3d, ..Logs::default() }, &Settings::default()) else {
         return;
     };

@@ -63,6 +63,46 @@ fn refuses_other_names_and_other_sites() {
 }
 
 #[test]
+fn with_a_token_nobody_gets_in_without_it() {
+    let server = serve(&Settings { token: true, ..Settings::default() });
+    let host = server.address().to_string();
+    let url = server.url();
+    let query = url.strip_prefix(&format!("http://{host}/")).unwrap();
+    assert_eq!(query.len(), "?token=".len() + 32, "{query}");
+    let wrong = query.replace(&query[7..8], if &query[7..8] == "0" { "1" } else { "0" });
+    for path in ["/", "/main.js", &format!("/{wrong}"), &format!("/main.js{query}"), "/?token="] {
+        let answer = get(&server, path, &host, "");
+        assert!(answer.starts_with("HTTP/1.1 403") && answer.contains("token"), "{path}: {answer}");
+    }
+    assert_eq!(refused(&server, upgrade(&server, Some(&format!("http://{host}")))), 403);
+
+    let answer = get(&server, &format!("/{query}"), &host, "");
+    assert!(answer.starts_with("HTTP/1.1 303") && answer.contains("location: /\r\n"), "{answer}");
+    let cookie = answer.split("set-cookie: ").nth(1).unwrap().split(';').next().unwrap();
+    assert!(answer.contains("; HttpOnly; SameSite=Lax"), "{answer}");
+    for cookies in [cookie.to_owned(), format!("other=1; {cookie}")] {
+        let page = get(&server, "/", &host, &format!("Cookie: {cookies}\r\n"));
+        assert!(page.starts_with("HTTP/1.1 200"), "{page}");
+    }
+    let other = get(&server, "/", &host, &format!("Cookie: {cookie}0\r\n"));
+    assert!(other.starts_with("HTTP/1.1 403"), "{other}");
+    let mut request = upgrade(&server, Some(&format!("http://{host}")));
+    request.headers_mut().insert("Cookie", cookie.parse().unwrap());
+    tungstenite::client(request, stream(&server)).unwrap();
+}
+
+/// Whoever listens for others has a token without asking for one.
+#[test]
+fn other_machines_need_the_token() {
+    let settings = Settings { address: std::net::Ipv4Addr::UNSPECIFIED.into(), ..Settings::default() };
+    let server = serve(&settings);
+    assert!(server.url().contains("/?token="), "{}", server.url());
+    let host = format!("127.0.0.1:{}", server.address().port());
+    assert!(get(&server, "/", &host, "").starts_with("HTTP/1.1 403"));
+    assert!(!serve(&Settings::default()).url().contains("token"));
+}
+
+#[test]
 fn no_message_ends_a_session() {
     let server = serve(&Settings::default());
     let mut page = Page::open(&server);
@@ -243,10 +283,19 @@ fn whoever_keeps_the_server_waiting_is_given_up() {
 
 #[test]
 fn many_idle_connections_do_not_keep_a_page_out() {
-    let patience = Duration::from_millis(500);
+    // However patient it is with them.
+    let patience = Duration::from_secs(600);
     let server = serve(&Settings { patience, ..Settings::default() });
-    let idle: Vec<_> = (0..300).map(|_| stream(&server)).collect();
+    let mut session = Page::open(&server);
+    session.step(1);
+    let mut idle: Vec<_> = (0..300).map(|_| stream(&server)).collect();
+    for connection in &mut idle[200..] {
+        connection.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
+    }
+    let start = Instant::now();
     assert_eq!(Page::open(&server).step(1)["at"], 1);
+    assert!(start.elapsed() < Duration::from_secs(20), "{:?}", start.elapsed());
+    assert_eq!(session.step(1)["at"], 2, "a session is not idle");
     drop(idle);
 }
 

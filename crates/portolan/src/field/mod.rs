@@ -23,7 +23,7 @@ mod smooth;
 
 pub use clearance::{Clearance, ClearanceField, UnknownSpace};
 pub use esdf::{
-    Esdf, EsdfMethod, EsdfSettings, EsdfUpdate, LEAST_HITS, ObstacleCells, PointKind, SurfaceNoise,
+    Esdf, EsdfMethod, EsdfSettings, EsdfUpdate, LEAST_HITS, LessNoise, ObstacleCells, PointKind, SurfaceNoise,
 };
 pub use grid::{EsdfError, EsdfGrid, esdf_from_tsdf, squared_distance_transform};
 pub use mask::{Label, MaskCell, MaskError, MaskTransform};

@@ -59,8 +59,8 @@ impl<const D: usize> Ledger<D> {
     /// Adds a scan, taken at a known pose, under the name of its log and its number in it.
     ///
     /// # Errors
-    /// [`LedgerError`]: where the scan is there already, its pose has no cell, or there might be no room for all of it. The
-    /// ledger is then as before.
+    /// [`LedgerError`]: where the scan is there already, or another one of this name, its pose has no cell, or there is no
+    /// room for all of it. The ledger is then as before.
     pub fn add(
         &mut self,
         log: &str,
@@ -83,7 +83,9 @@ impl<const D: usize> Ledger<D> {
         scan: &(impl ScanKind<D> + Sync),
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, LedgerError> {
+        let fingerprint = scan.fingerprint();
         if self.scans.get(log, index).is_some() {
+            self.scans.held(log, index, fingerprint)?;
             return Err(LedgerError::Twice { log: log.to_owned(), index });
         }
         let lattice = Lattice::new(self.settings.origin.unwrap_or([0.0; D]), self.settings.resolution);
@@ -95,7 +97,7 @@ impl<const D: usize> Ledger<D> {
             return Err(LedgerError::Far { meters });
         }
         let fused = self.fuse(world_from_sensor, scan, Sign::Plus, clock)?;
-        let record = ScanRecord { world_from_sensor: *world_from_sensor, fingerprint: scan.fingerprint() };
+        let record = ScanRecord { world_from_sensor: *world_from_sensor, fingerprint };
         self.scans.insert(log, index, record);
         Ok(fused)
     }

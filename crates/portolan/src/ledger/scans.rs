@@ -38,6 +38,19 @@ impl<const D: usize> LedgerScans<D> {
         self.0.get(log)?.get(&index)
     }
 
+    /// Number of scans that have the readings of a scan of another log at the same pose: a log that was copied counts twice,
+    /// and only its name tells it from another one. O(n log n).
+    pub fn copies(&self) -> usize {
+        let mut all: Vec<(u64, &Pose<D>, &str)> =
+            self.iter().map(|(log, _, r)| (r.fingerprint, &r.world_from_sensor, log)).collect();
+        all.sort_by_key(|(fingerprint, ..)| *fingerprint);
+        let same =
+            |a: &(u64, &Pose<D>, &str), b: &(u64, &Pose<D>, &str)| a.0 == b.0 && a.1 == b.1 && a.2 != b.2;
+        let of_one =
+            |alike: &[(u64, &Pose<D>, &str)]| alike[1..].iter().filter(|s| same(&alike[0], s)).count();
+        all.chunk_by(|a, b| a.0 == b.0).map(of_one).sum()
+    }
+
     /// All scans: log, number, record; ascending.
     pub fn iter(&self) -> impl Iterator<Item = (&str, u64, &ScanRecord<D>)> {
         self.0.iter().flat_map(|(log, scans)| scans.iter().map(move |(i, scan)| (log.as_str(), *i, scan)))
@@ -61,8 +74,11 @@ impl<const D: usize> LedgerScans<D> {
     /// # Errors
     /// Where a scan is in both; nothing is added then.
     pub fn merge(&mut self, other: &Self) -> Result<(), LedgerError> {
-        if let Some((log, index, _)) = other.iter().find(|(log, i, _)| self.get(log, *i).is_some()) {
-            return Err(LedgerError::Twice { log: log.to_owned(), index });
+        for (log, index, record) in other.iter() {
+            if self.get(log, index).is_some() {
+                self.held(log, index, record.fingerprint)?;
+                return Err(LedgerError::Twice { log: log.to_owned(), index });
+            }
         }
         for (log, index, record) in other.iter() {
             self.insert(log, index, *record);

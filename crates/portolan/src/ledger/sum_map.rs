@@ -3,9 +3,9 @@
 use super::LedgerError;
 use crate::cell::{DistanceSum, HitLengthSum, HitMissSum, LogOdds8, Sign};
 use crate::geom::{Aabb, Pose};
-use crate::map::{Attenuation, Occupancy, ScanKind, Tsdf};
+use crate::map::{Attenuation, MapError, Occupancy, ScanKind, Tsdf};
 use crate::scan::ScanStats;
-use crate::store::{Store, SumStore};
+use crate::store::{Store, SumStore, Unfit};
 
 pub(super) type SumOccupancy<const D: usize> = Occupancy<D, LogOdds8, SumStore<HitMissSum, D>>;
 pub(super) type SumTsdf<const D: usize> = Tsdf<D, SumStore<DistanceSum, D>>;
@@ -39,12 +39,22 @@ macro_rules! sum_map {
                 scan: &impl ScanKind<D>,
                 sign: Sign,
             ) -> Result<ScanStats, LedgerError> {
-                self.forget_scans();
-                self.store_mut().set_sign(sign);
-                let stats = self.integrate(pose, scan);
-                match self.store_mut().refused() {
-                    Some(block) => Err(LedgerError::Sums { block: block.0.to_vec() }),
-                    None => Ok(stats?),
+                let mut once = |sign| {
+                    self.forget_scans();
+                    self.store_mut().begin(sign);
+                    (self.integrate(pose, scan), self.store_mut().verdict())
+                };
+                let (stats, verdict) = once(sign);
+                if let (Ok(stats), Ok(())) = (&stats, &verdict) {
+                    return Ok(*stats);
+                }
+                // The same sweeps once more: what they did is undone, up to where they ended.
+                let _ = once(sign.opposite());
+                self.store_mut().forget_empty();
+                match (stats?, verdict) {
+                    (stats, Ok(())) => Ok(stats),
+                    (_, Err(Unfit::Full(full))) => Err(MapError::from(full).into()),
+                    (_, Err(Unfit::NotThere(block))) => Err(LedgerError::Sums { block: block.0.to_vec() }),
                 }
             }
 

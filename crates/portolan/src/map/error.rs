@@ -15,6 +15,17 @@ pub enum MapError {
     /// The origin is no point.
     #[error("origin must be finite, got {0}")]
     Origin(f64),
+    /// The origin is so far from zero that numbers do not tell cells apart.
+    #[error(
+        "the origin {origin} is more than 2^45 cells of {resolution} m from zero, where numbers do not tell cells apart: move \
+         it nearer to zero, or make cells larger"
+    )]
+    FarOrigin {
+        /// Of one axis (meters).
+        origin: f64,
+        /// Edge of a cell (meters).
+        resolution: f64,
+    },
     /// The box has no cell, or more than a dense map may have.
     #[error("a dense map of {cells} cells is not possible: between 1 and {limit} cells are")]
     Cells {
@@ -107,8 +118,30 @@ pub(super) fn check_lattice<const D: usize>(lattice: &Lattice<D>) -> Result<(), 
     if !(lattice.resolution > 0.0 && lattice.resolution.is_finite()) {
         return Err(MapError::Resolution(lattice.resolution));
     }
-    match lattice.origin.iter().find(|v| !v.is_finite()) {
-        Some(&bad) => Err(MapError::Origin(bad)),
+    if let Some(&bad) = lattice.origin.iter().find(|v| !v.is_finite()) {
+        return Err(MapError::Origin(bad));
+    }
+    match lattice.origin.iter().find(|v| v.abs() / lattice.resolution > FARTHEST_CELLS) {
+        Some(&origin) => Err(MapError::FarOrigin { origin, resolution: lattice.resolution }),
         None => Ok(()),
+    }
+}
+
+/// Cells between a lattice's origin and zero. From there on the places that an `f64` has are more than a 128th of a cell apart,
+/// and maps that compute the same cell in different ways begin to differ.
+const FARTHEST_CELLS: f64 = (1u64 << 45) as f64;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_that_numbers_do_not_tell_apart_are_refused() {
+        let check = |origin: f64| check_lattice(&Lattice::new([0.0, origin], 0.5));
+        check(-FARTHEST_CELLS * 0.5).unwrap();
+        check(4e6).unwrap();
+        let said = check(FARTHEST_CELLS * 0.500001).unwrap_err().to_string();
+        assert!(said.contains("cells of 0.5 m from zero"), "{said}");
+        assert!(matches!(check(f64::INFINITY), Err(MapError::Origin(_))));
     }
 }

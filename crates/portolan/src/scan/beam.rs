@@ -13,6 +13,8 @@ pub enum BeamKind {
     Dropped,
     /// The sensor saw the robot that carries it: no information about the world.
     SelfHit,
+    /// Something at the beam's range that was not there at other times ([`crate::movers`]): free up to there.
+    Mover,
 }
 
 /// A beam in the sensor's frame.
@@ -37,7 +39,7 @@ impl<const D: usize> Beam<D> {
     #[inline(always)]
     pub fn free_range(&self) -> f64 {
         match self.kind {
-            BeamKind::Hit | BeamKind::MaxRange | BeamKind::NoReturn => self.range,
+            BeamKind::Hit | BeamKind::MaxRange | BeamKind::NoReturn | BeamKind::Mover => self.range,
             BeamKind::Dropped | BeamKind::SelfHit => 0.0,
         }
     }

@@ -63,6 +63,7 @@ impl<const D: usize> Fingerprint for Scan<D> {
                 BeamKind::NoReturn => 2,
                 BeamKind::Dropped => 3,
                 BeamKind::SelfHit => 4,
+                BeamKind::Mover => 5,
             });
             mix.reals(&self.origin(i));
         }

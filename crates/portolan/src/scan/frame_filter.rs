@@ -249,7 +249,10 @@ mod tests {
         // The free end was measured when its point was.
         assert_eq!((kept.times.clone(), kept.free_ends.clone()), (vec![0.0, 0.4], vec![[0.0, 4.0, 0.0]]));
         assert_eq!(kept.refused.too_near, 1);
-        assert_eq!(counts, BeamCounts { hit: 1, max_range: 1, no_return: 0, dropped: 1, self_hit: 2 });
+        assert_eq!(
+            counts,
+            BeamCounts { hit: 1, max_range: 1, no_return: 0, dropped: 1, self_hit: 2, mover: 0 }
+        );
         let (all, counts) = FrameFilter::default().apply(Frame::Points(scan.clone()));
         assert_eq!((all, counts.hit), (Frame::Points(scan), 5));
     }
@@ -269,7 +272,10 @@ mod tests {
         let cut = -f64::from(image.values[3]);
         assert!((norm([3.0 * cut, 0.0, cut]) - 4.0).abs() < 1e-6);
         assert_eq!(image.refused.too_near, 2);
-        assert_eq!(counts, BeamCounts { hit: 1, max_range: 2, no_return: 0, dropped: 2, self_hit: 0 });
+        assert_eq!(
+            counts,
+            BeamCounts { hit: 1, max_range: 2, no_return: 0, dropped: 2, self_hit: 0, mover: 0 }
+        );
     }
     fn ground(values: Vec<f32>) -> RangeImage {
         let rays = Orthographic { first: [0.0; 2], step: [0.5; 2] };

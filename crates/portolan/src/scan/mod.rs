@@ -9,6 +9,7 @@
 //! | [`BeamKind::NoReturn`] | no echo: open space, glass, black cloth | up to `range`, which is 0 unless the caller gives another | never |
 //! | [`BeamKind::Dropped`] | nothing at all, or a reading that was refused | no | never |
 //! | [`BeamKind::SelfHit`] | the robot's own body | no | never |
+//! | [`BeamKind::Mover`] | something that was not there at other times | up to it | never |
 
 mod angles;
 mod beam;
@@ -19,6 +20,7 @@ mod frame_filter;
 mod incidence;
 mod laser;
 mod layout_finder;
+mod movable;
 mod organised;
 mod point_scan;
 mod range_image;
@@ -39,6 +41,7 @@ pub use incidence::cos_incidence;
 pub(crate) use incidence::{MAX_OPENING, MAX_SLOPE, connected};
 pub use laser::RangeLimits;
 pub use layout_finder::LayoutFinder;
+pub use movable::Movable;
 pub use organised::OrganisedPoints;
 pub use point_scan::{Frame, Origin, PointScan};
 #[cfg(test)]

@@ -21,7 +21,7 @@ pub enum BeamOrder {
 pub struct Scan<const D: usize> {
     pub(super) directions: Vec<[f64; D]>,
     ranges: Vec<f64>,
-    kinds: Vec<BeamKind>,
+    pub(super) kinds: Vec<BeamKind>,
     /// Where each beam begins; empty: all in the zero.
     pub(super) origins: Vec<[f64; D]>,
     pub(super) order: BeamOrder,

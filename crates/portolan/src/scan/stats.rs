@@ -15,6 +15,9 @@ pub struct BeamCounts {
     pub dropped: u64,
     /// Saw the robot itself.
     pub self_hit: u64,
+    /// Saw what was not there at other times. Only scans of beams know them; where points and pixels were taken out as movers, what
+    /// is left of them is counted as `max_range`.
+    pub mover: u64,
 }
 
 impl BeamCounts {
@@ -26,12 +29,13 @@ impl BeamCounts {
             BeamKind::NoReturn => &mut self.no_return,
             BeamKind::Dropped => &mut self.dropped,
             BeamKind::SelfHit => &mut self.self_hit,
+            BeamKind::Mover => &mut self.mover,
         } += 1;
     }
 
     /// All beams.
     pub fn total(&self) -> u64 {
-        self.hit + self.max_range + self.no_return + self.dropped + self.self_hit
+        self.hit + self.max_range + self.no_return + self.dropped + self.self_hit + self.mover
     }
 }
 
@@ -42,6 +46,7 @@ impl std::ops::AddAssign for BeamCounts {
         self.no_return += o.no_return;
         self.dropped += o.dropped;
         self.self_hit += o.self_hit;
+        self.mover += o.mover;
     }
 }
 
@@ -52,6 +57,7 @@ impl std::ops::SubAssign for BeamCounts {
         self.no_return -= o.no_return;
         self.dropped -= o.dropped;
         self.self_hit -= o.self_hit;
+        self.mover -= o.mover;
     }
 }
 

@@ -16,6 +16,7 @@ mod tree_remake;
 pub use bricks::Bricks;
 pub use dense::Dense;
 pub use sums::SumStore;
+pub(crate) use sums::Unfit;
 pub use tree::{Leaf, Tree};
 pub use tree_bricks::TreeBricksError;
 pub use tree_leaves::LeavesIn;

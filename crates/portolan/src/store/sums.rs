@@ -8,22 +8,23 @@ use crate::sweep::Swept;
 
 /// Bricks of sums ([`SumCell`]) for any map of the cells that are estimated from them.
 ///
-/// A scan is fused wholly or not at all: where its sums turn out to need more than the limit, it is taken away again. What is taken away
-/// ([`SumStore::set_sign`]) must have been there: a scan that leaves sums that no observations have is put back, and
-/// [`SumStore::refused`] says where.
+/// What is fused in one call is fused wholly or not at all: where the sums turn out to need more than the limit, it is taken away
+/// again. A scan may come in several calls, as that of a lidar that moved does; a ledger opens it, asks for a verdict at its end, and
+/// undoes all of it where the verdict says so.
 #[derive(Clone, Debug)]
 pub struct SumStore<C: SumCell, const D: usize> {
     sums: Bricks<C, D>,
     rule: <C::Estimate as Cell>::Rule,
     sign: Sign,
     limit: usize,
-    refused: Option<BlockKey<D>>,
+    /// The blocks that a scan took something away from so far; `None`: no scan is open.
+    open: Option<Vec<BlockKey<D>>>,
 }
 
 impl<C: SumCell, const D: usize> SumStore<C, D> {
     /// A store of these sums, with the settings of the estimates.
     pub fn new(sums: Bricks<C, D>, rule: <C::Estimate as Cell>::Rule) -> Self {
-        Self { sums, rule, sign: Sign::Plus, limit: usize::MAX, refused: None }
+        Self { sums, rule, sign: Sign::Plus, limit: usize::MAX, open: None }
     }
 
     /// Puts other sums in place, on the same lattice.
@@ -36,14 +37,33 @@ impl<C: SumCell, const D: usize> SumStore<C, D> {
         &self.sums
     }
 
-    /// Adds scans from now on, or takes them away.
-    pub fn set_sign(&mut self, sign: Sign) {
+    /// What is fused until [`SumStore::verdict`] belongs to one scan, which is added or taken away. Nothing of it is refused.
+    pub(crate) fn begin(&mut self, sign: Sign) {
         self.sign = sign;
+        self.open = Some(Vec::new());
     }
 
-    /// A block of the last scan that could not be taken away, because it was not there; asking forgets it.
-    pub fn refused(&mut self) -> Option<BlockKey<D>> {
-        self.refused.take()
+    /// Whether the scan that was begun can stay: there is room for it, or what was taken away had been there.
+    ///
+    /// # Errors
+    /// Why it has to be undone.
+    pub(crate) fn verdict(&mut self) -> Result<(), Unfit<D>> {
+        let mut touched = self.open.take().unwrap_or_default();
+        touched.sort_unstable();
+        touched.dedup();
+        let sign = std::mem::take(&mut self.sign);
+        let bytes = self.sums.memory_bytes();
+        if sign == Sign::Plus && bytes > self.limit {
+            return Err(Unfit::Full(StoreFull { limit: self.limit, bytes }));
+        }
+        let wrong = |key: &BlockKey<D>| self.sums.brick(*key).is_some_and(|brick| !brick.is_possible());
+        let first = parallel::map(&touched, 64, wrong).into_iter().position(|wrong| wrong);
+        first.map_or(Ok(()), |i| Err(Unfit::NotThere(touched[i])))
+    }
+
+    /// Forgets bricks that hold nothing: what a scan that was undone had made.
+    pub(crate) fn forget_empty(&mut self) {
+        self.sums.retain(|brick| !brick.is_zero());
     }
 
     /// Adds another store's sums, or takes them away.
@@ -93,39 +113,12 @@ impl<C: SumCell, const D: usize> SumStore<C, D> {
         }
         Some(C::estimates(sums, &self.rule))
     }
-
-    /// Whether what was just done to these blocks can stay.
-    fn verdict(&self, blocks: &[BlockKey<D>]) -> Verdict<D> {
-        if self.sign == Sign::Plus {
-            let bytes = self.sums.memory_bytes();
-            return if bytes > self.limit { Verdict::Full(bytes) } else { Verdict::Fused };
-        }
-        let wrong = |key: &BlockKey<D>| self.sums.brick(*key).is_some_and(|brick| !brick.is_possible());
-        let first = parallel::map(blocks, 64, wrong).into_iter().position(|wrong| wrong);
-        first.map_or(Verdict::Fused, |i| Verdict::NotThere(blocks[i]))
-    }
-
-    /// After what cannot stay was undone: forgets the bricks that it had made, which hold nothing.
-    fn end(&mut self, verdict: Verdict<D>) -> Result<(), StoreFull> {
-        match verdict {
-            Verdict::Fused => return Ok(()),
-            Verdict::NotThere(block) => self.refused = Some(block),
-            Verdict::Full(_) => {}
-        }
-        self.sums.retain(|brick| !brick.is_zero());
-        match verdict {
-            Verdict::Full(bytes) => Err(StoreFull { limit: self.limit, bytes }),
-            _ => Ok(()),
-        }
-    }
 }
 
-/// What is to become of evidence that was fused.
-enum Verdict<const D: usize> {
-    /// It stays.
-    Fused,
-    /// The sums take so many bytes, more than they may.
-    Full(usize),
+/// Why a scan has to be undone.
+pub(crate) enum Unfit<const D: usize> {
+    /// The sums need more than they may.
+    Full(StoreFull),
     /// Something was taken away that was not in this block.
     NotThere(BlockKey<D>),
 }
@@ -151,11 +144,16 @@ impl<C: SumCell, const D: usize> Store<C::Estimate, D> for SumStore<C, D> {
         rule: &<C::Estimate as Cell>::Rule,
     ) -> Result<(), StoreFull> {
         self.sums.apply(key, evidence, &C::rule(rule, self.sign))?;
-        let verdict = self.verdict(&[key]);
-        if !matches!(verdict, Verdict::Fused) {
-            self.sums.apply(key, evidence, &C::rule(rule, self.sign.opposite()))?;
+        match &mut self.open {
+            Some(touched) => touched.push(key),
+            None if self.sums.memory_bytes() > self.limit => {
+                self.sums.apply(key, evidence, &C::rule(rule, Sign::Minus))?;
+                self.forget_empty();
+                return Err(StoreFull { limit: self.limit, bytes: self.sums.memory_bytes() });
+            }
+            None => {}
         }
-        self.end(verdict)
+        Ok(())
     }
 
     fn fuse<W>(&mut self, scan: &W, rule: &<C::Estimate as Cell>::Rule) -> Result<u64, StoreFull>
@@ -163,11 +161,17 @@ impl<C: SumCell, const D: usize> Store<C::Estimate, D> for SumStore<C, D> {
         W: Swept<D, Evidence = <C::Estimate as Cell>::Evidence>,
     {
         let cells = self.sums.fuse(scan, &C::rule(rule, self.sign))?;
-        let verdict = self.verdict(scan.blocks());
-        if !matches!(verdict, Verdict::Fused) {
-            self.sums.fuse(scan, &C::rule(rule, self.sign.opposite()))?;
+        match &mut self.open {
+            Some(touched) if self.sign == Sign::Minus => touched.extend(scan.blocks()),
+            Some(_) => {}
+            None if self.sums.memory_bytes() > self.limit => {
+                self.sums.fuse(scan, &C::rule(rule, Sign::Minus))?;
+                self.forget_empty();
+                return Err(StoreFull { limit: self.limit, bytes: self.sums.memory_bytes() });
+            }
+            None => {}
         }
-        self.end(verdict).map(|()| cells)
+        Ok(cells)
     }
 
     fn limit(&self) -> usize {

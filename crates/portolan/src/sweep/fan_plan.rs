@@ -91,6 +91,8 @@ impl Stretch {
 /// `f64::floor` for indices; on baseline x86-64 the method is a call.
 #[inline(always)]
 fn floor(v: f64) -> i64 {
+    // Far beyond any block, and far from where indices end: a reading may be as large as a number can be.
+    let v = v.clamp(-1e15, 1e15);
     let toward_zero = v as i64;
     toward_zero - i64::from(v < toward_zero as f64)
 }
@@ -154,6 +156,35 @@ impl Outline {
             let [x0, x1] = std::mem::replace(row, [f64::INFINITY, f64::NEG_INFINITY]);
             if x0 <= x1 {
                 bitmap.mark(y, floor(x0 - self.margin), floor(x1 + self.margin));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Drivers write the largest number for "no echo".
+    #[test]
+    fn outlines_as_far_as_numbers_reach_mark_what_is_near() {
+        let lattice = Lattice::new([0.0; 2], 0.05);
+        for far in [1e12, 1e20, f64::from(f32::MAX)] {
+            for sign in [1.0, -1.0] {
+                let far = sign * far;
+                let mut bitmap = BlockBitmap::default();
+                assert!(bitmap.reset(&lattice, &Aabb::new([-2.0; 2], [2.0; 2])));
+                let mut outline = Outline::default();
+                outline.reset(&bitmap, 0.1);
+                for [p, q] in [[[0.5, 0.5], [far, 0.5]], [[far, 0.5], [far, far]], [[far, far], [0.5, 0.5]]] {
+                    outline.edge(p, q);
+                }
+                outline.mark(&mut bitmap);
+                let mut keys: Vec<BlockKey<2>> = Vec::new();
+                bitmap.collect(&mut keys);
+                assert!(keys.contains(&BlockKey([0, 0])), "{far}: {keys:?}");
+                let toward = |key: &BlockKey<2>| f64::from(key.0[0]) * sign >= -1.0;
+                assert!(keys.len() > 5 && keys.iter().all(toward), "{far}: {keys:?}");
             }
         }
     }

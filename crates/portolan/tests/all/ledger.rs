@@ -1,12 +1,15 @@
 //! Laws of maps of sums: any split, any order, any number of threads, back again, elsewhere.
 
 use crate::common::apartment;
-use portolan::ledger::{Epochs, LedgerError};
+use portolan::geom::Trajectory;
+use portolan::ledger::{Epochs, LedgerError, LedgerSums};
 use portolan::map::{MapError, ScanKind, Tsdf, TsdfConfig, least_weight};
 use portolan::scan::{Frame, Scan};
 use portolan::store::Store;
 use portolan::{Ledger, MapperSettings, geom::Pose};
-use portolan_sim::building::{BuildingConfig, BuildingSensor, SpinningLidar, building_log};
+use portolan_sim::building::{
+    BuildingConfig, BuildingSensor, SpinningLidar, building_log, moving_lidar_frame,
+};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -16,6 +19,30 @@ type Taken<const D: usize, S> = (Pose<D>, S);
 /// Scans of the Apartment, far apart.
 static SCANS_2D: LazyLock<Vec<Taken<2, Scan<2>>>> =
     LazyLock::new(|| apartment().log.iter().step_by(17).cloned().collect());
+
+/// Turns of a lidar that moves at 2 m/s, the motion taken out: distances see each in strips, one after the other.
+static SCANS_MOVING: LazyLock<Vec<Taken<3, Frame>>> = LazyLock::new(|| {
+    const TURN: f64 = 0.1;
+    let lidar = SpinningLidar { columns: 180, rings: 16, ..Default::default() };
+    let building = portolan_sim::building::building_world(1);
+    let (start, world) = (building.path[0], &building.world);
+    let pose = |t: f64| Pose::<3> {
+        translation: [start[0] + 2.0 * t, start[1] + 0.3 * t, 1.2],
+        ..Pose::<3>::IDENTITY
+    };
+    let path = Trajectory::new((0..8).map(|i| (TURN * f64::from(i), pose(TURN * f64::from(i))))).unwrap();
+    (0..6u32)
+        .map(|i| {
+            let at = TURN * f64::from(i);
+            let moving = |t: f64| pose(at + t);
+            let frame = moving_lidar_frame(world, moving, &lidar, &lidar.directions(), TURN, (1, i.into()));
+            let Frame::Points(mut scan) = frame else { panic!("a lidar delivers points") };
+            scan.deskew(&pose(at), &mut path.motion(0.25), at).unwrap();
+            assert!(scan.delivered.is_some());
+            (pose(at), Frame::Points(scan))
+        })
+        .collect()
+});
 
 /// Turns of a lidar through the Building: images, points whose rows are to be found, and points that are followed ray by ray.
 static SCANS_3D: LazyLock<Vec<Taken<3, Frame>>> = LazyLock::new(|| {
@@ -217,6 +244,7 @@ fn slips_are_refused_and_change_nothing() {
     assert_eq!(twice, Err(LedgerError::Twice { log: "log".into(), index: 2 }));
     assert_eq!(ledger.subtract("log", 7, at(7).1), Err(LedgerError::NotHeld { log: "log".into(), index: 7 }));
     assert!(matches!(ledger.subtract("log", 2, at(3).1), Err(LedgerError::OtherReadings { .. })));
+    assert!(matches!(ledger.add("log", 2, at(3).0, at(3).1), Err(LedgerError::OtherReadings { .. })));
     assert!(matches!(ledger.subtract("other", 2, at(2).1), Err(LedgerError::NotHeld { .. })));
     assert!(matches!(ledger.repose("log", 9, at(2).0, at(2).1), Err(LedgerError::NotHeld { .. })));
     let nowhere = Pose { translation: [f64::NAN; 2], ..*at(2).0 };
@@ -244,6 +272,20 @@ fn slips_are_refused_and_change_nothing() {
         Ledger::new(MapperSettings { color: true, ..settings::<3>() }),
         Err(LedgerError::Without(_))
     ));
+}
+
+#[test]
+fn copies_under_another_name_are_counted() {
+    let mut ledger = fused(&SCANS_2D, 0..5);
+    assert_eq!(ledger.scans().copies(), 0);
+    for i in [1, 3] {
+        ledger.add("copy", 10 + i as u64, &SCANS_2D[i].0, &SCANS_2D[i].1).unwrap();
+    }
+    assert_eq!(ledger.scans().copies(), 2);
+    // A robot that stands still may read the same twice; elsewhere it is another scan.
+    ledger.add("log", 77, &SCANS_2D[0].0, &SCANS_2D[0].1).unwrap();
+    ledger.add("copy", 77, &SCANS_2D[4].0, &SCANS_2D[2].1).unwrap();
+    assert_eq!(ledger.scans().copies(), 2);
 }
 
 #[test]
@@ -287,6 +329,48 @@ fn a_scan_that_has_no_room_is_left_out_whole() {
     assert!(refused > 0 && refused < SCANS_2D.len(), "{refused}");
     let which: Vec<usize> = ledger.scans().iter().map(|(_, i, _)| i as usize).collect();
     assert!(ledger == fused(&SCANS_2D, which));
+}
+
+/// A scan that comes in strips is wholly there or not at all, too, and so is one that is taken away and was not there.
+#[test]
+fn strips_of_a_moving_lidar_are_one_scan() {
+    let scans = &*SCANS_MOVING;
+    let whole = fused(scans, 0..scans.len());
+    let steps = 12;
+    for step in 1..steps {
+        let memory = whole.memory_bytes() * step / steps;
+        let mut ledger = Ledger::new(MapperSettings { memory, ..settings() }).unwrap();
+        for (i, (pose, scan)) in scans.iter().enumerate() {
+            if ledger.add("log", i as u64, pose, scan).is_err() {
+                let held: Vec<usize> = ledger.scans().iter().map(|(_, i, _)| i as usize).collect();
+                assert!(!held.contains(&i) && ledger == fused(scans, held));
+            }
+        }
+    }
+    any_split_in_any_order(scans, &[0, 1, 2, 0, 1, 2], &[9, 4, 6, 1, 8, 3]);
+}
+
+/// Sums that do not hold what their list says, as no ledger comes to be by itself.
+#[test]
+fn what_sums_do_not_hold_is_not_taken_from_them() {
+    fn wrong<const D: usize, S: ScanKind<D> + Sync>(scans: &[Taken<D, S>]) {
+        let (a, b) = (fused(scans, [0]), fused(scans, [1]));
+        let sums = LedgerSums {
+            occupancy: a.occupancy_sums().cloned(),
+            distances: a.distance_sums().cloned(),
+            attenuation: a.attenuation_sums().cloned(),
+        };
+        let how = MapperSettings { origin: Some([0.0; D]), ..settings() };
+        let mut forged = Ledger::from_parts(how, b.scans().clone(), sums).unwrap();
+        let before = forged.clone();
+        assert!(matches!(forged.subtract("log", 1, &scans[1].1), Err(LedgerError::Sums { .. })));
+        assert!(forged == before);
+        assert!(matches!(forged.take_out(&b), Err(LedgerError::Sums { .. })));
+        assert!(forged == before);
+    }
+    wrong(&SCANS_2D);
+    wrong(&SCANS_3D);
+    wrong(&SCANS_MOVING);
 }
 
 #[test]

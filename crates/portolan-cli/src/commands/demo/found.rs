@@ -149,6 +149,7 @@ impl Found<'_> {
             run.total()
         );
         let _ = writeln!(text, "wrote {} to {folder}", run.files.join(", "));
+        let _ = writeln!(text, "open {folder}/report.html");
         text
     }
 }

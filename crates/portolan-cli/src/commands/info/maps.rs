@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::json;
 use crate::mapping::brick_extent;
+use crate::up::Up;
 
 fn of_header(dimension: usize, header: &MapHeader, poses: usize, maps: Value) -> Value {
     json!({
@@ -71,7 +72,11 @@ pub(super) fn of_3d(file: &MapFile<3>) -> Value {
     }
     maps_of_hits(&mut maps, file);
     sums(&mut maps, file);
-    of_header(3, &file.header, file.poses.len(), maps)
+    let mut about = of_header(3, &file.header, file.poses.len(), maps);
+    let up = Up::of_header(&file.header);
+    about["up"] = json!(up.unwrap_or(Up::Z).words());
+    about["up_is_assumed"] = json!(up.is_none().then_some(true));
+    about
 }
 
 /// What a map of sums holds, from which the others follow.

@@ -122,9 +122,9 @@ pub(crate) fn arg(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Fuses a log at 5 cm.
+/// Fuses a log at 5 cm, over what is in the folder.
 pub(crate) fn map(log: &Path, out: &Path, more: &[&str]) -> String {
-    let mut arguments = vec!["map", arg(log), "--resolution", "0.05", "--out", arg(out)];
+    let mut arguments = vec!["map", arg(log), "--resolution", "0.05", "--overwrite", "--out", arg(out)];
     arguments.extend(more);
     succeed(arguments)
 }

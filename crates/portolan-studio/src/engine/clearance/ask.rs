@@ -46,7 +46,7 @@ pub(in crate::engine) enum Ask {
     },
 }
 
-/// One of the two fields.
+/// One of the fields.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub(in crate::engine) enum Which {
@@ -54,6 +54,8 @@ pub(in crate::engine) enum Which {
     Truncated,
     /// Distances to the extracted surface.
     Euclidean,
+    /// What of these is certified where unknown space is an obstacle.
+    Pessimistic,
 }
 
 /// What unknown space is, in the page's words.

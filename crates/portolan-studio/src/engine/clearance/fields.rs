@@ -1,6 +1,8 @@
-//! The two fields of one map.
+//! The fields of one map.
 
-use portolan::field::{Esdf, EsdfError, EsdfGrid, FieldSlots, Interpolation, ObstacleCells};
+use portolan::field::{
+    ClearanceField, Esdf, EsdfError, EsdfGrid, FieldSlots, Interpolation, ObstacleCells, UnknownSpace,
+};
 use portolan::geom::vector::norm;
 use portolan::geom::{Aabb, Grid};
 use portolan::map::Tsdf2;
@@ -12,7 +14,7 @@ use crate::engine::exports;
 /// Distance and gradient.
 pub(super) type Sample = (f64, [f64; 2]);
 
-/// Both fields, over the cells of the map.
+/// All fields, over the cells of the map.
 pub(super) struct Fields {
     /// As `query` makes it, with distances to unknown cells.
     pub(super) euclidean: Esdf<2>,
@@ -21,6 +23,8 @@ pub(super) struct Fields {
     /// What the filter keeps, read as if it were a distance field: bilinear between the centers of the same cells that the
     /// Euclidean field knows.
     truncated: EsdfGrid<2>,
+    /// At the cells' centers, how far anything is at least, if unknown space is an obstacle; behind surfaces, the distance.
+    pessimistic: EsdfGrid<2>,
     /// From here on (meters) the truncated field is a constant.
     pub(super) limit: f64,
 }
@@ -31,6 +35,7 @@ impl Fields {
         // A probe must not wait for bricks that were not read yet.
         euclidean.measure();
         let dense = euclidean.dense(tsdf.grid());
+        let pessimistic = EsdfGrid::from_samples(*tsdf.grid(), certified(&euclidean, &dense))?;
         let planes = tsdf.store().planes();
         let least = tsdf.min_weight();
         let cells = planes.distances().iter().zip(planes.weights());
@@ -38,6 +43,7 @@ impl Fields {
         Ok(Self {
             euclidean,
             dense,
+            pessimistic,
             truncated: EsdfGrid::from_samples(*tsdf.grid(), kept.collect())?,
             // As the map itself decides which cells are saturated.
             limit: f64::from(tsdf.rule().truncation) * (1.0 - 1e-4),
@@ -57,6 +63,7 @@ impl Fields {
         match which {
             Which::Truncated => self.truncated.samples(),
             Which::Euclidean => self.dense.samples(),
+            Which::Pessimistic => self.pessimistic.samples(),
         }
     }
 
@@ -72,6 +79,7 @@ impl Fields {
         match which {
             Which::Truncated => self.truncated.samples()[i].abs() < self.limit as f32,
             Which::Euclidean => self.dense.status(i) == Status::Known,
+            Which::Pessimistic => self.pessimistic.status(i) == Status::Known,
         }
     }
 
@@ -91,6 +99,9 @@ impl Fields {
         let out = FieldSlots { distance: &mut distance, gradient: &mut gradient, status: &mut status };
         match which {
             Which::Truncated => self.truncated.distances_and_gradients(points, Interpolation::Linear, out),
+            Which::Pessimistic => {
+                self.pessimistic.distances_and_gradients(points, Interpolation::Linear, out);
+            }
             Which::Euclidean => self.euclidean.distances_and_gradients(points, Interpolation::Linear, out),
         }
         gradient.into_iter().zip(status).map(|(g, s)| s.has_value().then_some(g)).collect()
@@ -108,9 +119,23 @@ impl Fields {
 
     pub(super) fn memory_bytes(&self) -> usize {
         let cells = self.grid().len();
-        // Samples of both, and a status.
-        self.euclidean.memory_bytes() + 9 * cells
+        // Samples of all, and a status.
+        self.euclidean.memory_bytes() + 13 * cells
     }
+}
+
+/// What is certified at the centers of cells where unknown space is an obstacle; NaN where nothing is known.
+fn certified(field: &Esdf<2>, dense: &EsdfGrid<2>) -> Vec<f32> {
+    let grid = dense.grid();
+    let at = |(i, &distance): (usize, &f32)| {
+        if distance.is_nan() || distance <= 0.0 {
+            return distance;
+        }
+        let center = grid.lattice.center(grid.cell(i));
+        let clearance = field.clearance(center, UnknownSpace::Pessimistic).value();
+        clearance.map_or(0.0, |c| c.lower as f32).min(distance)
+    };
+    dense.samples().iter().enumerate().map(at).collect()
 }
 
 /// Length of a gradient, where there is one.

@@ -3,7 +3,7 @@
 use portolan::Answer;
 use portolan::field::{Esdf, UnknownSpace};
 use portolan::map::Tsdf2;
-use portolan_io::{AnswerRow, certified_reach, write_answer};
+use portolan_io::{AnswerRow, SigmaColumns, certified_reach, write_answer};
 use serde_json::{Value, json};
 
 use super::fields::{Fields, Sample, length};
@@ -20,7 +20,7 @@ pub(super) fn answer(
 ) -> Result<Value, Refusal> {
     let row = row(tsdf, beside, &fields.euclidean, p, unknown);
     let mut line = Vec::new();
-    write_answer(&mut line, &row).map_err(Refusal::new)?;
+    write_answer(&mut line, &row, SigmaColumns::No).map_err(Refusal::new)?;
     let kept = fields.truncated(p);
     let sample = kept.value();
     Ok(json!({

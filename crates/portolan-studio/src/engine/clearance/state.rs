@@ -13,7 +13,7 @@ use crate::engine::fusion::{Fusion, frame};
 use crate::engine::{Clock, Limits, Refusal, Reply};
 
 /// Bytes of a cell: bricks of both distances, both fields as arrays, the answer on its way.
-const BYTES_PER_CELL: usize = 48;
+const BYTES_PER_CELL: usize = 56;
 
 /// The view of clearance.
 pub(in crate::engine) struct Clearance {
@@ -127,6 +127,7 @@ impl MapFields {
         });
         Ok(Reply::of(body)?
             .with("truncated", self.fields.samples(Which::Truncated).to_vec())
+            .with("pessimistic", self.fields.samples(Which::Pessimistic).to_vec())
             .with("euclidean", self.fields.samples(Which::Euclidean).to_vec())
             .with("contour", contour.points)
             .with("lines", contour.starts)

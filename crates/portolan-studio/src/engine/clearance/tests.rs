@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use portolan::Answer;
-use portolan::field::{Esdf, EsdfSettings, UnknownSpace};
+use portolan::field::{ClearanceField, Esdf, EsdfSettings, UnknownSpace};
 use portolan::geom::{Pose, vector};
 use portolan::map::Tsdf2;
 use portolan::plan::{Cause, PathCheck, Waypoints, check_path};
@@ -208,6 +208,7 @@ fn rings_lie_where_the_field_has_their_distance() {
                 let d = match which {
                     Which::Euclidean => fields.euclidean.distance(p),
                     Which::Truncated => fields.truncated(p).map(|s| s.0),
+                    Which::Pessimistic => panic!("it has a test of its own"),
                 };
                 // Unknown: rounded to the other side of the last square.
                 if let Answer::Known(d) | Answer::Saturated(d) = d {
@@ -218,6 +219,28 @@ fn rings_lie_where_the_field_has_their_distance() {
         let most = levels.iter().fold(0.0f32, |m, l| m.max(*l));
         assert_eq!(most > 0.15, which == Which::Euclidean, "only a distance field has far rings: {most}");
     }
+}
+
+/// No picture may show more clearance than is certified for what it counts as obstacles.
+#[test]
+fn the_pessimistic_picture_shows_no_more_than_is_certified() {
+    let mut studio = apartment();
+    let fields = studio.fields();
+    let grid = *fields.grid();
+    let (shown, distances) = (fields.samples(Which::Pessimistic), fields.samples(Which::Euclidean));
+    let mut nearer = 0;
+    for (i, (&shown, &distance)) in shown.iter().zip(distances).enumerate() {
+        assert_eq!(shown.is_nan(), distance.is_nan());
+        if shown.is_nan() || distance <= 0.0 {
+            continue;
+        }
+        let certified =
+            fields.euclidean.clearance(grid.lattice.center(grid.cell(i)), UnknownSpace::Pessimistic);
+        let lower = certified.value().map_or(0.0, |c| c.lower);
+        assert!(f64::from(shown) <= lower + 1e-6, "{shown} at cell {i}, certified {lower}");
+        nearer += usize::from(shown < distance - 0.1);
+    }
+    assert!(nearer > 40, "{nearer} cells are near to what was never seen");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::settings::Settings;
 
-/// A question. All but `watch` and `export` are answered with a frame (`frame.rs`).
+/// A question. All but `chair_fits`, `watch` and `export` are answered with a frame (`frame.rs`).
 #[derive(Debug, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case", deny_unknown_fields)]
 pub(in crate::engine) enum Ask {
@@ -27,6 +27,11 @@ pub(in crate::engine) enum Ask {
     },
     /// Puts the middle of the chair there; it has stood there since the scan that was fused last.
     MoveChair {
+        /// World (meters).
+        to: [f64; 2],
+    },
+    /// Whether the chair could be put there: answered with why not, or `null`.
+    ChairFits {
         /// World (meters).
         to: [f64; 2],
     },

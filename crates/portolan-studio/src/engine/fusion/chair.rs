@@ -49,6 +49,11 @@ impl Ghost {
     }
 }
 
+/// The share of the error that is left after `n` observations, by the gain alone.
+fn predicted(n: f64, half_life: f64) -> f64 {
+    0.5f64.powf(n / half_life)
+}
+
 /// What is not finite becomes `null`: half of the cells have not halved their error yet.
 fn group(g: &GhostGroup) -> Value {
     json!({
@@ -57,6 +62,6 @@ fn group(g: &GhostGroup) -> Value {
         "half_life_measured": g.half_life_measured,
         "half_life_predicted": g.half_life_predicted,
         "observations_per_lap": g.observations_per_lap,
-        "curve": g.curve,
+        "curve": g.curve.iter().map(|[n, left]| [*n, *left, predicted(*n, g.half_life_predicted)]).collect::<Vec<_>>(),
     })
 }

@@ -137,8 +137,22 @@ impl Scans {
     /// # Errors
     /// Where there is no chair, or no room for it.
     pub(super) fn move_chair(&mut self, scans: usize, to: [f64; 2]) -> Result<(), Refusal> {
+        let moved = self.moved_chair(scans, to)?;
+        if let Some(driven) = &mut self.driven {
+            driven.moves.retain(|m| m.scan < scans);
+            driven.moves.push(moved);
+            driven.scans.truncate(scans);
+        }
+        Ok(())
+    }
+
+    /// What would become of the world.
+    ///
+    /// # Errors
+    /// As [`Scans::move_chair`].
+    pub(super) fn moved_chair(&self, scans: usize, to: [f64; 2]) -> Result<Move, Refusal> {
         let driven =
-            self.driven.as_mut().ok_or_else(|| Refusal::new("a recorded log has no chair to move"))?;
+            self.driven.as_ref().ok_or_else(|| Refusal::new("a recorded log has no chair to move"))?;
         if !to.iter().all(|v| v.is_finite()) {
             return Err(Refusal::new("the chair must be put at a finite place"));
         }
@@ -164,10 +178,7 @@ impl Scans {
         if driven.poses.iter().any(|p| new.grown(0.25).contains(p.translation)) {
             return Err(Refusal::new("the chair would stand in the robot's way"));
         }
-        driven.moves.retain(|m| m.scan < scans);
-        driven.moves.push(Move { scan: scans, places: [old, new], before: world.clone(), world: moved });
-        driven.scans.truncate(scans);
-        Ok(())
+        Ok(Move { scan: scans, places: [old, new], before: world.clone(), world: moved })
     }
 
     pub(super) fn memory_bytes(&self) -> usize {

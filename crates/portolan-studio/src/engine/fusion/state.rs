@@ -90,6 +90,10 @@ impl Fusion {
                 self.revision += 1;
                 self.frame(0.0, true)
             }
+            Ask::ChairFits { to } => {
+                let why = self.scans.moved_chair(self.at(), to).err().map(|refusal| refusal.to_string());
+                Reply::of(json!({ "refused": why }))
+            }
             Ask::Watch { cell } => self.watch(cell),
             Ask::Export { file } => self.export(file),
         }

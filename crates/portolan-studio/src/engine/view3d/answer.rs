@@ -12,15 +12,19 @@ use super::state::View3d;
 use super::{shade, voxel};
 use crate::engine::{Refusal, Reply};
 
+/// Points of what moved that the page gets, at most.
+const MOST_MOVERS: usize = 100_000;
+
 impl View3d {
     /// What is new; with `all` also what seldom changes.
     pub(super) fn answer(&mut self, all: bool) -> Result<Reply, Refusal> {
         self.maps()?;
-        let colors = [ColorBy::Height, ColorBy::Color, ColorBy::Weight, ColorBy::Error];
+        use ColorBy::{Color, Error, Height, Passed, Sigma, Weight};
+        let colors = [Height, Color, Weight, Sigma, Passed, Error];
         let colors: Vec<_> = colors.map(|by| json!({ "by": by, "refused": self.refused(by) })).into();
         let Some(maps) = &mut self.maps else { return Err(Refusal::new("there is no map")) };
-        let (by, world) = (self.color, self.source.world());
-        let delta = maps.next(&self.clock, |piece, tsdf, out| shade::shades(by, piece, tsdf, world, out));
+        let (by, source) = (self.color, &self.source);
+        let delta = maps.next(&self.clock, |piece, tsdf, out| shade::shades(by, piece, tsdf, source, out));
         let tsdf = maps.tsdf();
         let lattice = tsdf.lattice();
         let bounds = Extent::of(tsdf).map(|e| e.aabb(lattice));
@@ -58,7 +62,7 @@ impl View3d {
                 "triangles": maps.buffers.triangles(),
                 "pending": maps.buffers.pending(),
             },
-            "color": { "by": by, "ramp": shade::ramp(by, tsdf, maps.buffers.heights()) },
+            "color": { "by": by, "ramp": shade::ramp(by, tsdf, source, maps.buffers.heights()) },
         });
         if all {
             body["all"] = json!({
@@ -75,8 +79,14 @@ impl View3d {
                 "colors": colors,
                 "occupancy": maps.occupancy().is_some(),
                 "half_life": tsdf.rule().half_life(1.0),
+                "movers": source.movers().len(),
             });
         }
+        // They do not change.
+        let movers = if all { source.movers() } else { &[] };
+        let step = movers.len().div_ceil(MOST_MOVERS).max(1);
+        let movers: Vec<f32> =
+            movers.iter().step_by(step).flat_map(|&p| local(p)).map(|v| v as f32).collect();
         let points = maps.points();
         Ok(Reply::of(body)?
             .with("holes", delta.holes)
@@ -85,6 +95,7 @@ impl View3d {
             .with("normals", delta.normals)
             .with("shades", delta.shades)
             .with("indices", delta.indices)
-            .with("points", points))
+            .with("points", points)
+            .with("movers", movers))
     }
 }

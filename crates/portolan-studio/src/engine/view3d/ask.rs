@@ -76,6 +76,10 @@ pub(in crate::engine) enum ColorBy {
     Weight,
     /// The signed distance to the true surface.
     Error,
+    /// The standard deviation of the surface.
+    Sigma,
+    /// The share of the looks that passed the cell that holds the place.
+    Passed,
 }
 
 /// A layer of cells.

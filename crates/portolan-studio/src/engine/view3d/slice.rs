@@ -11,7 +11,7 @@ use crate::engine::Refusal;
 /// Cells along a side of the image; of larger layers every so many cells are shown.
 const LONGEST: usize = 1536;
 
-/// The cells of all bricks: the first, and the one behind the last.
+/// The cells of all bricks but stray ones: the first, and the one behind the last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extent {
     pub(super) first: [i32; 3],
@@ -19,10 +19,19 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// `None` where nothing was observed. O(bricks).
+    /// `None` where nothing was observed. What lies further from all but a hundredth of the bricks on each side than half of
+    /// their extent is left out: a beam through a window shall not make all else a dot. O(bricks).
     pub(super) fn of(tsdf: &Tsdf3) -> Option<Self> {
-        let keys = || tsdf.store().bricks_by_age().map(|(key, _)| key);
-        let side = |k: usize| Some((keys().map(|key| key.0[k]).min()?, keys().map(|key| key.0[k]).max()?));
+        let last = tsdf.store().len().checked_sub(1)?;
+        let side = |k: usize| {
+            let mut all: Vec<i32> = tsdf.store().bricks_by_age().map(|(key, _)| key.0[k]).collect();
+            let (low, high) = (*all.iter().min()?, *all.iter().max()?);
+            let stray = last / 100;
+            let usual_low = *all.select_nth_unstable(stray).1;
+            let usual_high = *all.select_nth_unstable(last - stray).1;
+            let more = 2 + (usual_high - usual_low) / 2;
+            Some((low.max(usual_low - more), high.min(usual_high + more)))
+        };
         let [x, y, z] = [side(0)?, side(1)?, side(2)?];
         Some(Self {
             first: BlockKey([x.0, y.0, z.0]).first_cell(),

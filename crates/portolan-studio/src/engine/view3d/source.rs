@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use portolan::geom::Pose;
-use portolan::geom::vector::{add, norm, scale};
-use portolan::map::Tsdf3;
+use portolan::map::{Attenuation, Tsdf3};
 use portolan::scan::Frame;
+use portolan::uncertainty::SurfaceSigma;
 use portolan_io::scan_log::ScanLog;
 use portolan_sim::SEED;
 use portolan_sim::building::{
@@ -13,7 +13,7 @@ use portolan_sim::building::{
 };
 
 use super::settings::Sensor;
-use crate::engine::{Logs, Refusal, Source3d};
+use crate::engine::{BesideMap, Logs, Refusal, Source3d};
 
 /// Scans of the lidar on its way through the building.
 const LIDAR_SCANS: usize = 40;
@@ -28,6 +28,8 @@ const WAY: usize = 4000;
 pub(super) struct Source {
     logs: Arc<Logs>,
     walk: Option<Walk>,
+    /// Whether a recorded log or map has colors.
+    colored: bool,
 }
 
 /// A walk through the building; its frames are made when they are first asked for.
@@ -44,7 +46,7 @@ struct Walk {
 impl Source {
     pub(super) fn new(logs: &Arc<Logs>, sensor: Sensor) -> Self {
         let walk = matches!(logs.source_3d, Source3d::Building).then(|| Walk::new(sensor));
-        Self { logs: logs.clone(), walk }
+        Self { logs: logs.clone(), walk, colored: is_colored(&logs.source_3d) }
     }
 
     fn recorded(&self) -> Option<&ScanLog> {
@@ -76,6 +78,29 @@ impl Source {
             Source3d::Map { tsdf, .. } => Some(tsdf),
             Source3d::Building | Source3d::Recorded { .. } => None,
         }
+    }
+
+    /// What is known beside a map.
+    fn beside(&self) -> Option<&BesideMap> {
+        match &self.logs.source_3d {
+            Source3d::Map { beside, .. } => Some(beside.as_ref()),
+            Source3d::Building | Source3d::Recorded { .. } => None,
+        }
+    }
+
+    /// How sure the surface of a map is.
+    pub(super) fn sigma(&self) -> Option<&SurfaceSigma> {
+        self.beside()?.sigma.as_ref()
+    }
+
+    /// Which share of the looks the cells of a map stop.
+    pub(super) fn attenuation(&self) -> Option<&Attenuation<3>> {
+        self.beside()?.attenuation.as_ref()
+    }
+
+    /// Returns of what moved and is not in the map (world, meters).
+    pub(super) fn movers(&self) -> &[[f64; 3]] {
+        self.beside().map_or(&[], |beside| &beside.movers)
     }
 
     /// Frames that there are.
@@ -114,7 +139,7 @@ impl Source {
         let pose = self.pose(i).ok_or_else(none)?;
         let frame = match (&mut self.walk, &self.logs.source_3d) {
             (Some(walk), _) => walk.frame(i).ok_or_else(none)?,
-            (None, Source3d::Recorded { log, filter }) => {
+            (None, Source3d::Recorded { log, filter, .. }) => {
                 // What the limits refuse is counted in the frame.
                 let (frame, _) = log.filtered_frame(i, filter).map_err(Refusal::new)?;
                 Arc::new(frame)
@@ -129,34 +154,34 @@ impl Source {
         self.walk.as_ref().map(|walk| &walk.world)
     }
 
-    /// Whether frames may have colors.
+    /// Whether frames have colors, or the map.
     pub(super) fn has_color(&self) -> bool {
-        match &self.walk {
-            Some(walk) => walk.kind == Sensor::Camera,
-            None => self.recorded().is_some(),
-        }
+        self.walk.as_ref().map_or(self.colored, |walk| walk.kind == Sensor::Camera)
     }
 
-    /// The axis of the world that points up: z, except in the worlds of cameras, whose y points down. Their
-    /// worlds are often those of the first picture.
+    /// Unit vector upward in the world.
     pub(super) fn up(&self) -> [f64; 3] {
-        let z = [0.0, 0.0, 1.0];
-        let Some(log) = self.recorded().filter(|log| log.camera().is_some()) else { return z };
-        let step = log.len().div_ceil(200).max(1);
-        let ups = (0..log.len()).step_by(step).map(|i| log.pose(i).rotate([0.0, -1.0, 0.0]));
-        let mean = ups.fold([0.0; 3], add);
-        if !(norm(mean) > 1e-9) {
-            return z;
+        match &self.logs.source_3d {
+            Source3d::Building => [0.0, 0.0, 1.0],
+            Source3d::Recorded { up, .. } | Source3d::Map { up, .. } => *up,
         }
-        let nearest = (0..3).max_by(|&a, &b| mean[a].abs().total_cmp(&mean[b].abs())).unwrap_or(2);
-        let axis: [f64; 3] = std::array::from_fn(|k| if k == nearest { mean[k].signum() } else { 0.0 });
-        let mean = scale(mean, 1.0 / norm(mean));
-        // Cameras look down more often than up: what is nearly an axis is the axis.
-        if mean[nearest].abs() > 0.85 { axis } else { mean }
     }
 
     pub(super) fn memory_bytes(&self) -> usize {
         self.walk.as_ref().map_or(0, |walk| walk.bytes)
+    }
+}
+
+/// Whether the first frame of a log, or a map, has colors. A frame that cannot be read is told when it is fused.
+fn is_colored(source: &Source3d) -> bool {
+    match source {
+        Source3d::Building => false,
+        Source3d::Map { tsdf, .. } => tsdf.colors().is_some_and(|store| !store.is_empty()),
+        Source3d::Recorded { log, .. } => match log.frame(0) {
+            Ok(Frame::Image(image)) => !image.colors.is_empty(),
+            Ok(Frame::Points(scan)) => !scan.colors.is_empty(),
+            Err(_) => false,
+        },
     }
 }
 

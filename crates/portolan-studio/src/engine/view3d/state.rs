@@ -30,13 +30,15 @@ pub(in crate::engine) struct View3d {
 impl View3d {
     pub(in crate::engine) fn new(logs: &Arc<Logs>, limits: Limits, clock: &Clock) -> Self {
         let settings = Settings::default();
+        let source = Source::new(logs, settings.sensor);
         Self {
             limits,
             clock: clock.clone(),
-            source: Source::new(logs, settings.sensor),
+            // What has colors is known by them.
+            color: if source.has_color() { ColorBy::Color } else { ColorBy::Height },
+            source,
             settings,
             maps: None,
-            color: ColorBy::default(),
             revision: 0,
         }
     }
@@ -167,16 +169,18 @@ impl View3d {
 
     /// Why the surface cannot be colored so.
     pub(super) fn refused(&self, by: ColorBy) -> Option<&'static str> {
-        let colored = match self.source.map() {
-            Some(map) => map.colors().is_some(),
-            None => self.source.has_color(),
-        };
         match by {
-            ColorBy::Color if !colored => Some("this sensor measures no color"),
+            ColorBy::Color if !self.source.has_color() => Some("this sensor measures no color"),
             ColorBy::Error if self.source.world().is_none() => {
                 Some("errors are distances to the true surface, which is unknown for a recorded log")
             }
-            ColorBy::Height | ColorBy::Weight | ColorBy::Color | ColorBy::Error => None,
+            ColorBy::Sigma if self.source.sigma().is_none() => Some(
+                "how sure the surface is is known of maps that were made with --ledger, by sigma.json beside them",
+            ),
+            ColorBy::Passed if self.source.attenuation().is_none() => {
+                Some("which share of the looks passed is known of saved maps that hold hits per meter")
+            }
+            _ => None,
         }
     }
 

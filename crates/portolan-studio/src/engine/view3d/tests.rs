@@ -3,11 +3,15 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use portolan::mapper::{Mapper, MapperSettings};
+use portolan::store::Store;
 use portolan::surface::{MeshSettings, marching_cubes};
+use portolan::uncertainty::SurfaceSigma;
+use portolan_sim::building::{BuildingConfig, BuildingSensor, SpinningLidar, building_log};
 use serde_json::{Value, json};
 
 use super::state::View3d;
-use crate::engine::{Clock, Limits, Logs, Refusal, Reply, Session, Values, Wire};
+use crate::engine::{BesideMap, Clock, Limits, Logs, Refusal, Reply, Session, Source3d, Values, Wire};
 
 fn view() -> View3d {
     View3d::new(&Arc::new(Logs::default()), Limits::default(), &Clock::new(|| 0.0))
@@ -137,6 +141,64 @@ fn what_the_page_has_is_the_mesh() {
         assert_eq!(known > 0, by != "height", "{by}");
     }
     assert!(ask(&mut view, json!({ "op": "color", "by": "color" })).is_err());
+}
+
+#[test]
+fn a_saved_map_is_colored_by_what_lies_beside_it() {
+    let lidar = SpinningLidar { rings: 32, columns: 256, ..SpinningLidar::default() };
+    let config = BuildingConfig { scans: 3, sensor: BuildingSensor::Lidar(lidar), ..Default::default() };
+    let mut mapper = Mapper::with(MapperSettings { origin: Some([0.0; 3]), ..MapperSettings::<3>::new(0.2) });
+    for (pose, frame) in &building_log(&config).scans {
+        mapper.integrate(pose, frame).unwrap();
+    }
+    let (tsdf, attenuation) = (mapper.tsdf().unwrap().clone(), mapper.attenuation().unwrap().clone());
+    let sigma = SurfaceSigma::through([[1.0, 0.02], [100.0, 0.002]]).unwrap();
+    let beside = BesideMap {
+        sigma: Some(sigma.clone()),
+        movers: vec![[1.0, 2.0, 0.5]; 3],
+        attenuation: Some(attenuation.clone()),
+    };
+    let beside = Box::new(beside);
+    let (name, up) = ("a map".to_owned(), [0.0, 0.0, 1.0]);
+    let source_3d = Source3d::Map { name, tsdf: Box::new(tsdf.clone()), up, beside };
+    let logs = Arc::new(Logs { source_3d, ..Logs::default() });
+    let (mut view, mut page) = (View3d::new(&logs, Limits::default(), &Clock::new(|| 0.0)), Page::default());
+    let reply = ask(&mut view, json!({ "op": "open" })).unwrap();
+    let origin = [0, 1, 2].map(|k| reply.body["all"]["origin"][k].as_f64().unwrap());
+    assert_eq!(reply.body["all"]["movers"], 3);
+    let moved = &reply.arrays.iter().find(|a| a.name == "movers").unwrap().values;
+    let expected = [0, 1, 2].map(|k| ([1.0, 2.0, 0.5][k] - origin[k]) as f32);
+    assert!(matches!(moved, Values::F32(all) if all[..] == expected.repeat(3)));
+    drain(&mut view, &mut page, reply);
+
+    let known = |share: f64| [(255.0 * share).round().clamp(0.0, 255.0) as u8, 0, 0, 255];
+    let by_sigma = |p: [f64; 3]| {
+        let at = sigma.of_distance(tsdf.store(), p, 0.0, [0.0; 3])?;
+        Some(known((at / 0.002).ln() / 10f64.ln()))
+    };
+    let by_passed = |p: [f64; 3]| {
+        let stopped = attenuation.opacity(attenuation.store().lattice().cell_of(p)?)?;
+        Some(known(1.0 - stopped))
+    };
+    for (by, expected) in
+        [("sigma", &by_sigma as &dyn Fn([f64; 3]) -> Option<[u8; 4]>), ("passed", &by_passed)]
+    {
+        let reply = ask(&mut view, json!({ "op": "color", "by": by })).unwrap();
+        drain(&mut view, &mut page, reply);
+        let (mut right, mut some) = (0, 0);
+        let places = page.positions.chunks(3).zip(page.shades.chunks(4)).filter(|(p, _)| p[0].is_finite());
+        let all = places.clone().count();
+        for (p, shade) in places {
+            let p = [0, 1, 2].map(|k| origin[k] + f64::from(p[k]));
+            right += usize::from(shade == expected(p).unwrap_or([0; 4]));
+            some += usize::from(shade[3] == 255);
+        }
+        // A place on the border of two cells may be in either, by rounding.
+        assert!(all > 1000 && 100 * right > 99 * all && 2 * some > all, "{by}: {right}, {some} of {all}");
+    }
+    for by in ["sigma", "passed"] {
+        assert!(ask(&mut self::view(), json!({ "op": "color", "by": by })).is_err());
+    }
 }
 
 #[test]

@@ -39,7 +39,7 @@ mod surface;
 mod transform;
 mod unknown;
 
-pub use clearance::SurfaceNoise;
+pub use clearance::{LessNoise, SurfaceNoise};
 pub use field::Esdf;
 pub use obstacles::{LEAST_HITS, ObstacleCells, PointKind};
 pub use settings::{EsdfMethod, EsdfSettings, EsdfUpdate};

@@ -23,15 +23,17 @@ const TOGETHER: usize = 128;
 const NONE: u32 = u32::MAX;
 
 /// Joins pieces in ascending order of keys. Every crossing belongs to the brick where its edge starts; lower neighbors find
-/// it by its place there, without comparing positions. Beside the mesh the ranges of its vertices, if they are wanted.
+/// it by its place there, without comparing positions. Beside the mesh the ranges of its vertices, if they are wanted. On so
+/// many `threads` at most.
 pub(super) fn assemble(
     pieces: &[(&Part, &Piece)],
     placement: &Placement,
     want: Attributes,
+    threads: usize,
 ) -> (Mesh, Vec<f32>) {
     let lowest = |k: usize| pieces.iter().map(|(_, p)| p.key.0[k]).min().unwrap_or(0);
     let first = placement.first.unwrap_or_else(|| [0, 1, 2].map(lowest));
-    let owners = owners(pieces);
+    let owners = owners(pieces, threads);
     let kept = kept(pieces, &owners);
     let joint = Joint { pieces, owners, starts: starts(pieces, &kept), kept, placement, first, want };
     let (vertices, triangles) = joint.starts[pieces.len()];
@@ -63,7 +65,7 @@ pub(super) fn assemble(
             }
         })
         .collect();
-    parallel::change_each(&mut places, 1, Vec::new, |place, numbers| joint.fill(place, numbers));
+    parallel::change_each_on(threads, &mut places, 1, Vec::new, |place, numbers| joint.fill(place, numbers));
     super::normals::complete(&mut mesh);
     (mesh, ranges)
 }
@@ -210,10 +212,11 @@ impl Joint<'_> {
 }
 
 /// The upper neighbors of every piece. Keys ascend, so that one pass per octant finds those of many pieces.
-fn owners(pieces: &[(&Part, &Piece)]) -> Vec<[u32; 8]> {
+fn owners(pieces: &[(&Part, &Piece)], threads: usize) -> Vec<[u32; 8]> {
     let order = |key: [i32; 3]| (key[2], key[1], key[0]);
     let mut owners = vec![[NONE; 8]; pieces.len()];
-    parallel::for_each(
+    parallel::for_each_on(
+        threads,
         owners.chunks_mut(8 * TOGETHER).enumerate(),
         || (),
         |(chunk, owners), ()| {

@@ -111,7 +111,7 @@ fn mesh_of(
         part
     });
     let pieces: Vec<_> = parts.iter().flat_map(|part| part.pieces.iter().map(move |p| (part, p))).collect();
-    assemble(&pieces, &Placement::of(store), want).0
+    assemble(&pieces, &Placement::of(store), want, usize::MAX).0
 }
 
 /// The order of keys as a tuple.

@@ -92,7 +92,7 @@ impl IncrementalMesh {
             .flat_map(|part| part.pieces.iter().map(move |piece| (part, piece)))
             .collect();
         pieces.sort_unstable_by_key(|(_, piece)| order(piece.key));
-        assemble(&pieces, placement, self.settings.attributes(self.colored)).0
+        assemble(&pieces, placement, self.settings.attributes(self.colored), usize::MAX).0
     }
 
     /// The keys of all pieces, ascending. O(n log n).

@@ -124,11 +124,12 @@ pub(super) fn surface(
     samples: &DenseSamples,
     below: Below,
     want: Attributes,
+    threads: usize,
 ) -> Option<(Mesh, Vec<f32>)> {
     if samples.shape.iter().any(|n| *n < 2) {
         return None;
     }
-    let counted = parallel::map_numbers(tiles.count(), Vec::new, |i, signs| {
+    let counted = parallel::map_numbers_on(threads, tiles.count(), Vec::new, |i, signs| {
         let tile = tiles.tile(i);
         if !tile.read(samples.samples, samples.shape, below, signs) {
             return None;
@@ -174,9 +175,10 @@ pub(super) fn surface(
         })
         .collect();
     let writer = Writer { samples, bricks: &bricks, grid: &grid, extent: tiles.bricks, want };
-    let numbers = || vec![[0; 1024]; 4];
-    parallel::change_each(&mut places, 1, numbers, |place, numbers| {
-        fill(&writer, place, numbers.as_flattened_mut())
+    // On the stack: an allocation of this size costs a small array more than its surface.
+    let numbers = || [0u32; 4096];
+    parallel::change_each_on(threads, &mut places, 1, numbers, |place, numbers| {
+        fill(&writer, place, numbers)
     });
     super::normals::complete(&mut mesh);
     Some((mesh, ranges))

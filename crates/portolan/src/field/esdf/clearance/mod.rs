@@ -14,4 +14,4 @@ mod noise;
 mod points;
 mod search;
 
-pub use noise::SurfaceNoise;
+pub use noise::{LessNoise, SurfaceNoise};

@@ -68,7 +68,9 @@ impl<const D: usize> Block<D> {
                     side[s][k] = corners[(s + 1) % D][k][l] - corners[s][k][l];
                 }
                 let length_sq = dot(&side[s], &side[s]);
-                block.inverse_sq[s][l] = if length_sq > 0.0 { 1.0 / length_sq } else { 0.0 };
+                // So short that the inverse of its square is infinite, and of no length: its points are one.
+                let inverse = 1.0 / length_sq;
+                block.inverse_sq[s][l] = if inverse.is_finite() { inverse } else { 0.0 };
             }
             if D == 3 {
                 let normal = cross(&side[0], &side[1]);
@@ -155,6 +157,15 @@ mod tests {
                 1 => simplex = [simplex[0]; D],
                 2 => simplex[D - 1] = std::array::from_fn(|k| 0.5 * (simplex[0][k] + simplex[1][k])),
                 3 => simplex[D - 1] = simplex[0].map(|v| v + 0.004 * (v - 0.5)),
+                // Beside zero numbers are dense: sides whose squares are subnormal, or zero.
+                4 => {
+                    let tiny = [1e-19, 1e-20, 1e-22, 1e-30][n / 8 % 4];
+                    simplex =
+                        [[0.0; D], [tiny; D], std::array::from_fn(|k| if k == 0 { -tiny } else { tiny })]
+                            [..D]
+                            .try_into()
+                            .unwrap();
+                }
                 _ => {}
             }
             let size = [1.0, 3.0, 40.0][n % 3];
