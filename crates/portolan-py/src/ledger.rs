@@ -41,7 +41,9 @@ fn of_ledger(error: &LedgerError) -> PyErr {
 }
 
 fn made<const D: usize>(options: &Options) -> PyResult<Box<portolan::Ledger<D>>> {
-    let settings = portolan::MapperSettings { color: false, ..options.settings::<D>()? };
+    let settings = options.settings::<D>()?;
+    // What shapes sums is part of their map: no colors are promised where no sensor sees any.
+    let settings = portolan::MapperSettings { color: settings.color && D == 3, ..settings };
     portolan::Ledger::new(settings).map(Box::new).map_err(|error| of_ledger(&error))
 }
 
@@ -229,8 +231,8 @@ impl Ledger {
 impl Ledger {
     #[new]
     #[pyo3(signature = (resolution, *, truncation=None, carve=true, carve_weight=None, weights="constant", sweep=None,
-                        occupancy=true, attenuation=true, distances=true, max_distance=1.0, thin=None, bounds=None,
-                        origin=None, memory=None))]
+                        occupancy=true, attenuation=true, distances=true, color=true, max_distance=1.0, thin=None,
+                        bounds=None, origin=None, memory=None))]
     #[expect(clippy::too_many_arguments)]
     fn new(
         resolution: f64,
@@ -242,6 +244,7 @@ impl Ledger {
         occupancy: bool,
         attenuation: bool,
         distances: bool,
+        color: bool,
         max_distance: f64,
         thin: Option<f64>,
         bounds: Option<Vec<f64>>,
@@ -257,7 +260,7 @@ impl Ledger {
             occupancy,
             attenuation,
             distances,
-            color: false,
+            color,
             max_distance,
             thin,
             bounds,

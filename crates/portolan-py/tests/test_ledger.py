@@ -68,6 +68,29 @@ def test_3d_copies_pickles_and_files(tmp_path):
     assert ours.poses.shape == (2, 4, 4)
 
 
+def test_colors_add_up():
+    points = sphere_points(5000)
+    red, blue = (np.tile(np.uint8([c]), (len(points), 1)) for c in ([250, 10, 0], [0, 10, 250]))
+
+    def ball(which, **settings):
+        ledger = portolan.Ledger(0.2, **settings)
+        for i, colors in which:
+            ledger.add("ball", i, points, np.eye(4), colors=colors)
+        return ledger
+
+    both = ball([(0, red), (1, blue)])
+    merged = ball([(1, blue)])
+    merged.merge(ball([(0, red)]))
+    assert merged.to_bytes() == both.to_bytes() and portolan.Ledger.from_bytes(both.to_bytes()) == both
+    colors = both.mapper().mesh().colors
+    assert len(colors) and np.abs(colors.astype(int) - [125, 10, 125]).max() <= 1
+    with pytest.raises(ValueError, match="other readings"):
+        both.subtract("ball", 1, points, colors=red)
+    both.subtract("ball", 1, points, colors=blue)
+    assert np.abs(both.mapper().mesh().colors.astype(int) - [250, 10, 0]).max() <= 1
+    assert ball([(0, red)], color=False).mapper().mesh().colors is None
+
+
 def test_slips_are_told():
     ledger = fused([0, 1])
     before = ledger.to_bytes()

@@ -4,7 +4,7 @@
 #![allow(clippy::print_stdout, reason = "an example")]
 
 use portolan::field::{ClearanceField, Esdf, EsdfSettings, UnknownSpace};
-use portolan::plan::{Demand, PathCheck, Waypoints, check_path};
+use portolan::plan::{Demand, PathCheck, Waypoints, check_path, path_violations};
 use portolan::{Mapper, MapperSettings};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -26,12 +26,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let way: Vec<[f64; 2]> = log.iter().step_by(10).map(|(pose, _)| pose.translation).collect();
     for clearance in [0.1, 0.2, 2.0] {
         // Every point of the path, also between those that were looked at, is at least so far from obstacles.
-        match check_path(&esdf, &Waypoints::new(way.clone())?, &Demand::new(clearance)) {
+        let path = Waypoints::new(way.clone())?;
+        match check_path(&esdf, &path, &Demand::new(clearance)) {
             PathCheck::Certified(least) => {
                 println!("{clearance} m: certified, {:.3} m at least", least.lower)
             }
             PathCheck::Violated(first) => {
                 println!("{clearance} m: refused from {:.2} m on: {:?}", first.from, first.cause);
+                let all = path_violations(&esdf, &path, &Demand::new(clearance));
+                let length: f64 = all.iter().map(|part| part.to - part.from).sum();
+                println!("    {} parts of it, {length:.2} m in all", all.len());
             }
         }
     }

@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
-use portolan::Mapper;
 use portolan::geom::Pose;
 use portolan::ledger::LedgerError;
 use portolan::map::MapError;
 use portolan::mapper::Fused;
 use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
+use portolan::{Answer, Mapper};
 use portolan_io::IoError;
 use portolan_io::scan_log::ScanLog;
 
+use super::agreement::Agreement;
 use super::movers::{FoundMovers, Judge, Looking};
 use super::{Calibration, OccupancyKinds};
 use crate::progress::Progress;
@@ -44,6 +45,8 @@ pub(crate) struct FusionReport {
     pub(crate) contradiction: Option<String>,
     /// Scans that were moved, and scans of the log in the map, where scans were to be moved.
     pub(crate) moved: Option<[u64; 2]>,
+    /// Whether 3-D scans agree with each other.
+    pub(crate) agreement: Agreement,
     /// What moved and is not in the maps, where that was asked for.
     pub(crate) movers: Option<FoundMovers>,
     /// How sure the surface is, or why that is not known; `None` where the maps do not tell.
@@ -201,6 +204,12 @@ pub(super) trait TakesFrames {
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, LedgerError>;
 
+    /// The signed distance at a point, as of now; `None`: the maps hold no distances.
+    fn signed_distance(&self, p: [f64; 3]) -> Option<Answer<f64>>;
+
+    /// Edge of a cell (meters).
+    fn resolution(&self) -> f64;
+
     /// Bytes held.
     fn memory_bytes(&self) -> usize;
 }
@@ -214,6 +223,14 @@ impl TakesFrames for Mapper<3> {
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, LedgerError> {
         Ok(self.integrate_timed(pose, frame, clock)?)
+    }
+
+    fn signed_distance(&self, p: [f64; 3]) -> Option<Answer<f64>> {
+        self.tsdf().map(|tsdf| tsdf.signed_distance(p))
+    }
+
+    fn resolution(&self) -> f64 {
+        self.settings().resolution
     }
 
     fn memory_bytes(&self) -> usize {
@@ -262,7 +279,11 @@ fn fuse(
             break;
         }
         *report.seconds.entry("frames").or_default() += clock() - waiting;
-        match read.map(|(frame, counts)| (maps.take(i, &pose, &frame, &clock), frame, counts)) {
+        let take = |(frame, counts): (Frame, BeamCounts)| {
+            report.agreement.look(&pose, &frame, maps.resolution(), |p| maps.signed_distance(p));
+            (maps.take(i, &pose, &frame, &clock), frame, counts)
+        };
+        match read.map(take) {
             Ok((Ok(fused), frame, counts)) => {
                 let stats = report.add::<3>(&fused);
                 // Points that share a row and column with a nearer one, or lie outside of all.

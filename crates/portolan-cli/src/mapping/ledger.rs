@@ -251,6 +251,7 @@ impl<'a, const D: usize> Part<'a, D> {
     fn count_scan(&mut self) {
         self.added += 1;
         if self.ends.is_some_and(|ends| ends.contains(&self.added))
+            && self.aside.is_unused()
             && self.ledger.memory_bytes() < self.ledger.settings().memory / 3
         {
             self.parts.extend(self.ledger.distance_sums().cloned());
@@ -306,8 +307,9 @@ impl<'a, const D: usize> Part<'a, D> {
         }
     }
 
-    /// Writes the ledger into a file and begins another one.
+    /// Writes the ledger into a file and begins another one. Parts of the log are of no use from then on.
     fn put_aside(&mut self) -> anyhow::Result<()> {
+        self.parts.clear();
         let empty = Ledger::new(*self.ledger.settings())?;
         let full = std::mem::replace(&mut *self.ledger, empty);
         self.aside.put(full)
@@ -406,6 +408,14 @@ impl super::fuse::TakesFrames for Part<'_, 3> {
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, LedgerError> {
         self.add(index, pose, frame, clock)
+    }
+
+    fn signed_distance(&self, p: [f64; 3]) -> Option<portolan::Answer<f64>> {
+        self.ledger.signed_distance(p)
+    }
+
+    fn resolution(&self) -> f64 {
+        self.ledger.settings().resolution
     }
 
     fn memory_bytes(&self) -> usize {

@@ -5,12 +5,13 @@
 //! | what is asked for | `settings.rs`, `choices.rs` |
 //! | the library's recipe for it | `recipe.rs` |
 //! | scans and empty or saved maps | `mapper.rs`, `extent.rs` |
-//! | one scan after the other | `fuse.rs`, `movers.rs`; into sums `ledger.rs`, `aside.rs` |
+//! | one scan after the other | `fuse.rs`, `agreement.rs`, `movers.rs`; into sums `ledger.rs`, `aside.rs` |
 //! | surface, distance field, octree | `derived.rs` |
 //! | how sure the surface is | `sigma.rs` |
 //! | files | `artifacts.rs`, `files.rs`, `octomap.rs`, `map_server.rs`, `picture.rs`, `preview.rs` |
 //! | the report | `summary.rs` |
 
+mod agreement;
 mod artifacts;
 mod aside;
 mod choices;

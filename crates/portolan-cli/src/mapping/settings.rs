@@ -196,11 +196,12 @@ impl Settings {
         let shape = &mut self.shape;
         shape.truncation.get_or_insert(three_cells(shape.resolution));
         shape.sweep.get_or_insert(SweepArg::usual(dimension));
-        // Sums do not forget by themselves, and hold no colors.
+        // Sums do not forget by themselves.
         let usual = if shape.ledger { f32::INFINITY } else { W_MAX };
         let asked = shape.forgetting.w_max().filter(|_| !shape.ledger);
         shape.forgetting = ForgettingArgs::of(asked.unwrap_or(usual));
-        shape.color &= !shape.ledger;
+        // What shapes sums is part of their map: no colors are promised where no sensor sees any.
+        shape.color &= !shape.ledger || dimension == Dimension::Three;
         if self.maps.is_empty() {
             let made = |kind: &&MapKind| kind.only().is_none_or(|only| only == dimension);
             let all = MapKind::value_variants().iter().filter(made).copied();
@@ -315,9 +316,7 @@ impl Settings {
                 (100.0 * self.w_max()).round() / 100.0,
                 self.half_life()
             ),
-            false if self.shape.ledger => {
-                "sums: nothing is forgotten until it is taken out, and no colors are kept".to_owned()
-            }
+            false if self.shape.ledger => "sums: nothing is forgotten until it is taken out".to_owned(),
             false => "W_max infinite: nothing is forgotten".to_owned(),
         }
     }

@@ -64,6 +64,7 @@ impl Summary<'_> {
         if let SavedMap::Three(file) = self.file {
             warnings.extend(file.tsdf_bricks.as_ref().and_then(|tsdf| strays(&tsdf.store)));
         }
+        warnings.extend(self.fusion.agreement.warning(self.log));
         warnings.extend(self.fusion.movers.as_ref().and_then(FoundMovers::warning));
         warnings.extend(self.surface_warnings());
         let keeps = match self.file {
@@ -155,6 +156,7 @@ impl Summary<'_> {
                     json!({ "nodes": t.tree.nodes(), "inner": t.tree.inner_nodes(), "shift": t.shift })
                 }));
                 document["motion"] = self.log.motion_json();
+                document["agreement"] = self.fusion.agreement.to_json();
                 document["sweeps"] = json::ways(&self.fusion.stats.ways);
                 document["points_without_pixel"] = json!(self.fusion.without_pixel);
             }

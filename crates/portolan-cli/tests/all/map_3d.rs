@@ -4,7 +4,7 @@ use crate::support;
 
 use std::path::Path;
 
-use crate::support::logs_3d::{camera_log, lidar_log};
+use crate::support::logs_3d::{camera_log, lidar_log, lidar_log_of_camera_poses};
 use crate::support::{arg, fail, json, succeed};
 
 fn map(log: &Path, out: &Path, more: &[&str]) -> String {
@@ -109,6 +109,35 @@ fn a_camera_log_becomes_a_coloured_mesh() {
     assert!(!out.join("octree.bt").exists());
     map(&log, &out, &["--maps", "mesh", "--no-color"]);
     assert_eq!(self::summary(&out)["mesh"]["colors"], false);
+}
+
+/// Poses of another body and depths of another unit: what scans hit is where others saw nothing, and the likely cure is named.
+#[test]
+fn scans_that_do_not_fit_their_poses_are_told() {
+    let agreement = |log: &Path, more: &[&str]| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        map(log, &out, more);
+        let summary = summary(&out);
+        let of = |what: &str| summary["agreement"][what].as_f64().unwrap();
+        let warnings = summary["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap().to_owned());
+        let warning = warnings.filter(|w| w.contains("earlier scans saw free")).collect::<String>();
+        (of("hits"), of("in_free_space") / of("hits"), warning)
+    };
+    let (folder, log) = lidar_log_of_camera_poses();
+    let (hits, share, warning) = agreement(&log, &[]);
+    assert!(hits > 200.0 && share < 0.01 && warning.is_empty(), "{hits} {share} {warning}");
+    let camera_poses = folder.path().join("poses-of-the-camera.txt");
+    std::fs::copy(log.join("poses.txt"), &camera_poses).unwrap();
+    for more in [&["--poses", arg(&camera_poses)][..], &["--poses", arg(&camera_poses), "--ledger"]] {
+        let (_, share, warning) = agreement(&log, more);
+        assert!(warning.contains("the Tr of calib.txt"), "{share} {warning}");
+    }
+    let (_folder, log) = camera_log();
+    let (hits, share, warning) = agreement(&log, &[]);
+    assert!(hits > 200.0 && share < 0.01 && warning.is_empty(), "{hits} {share} {warning}");
+    let (_, share, warning) = agreement(&log, &["--depth-scale", "200"]);
+    assert!(warning.contains("--depth-scale"), "{share} {warning}");
 }
 
 #[test]

@@ -2,8 +2,8 @@
 
 use portolan::Ledger;
 use portolan::cell::{
-    DISTANCE_STEPS, DistanceSum, HitLengthSum, HitMissSum, LENGTH_UNITS, OccupancyModel, SumBrick, SumCell,
-    WEIGHT_UNITS,
+    ColorSum, DISTANCE_STEPS, DistanceSum, HitLengthSum, HitMissSum, LENGTH_UNITS, OccupancyModel, SumBrick,
+    SumCell, WEIGHT_UNITS,
 };
 use portolan::geom::{Aabb, BlockKey, Lattice, Pose, block_cells};
 use portolan::ledger::{LedgerScans, LedgerSums, ScanRecord};
@@ -28,6 +28,7 @@ const BRICK_OVERHEAD: u64 = 112;
 const SCANS: &str = "SCANS";
 pub(super) const OCCUPANCY: &str = "OSUMS";
 pub(super) const DISTANCES: &str = "TSUMS";
+pub(super) const COLORS: &str = "CSUMS";
 pub(super) const ATTENUATION: &str = "ASUMS";
 
 /// What the header says of a ledger: all that shapes its sums.
@@ -45,6 +46,9 @@ struct Settings {
     /// `None`: no occupancy.
     model: Option<ModelOf>,
     distances: bool,
+    /// Not written where there are none: as files were before there could be any.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    color: bool,
     attenuation: bool,
     distance_steps: i32,
     weight_units: i32,
@@ -69,6 +73,7 @@ pub(super) fn header<const D: usize>(s: &MapperSettings<D>) -> serde_json::Resul
         bounds: s.bounds.map(|b| [b.min.to_vec(), b.max.to_vec()]),
         model: s.occupancy.map(ModelOf),
         distances: s.distances,
+        color: s.color,
         attenuation: s.attenuation.is_some(),
         distance_steps: DISTANCE_STEPS,
         weight_units: WEIGHT_UNITS,
@@ -85,6 +90,9 @@ pub(super) fn write<const D: usize>(ledger: &Ledger<D>, writer: &mut ContainerWr
     }
     if let Some(sums) = ledger.distance_sums() {
         write_sums(writer, DISTANCES, sums)?;
+    }
+    if let Some(sums) = ledger.color_sums() {
+        write_sums(writer, COLORS, sums)?;
     }
     if let Some(sums) = ledger.attenuation_sums() {
         write_sums(writer, ATTENUATION, sums)?;
@@ -195,6 +203,7 @@ impl Reading<'_> {
                 self.sums::<HitMissSum, D, 2>(OCCUPANCY, lattice)
             })?,
             distances: some_if(settings.distances, || self.sums::<DistanceSum, D, 2>(DISTANCES, lattice))?,
+            colors: some_if(settings.color, || self.sums::<ColorSum, D, 4>(COLORS, lattice))?,
             attenuation: some_if(settings.attenuation.is_some(), || {
                 self.sums::<HitLengthSum, D, 3>(ATTENUATION, lattice)
             })?,
@@ -230,6 +239,7 @@ impl Reading<'_> {
             occupancy: s.model.map(|model| model.0),
             attenuation: s.attenuation.then(Default::default),
             distances: s.distances,
+            color: s.color,
             bounds,
             ..MapperSettings::new(s.resolution)
         })

@@ -3,14 +3,14 @@
 use std::collections::VecDeque;
 use std::path::Path;
 
-use portolan::cell::{DistanceSum, HitLengthSum, HitMissSum, Sign, SumBrick, SumCell, SumPlanes};
+use portolan::cell::{ColorSum, DistanceSum, HitLengthSum, HitMissSum, Sign, SumBrick, SumCell, SumPlanes};
 use portolan::geom::{BlockKey, block_cells};
 use portolan::ledger::{LedgerError, LedgerScans, check_settings};
 use portolan::mapper::MapperSettings;
 use serde_json::{Value, json};
 
 use super::ledger::{
-    ATTENUATION, DISTANCES, FIELD, OCCUPANCY, SumParts, brick, bytes_of, header, write_scans,
+    ATTENUATION, COLORS, DISTANCES, FIELD, OCCUPANCY, SumParts, brick, bytes_of, header, write_scans,
 };
 use super::reading::{AGAIN, Reading};
 use super::{MapHeader, VERSION, part_name};
@@ -76,6 +76,9 @@ pub fn add_ledger_files<const D: usize>(
     }
     if first.settings.distances {
         add_sums::<DistanceSum, D, 2>(files, DISTANCES, &mut writer)?;
+    }
+    if first.settings.color {
+        add_sums::<ColorSum, D, 4>(files, COLORS, &mut writer)?;
     }
     if first.settings.attenuation.is_some() {
         add_sums::<HitLengthSum, D, 3>(files, ATTENUATION, &mut writer)?;

@@ -4,7 +4,7 @@ use portolan::Ledger;
 use portolan::cell::Sign;
 use portolan::geom::{Aabb, Pose, block_cells};
 use portolan::mapper::MapperSettings;
-use portolan::scan::{Beam, BeamKind, Scan};
+use portolan::scan::{Beam, BeamKind, PointScan, Scan};
 use serde_json::{Value, json};
 
 use super::*;
@@ -239,4 +239,57 @@ fn files_add_up_without_being_held<const D: usize>() {
     writer.chunk("TSUMS", "width", &[4]).unwrap();
     writer.write(at("bad")).unwrap();
     assert!(add(&[("bad", Sign::Plus)]).err().unwrap().to_string().contains("the division of chunk"));
+}
+
+/// Scans of points with colors into a ledger that keeps them.
+fn colored(which: &[u64]) -> Ledger<3> {
+    let mut ledger = Ledger::new(MapperSettings { color: true, ..settings() }).unwrap();
+    for &i in which {
+        let points = (0..40u8).map(|k| [2.0, 0.05 * f32::from(k) - 1.0, 0.1 * i as f32]);
+        let mut scan = PointScan::new(points, [0.0; 3]);
+        scan.colors = (0..40).map(|k| [k, 200 - k, i as u8]).collect();
+        ledger.add("points.ply", i, &Pose::IDENTITY, &scan).unwrap();
+    }
+    ledger
+}
+
+#[test]
+fn colors_survive_and_add_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let whole = bytes(colored(&[0, 1, 2, 3]));
+    assert!(bytes(colored(&[3, 1, 0, 2])) == whole);
+    let back = parse::<3>(whole.clone()).unwrap().ledger.unwrap();
+    assert!(back == colored(&[0, 1, 2, 3]) && back.settings().color);
+    assert!(back.color_sums().is_some_and(|sums| !sums.is_empty()));
+    let wall = [1.95, 0.05, 0.15];
+    let color = |ledger: &Ledger<3>| ledger.mapper().unwrap().tsdf().unwrap().color(wall);
+    assert!(color(&back).is_some() && color(&back) == color(&colored(&[0, 1, 2, 3])));
+    assert_ne!(color(&back), color(&colored(&[1])));
+    // Without colors a file is what it was before there could be any.
+    let plain = bytes(Ledger::<3>::new(settings()).unwrap());
+    let container = Container::parse(plain, "m".as_ref()).unwrap();
+    assert!(container.chunks().iter().all(|chunk| chunk.tag != "CSUMS"));
+    let head = String::from_utf8(container.get("HEAD", "").unwrap().unwrap()).unwrap();
+    assert!(!head.contains("color"), "{head}");
+
+    file(colored(&[0, 2])).write(at("a")).unwrap();
+    file(colored(&[1, 3])).write(at("b")).unwrap();
+    let files =
+        ["b", "a"].map(|name| (LedgerFile::<3>::open(at(name), 1 << 30).unwrap().unwrap(), Sign::Plus));
+    add_ledger_files(&files, &MapHeader::default(), &at("sum")).unwrap();
+    assert!(std::fs::read(at("sum")).unwrap() == whole);
+
+    let container = Container::parse(whole, "m".as_ref()).unwrap();
+    let edited = |edit: &dyn Fn(&mut Vec<u8>)| {
+        let mut content = container.get("CSUMS", "sums").unwrap().unwrap();
+        edit(&mut content);
+        let mut writer = container.writer(|c| c.tag != "CSUMS" || c.name != "sums").unwrap();
+        writer.chunk("CSUMS", "sums", &content).unwrap();
+        parse::<3>(writer.to_bytes()).map_or_else(|e| e.to_string(), |_| "read".into())
+    };
+    assert_eq!(edited(&|_| {}), "read");
+    let brighter = edited(&|sums| sums[..4].copy_from_slice(&i32::MAX.to_le_bytes()));
+    assert!(brighter.contains("not possible (in block"), "{brighter}");
+    assert!(edited(&|sums| sums.truncate(sums.len() - 1)).contains("CSUMS"));
 }

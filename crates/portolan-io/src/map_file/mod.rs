@@ -14,10 +14,11 @@
 //! | `CBRICKS` | `color` | in the order of the keys: u16 red, green, blue, weight of each cell; weight 0: never observed, else `w`: 2^(w / 2048 - 24) * (1 + w % 2048 / 2048) |
 //! | `ABRICKS` | `hits`, `length`, `looks` | in the order of the keys: u32 beams that ended in each cell; u32 length of all beams inside of it, `length_units` to a cell's edge; u16 scans that looked, 0: never observed |
 //! | `SCANS` | `logs`, `index`, `readings`, `sensor` | of a ledger: JSON list of logs and their numbers of scans; then per scan, by log and number: u64 number in its log; u64 that tells its readings from others; f64 pose as in `POSES` |
-//! | `OSUMS`, `TSUMS`, `ASUMS` | `keys` | of a ledger: as those of bricks |
-//! | `OSUMS`, `TSUMS`, `ASUMS` | `width` | per brick u8: bytes of each of its numbers, 2, 4 or 8; 0: all cells are alike |
+//! | `OSUMS`, `TSUMS`, `CSUMS`, `ASUMS` | `keys` | of a ledger: as those of bricks |
+//! | `OSUMS`, `TSUMS`, `CSUMS`, `ASUMS` | `width` | per brick u8: bytes of each of its numbers, 2, 4 or 8; 0: all cells are alike |
 //! | `OSUMS` | `sums` | per brick, whole numbers with a sign, two's complement: scans that hit each cell, then those that passed it; where all are alike one i64 each |
 //! | `TSUMS` | `sums` | the same: sum of weight times distance (`weight_units` times `distance_steps` to the truncation), then sum of weights |
+//! | `CSUMS` | `sums` | the same: sums of weight (`weight_units`) times red, green, blue (bytes), then sum of weights; in the header `color` |
 //! | `ASUMS` | `sums` | the same: beams that ended in each cell; length of all beams (`length_units` to a cell's edge); scans that looked |
 //! | `POSES` | `sensor` | per fused scan: f64 rows of the rotation, then the translation (`world_from_sensor`) |
 //!

@@ -200,7 +200,7 @@ class Ledger:
     """Evidence that adds up: sums of whole numbers, and the list of the scans in them.
 
     Any split of scans, any order, any number of processes: equal ledgers, and equal bytes. Scans are taken out again, or
-    moved to other poses, exactly. Nothing is forgotten by itself, and no colors are kept. Scans are known by the name of their
+    moved to other poses, exactly. Nothing is forgotten by itself. Scans are known by the name of their
     log and their number in it. Arguments are those of `Mapper`.
     """
 
@@ -216,6 +216,7 @@ class Ledger:
         occupancy: bool = True,
         attenuation: bool = True,
         distances: bool = True,
+        color: bool = True,
         max_distance: float = 1.0,
         thin: Optional[float] = None,
         bounds: Optional[Sequence[float]] = None,

@@ -33,7 +33,7 @@ impl Color {
 
     /// The word of a positive weight, rounded to nearest; never the word of what was not observed.
     #[inline]
-    fn word(weight: f32) -> u16 {
+    pub(super) fn word(weight: f32) -> u16 {
         (((weight.to_bits() + 0x800) >> 12).saturating_sub(BIAS)).clamp(1, u32::from(u16::MAX)) as u16
     }
 }

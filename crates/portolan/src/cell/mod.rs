@@ -30,8 +30,8 @@ pub use model::{OccupancyModel, OccupancyModelError};
 pub use signed_distance::{DistancePlanes, FusionEvent, SignedDistance, TsdfRule, TsdfRuleError};
 pub use stop_rule::{StopRule, mean_chord};
 pub use sums::{
-    DISTANCE_STEPS, DistanceSum, HitLengthSum, HitMissSum, MOST_SUM, MOST_WEIGHT_UNITS, Sign, SumBrick,
-    SumCell, SumPlanes, SumTsdfRule, SumWidth, WEIGHT_UNITS,
+    ColorSum, DISTANCE_STEPS, DistanceSum, HitLengthSum, HitMissSum, MOST_SUM, MOST_WEIGHT_UNITS, Sign,
+    SumBrick, SumCell, SumPlanes, SumTsdfRule, SumWidth, WEIGHT_UNITS,
 };
 
 /// What one scan says about the cells of a block: at most one observation per cell.

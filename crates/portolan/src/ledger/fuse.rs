@@ -2,7 +2,7 @@
 
 use super::sum_map::SumMap;
 use super::{Ledger, LedgerError, LedgerScans, ScanRecord};
-use crate::cell::{LogOdds8, Sign};
+use crate::cell::{ColorRule, LogOdds8, Sign};
 use crate::geom::{Lattice, Pose};
 use crate::map::{Attenuation, MapError, Occupancy, ScanKind, Tsdf};
 use crate::mapper::{Fused, MapperSettings, timed};
@@ -18,13 +18,11 @@ impl<const D: usize> Ledger<D> {
     /// give one. Clamp and half-lives are left aside: sums do not forget by themselves.
     ///
     /// # Errors
-    /// Where a setting is not possible, or asks for colors.
+    /// Where a setting is not possible.
     pub fn new(settings: MapperSettings<D>) -> Result<Self, LedgerError> {
-        if settings.color {
-            return Err(LedgerError::Without("colors"));
-        }
         settings.check()?;
-        let settings = MapperSettings { w_max: f32::INFINITY, ..settings };
+        let color = settings.color && settings.distances;
+        let settings = MapperSettings { w_max: f32::INFINITY, color, ..settings };
         let origin = settings.origin.unwrap_or([0.0; D]);
         let lattice = Lattice::new(origin, settings.resolution);
         let config = settings.tsdf(origin);
@@ -33,9 +31,11 @@ impl<const D: usize> Ledger<D> {
             let map = Occupancy::from_store(SumStore::new(Bricks::new(lattice), rule), model)?;
             Ok::<_, MapError>(map.with_sweep(settings.occupancy_sweep()))
         });
-        let tsdf = settings
-            .distances
-            .then(|| Tsdf::from_stores(SumStore::new(Bricks::new(lattice), config.rule()?), None, config));
+        let tsdf = settings.distances.then(|| {
+            let rule = ColorRule { w_max: config.color_w_max };
+            let colors = settings.color.then(|| SumStore::new(Bricks::new(lattice), rule));
+            Tsdf::from_stores(SumStore::new(Bricks::new(lattice), config.rule()?), colors, config)
+        });
         let attenuation = settings.attenuation.map(|_| {
             let map = Attenuation::from_store(
                 SumStore::new(Bricks::new(lattice), Default::default()),
@@ -83,7 +83,7 @@ impl<const D: usize> Ledger<D> {
         scan: &(impl ScanKind<D> + Sync),
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, LedgerError> {
-        let fingerprint = scan.fingerprint();
+        let fingerprint = self.fingerprint(scan);
         if self.scans.get(log, index).is_some() {
             self.scans.held(log, index, fingerprint)?;
             return Err(LedgerError::Twice { log: log.to_owned(), index });
@@ -112,7 +112,7 @@ impl<const D: usize> Ledger<D> {
         index: u64,
         scan: &(impl ScanKind<D> + Sync),
     ) -> Result<ScanStats, LedgerError> {
-        let record = self.scans.held(log, index, scan.fingerprint())?;
+        let record = self.scans.held(log, index, self.fingerprint(scan))?;
         let fused = self.fuse(&record.world_from_sensor, scan, Sign::Minus, &|| 0.0)?;
         self.scans.remove(log, index);
         Ok(fused.stats())
@@ -147,7 +147,7 @@ impl<const D: usize> Ledger<D> {
         world_from_sensor: &Pose<D>,
         after: &(impl ScanKind<D> + Sync),
     ) -> Result<[ScanStats; 2], LedgerError> {
-        let record = self.scans.held(log, index, before.fingerprint())?;
+        let record = self.scans.held(log, index, self.fingerprint(before))?;
         let taken = self.subtract(log, index, before)?;
         match self.add(log, index, world_from_sensor, after) {
             Ok(added) => Ok([taken, added]),
@@ -158,6 +158,11 @@ impl<const D: usize> Ledger<D> {
                 back.and(Err(error))
             }
         }
+    }
+
+    /// What tells the scan's readings from others, as far as the maps read them.
+    fn fingerprint(&self, scan: &impl ScanKind<D>) -> u64 {
+        if self.settings.color { scan.fingerprint_with_colors() } else { scan.fingerprint() }
     }
 
     /// Adds a scan to the maps, or takes it from them: from all or from none. In 2-D, where a scan is planned on one thread,

@@ -64,6 +64,7 @@ pub fn check_settings<const D: usize>(
             ("sweep", format!("{:?}, exact {}", s.beams, s.exact)),
             ("model of occupancy", format!("{:?}", s.occupancy)),
             ("maps", format!("distances {}, hits per meter {}", s.distances, s.attenuation.is_some())),
+            ("colors", String::from(if s.color { "kept" } else { "not kept" })),
         ]
     };
     for ((what, ours), (_, theirs)) in described(a).into_iter().zip(described(b)) {
@@ -94,6 +95,7 @@ impl<const D: usize> PartialEq for Ledger<D> {
             && check_settings(&self.settings, &other.settings).is_ok()
             && same(self.occupancy.as_ref().map(|m| m.store()), other.occupancy.as_ref().map(|m| m.store()))
             && same(self.tsdf.as_ref().map(|m| m.store()), other.tsdf.as_ref().map(|m| m.store()))
+            && same(self.tsdf.as_ref().and_then(|m| m.colors()), other.tsdf.as_ref().and_then(|m| m.colors()))
             && same(
                 self.attenuation.as_ref().map(|m| m.store()),
                 other.attenuation.as_ref().map(|m| m.store()),

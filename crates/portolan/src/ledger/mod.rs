@@ -1,7 +1,7 @@
 //! Evidence that adds up: maps of whole-number sums, which merge, give scans back and follow corrected poses, exactly.
 //!
-//! A [`Ledger`] holds what a [`Mapper`](crate::Mapper) holds, as sums ([`crate::cell::SumCell`]): of signed distances, of hits
-//! and misses, of hits and lengths. It also lists its scans, each with the pose that it was fused at. Every scan is read by
+//! A [`Ledger`] holds what a [`Mapper`](crate::Mapper) holds, as sums ([`crate::cell::SumCell`]): of signed distances, of colors, of
+//! hits and misses, of hits and lengths. It also lists its scans, each with the pose that it was fused at. Every scan is read by
 //! itself, without what earlier ones taught, and is taken wholly or not at all. So, to the last bit,
 //!
 //! - parts of a log that were fused apart, in any number, order or place, merge into the ledger of the whole log;
@@ -14,8 +14,7 @@
 //! [`Ledger::mapper`] makes the clamped maps of it, which answer all questions: surface, distances, clearance, paths.
 //!
 //! Which of the two, when: the clamped cells forget, look by look, and need no list of scans; a ledger forgets what it is
-//! told to ([`Ledger::subtract`], [`Ledger::take_out`]), and where things moved it believes the majority of looks. It holds
-//! no colors.
+//! told to ([`Ledger::subtract`], [`Ledger::take_out`]), and where things moved it believes the majority of looks.
 
 mod epochs;
 mod error;

@@ -1,7 +1,7 @@
 //! What a ledger is made of, for files.
 
 use super::{Ledger, LedgerError, LedgerScans};
-use crate::cell::{DistanceSum, HitLengthSum, HitMissSum, SumCell, SumPlanes};
+use crate::cell::{ColorSum, DistanceSum, HitLengthSum, HitMissSum, SumCell, SumPlanes};
 use crate::geom::BlockKey;
 use crate::mapper::MapperSettings;
 use crate::store::{Bricks, Store, SumStore};
@@ -13,6 +13,8 @@ pub struct LedgerSums<const D: usize> {
     pub occupancy: Option<Bricks<HitMissSum, D>>,
     /// Of distances.
     pub distances: Option<Bricks<DistanceSum, D>>,
+    /// Of colors.
+    pub colors: Option<Bricks<ColorSum, D>>,
     /// Of hits and lengths.
     pub attenuation: Option<Bricks<HitLengthSum, D>>,
 }
@@ -26,6 +28,11 @@ impl<const D: usize> Ledger<D> {
     /// The sums of distances; `None` where there is no such map.
     pub fn distance_sums(&self) -> Option<&Bricks<DistanceSum, D>> {
         self.tsdf.as_ref().map(|map| map.store().sums())
+    }
+
+    /// The sums of colors; `None` where none are kept.
+    pub fn color_sums(&self) -> Option<&Bricks<ColorSum, D>> {
+        self.tsdf.as_ref()?.colors().map(SumStore::sums)
     }
 
     /// The sums of hits and lengths; `None` where there is no such map.
@@ -47,8 +54,14 @@ impl<const D: usize> Ledger<D> {
         if let (Some(map), Some(sums)) = (&mut ledger.occupancy, sums.occupancy) {
             put(map.store_mut(), sums)?;
         }
-        if let (Some(map), Some(sums)) = (&mut ledger.tsdf, sums.distances) {
-            put(map.store_mut(), sums)?;
+        if let Some(map) = &mut ledger.tsdf {
+            let (distances, colors) = map.stores_mut();
+            if let Some(sums) = sums.distances {
+                put(distances, sums)?;
+            }
+            if let (Some(colors), Some(sums)) = (colors, sums.colors) {
+                put(colors, sums)?;
+            }
         }
         if let (Some(map), Some(sums)) = (&mut ledger.attenuation, sums.attenuation) {
             put(map.store_mut(), sums)?;

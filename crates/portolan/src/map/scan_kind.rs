@@ -2,7 +2,7 @@
 
 use super::tsdf::BEAM_CELL_BYTES;
 use super::{Attenuation, BeamSweep, MapError, Occupancy, Tsdf};
-use crate::cell::{HitLength, LogOddsValue, SignedDistance};
+use crate::cell::{Color, HitLength, LogOddsValue, SignedDistance};
 use crate::geom::{Pose, block_cells};
 use crate::scan::{Fingerprint, Frame, PointScan, RangeImage, Scan, ScanStats};
 use crate::store::Store;
@@ -14,9 +14,9 @@ pub trait ScanKind<const D: usize>: Fingerprint {
     ///
     /// # Errors
     /// As [`Tsdf::integrate`].
-    fn fuse_distances<S: Store<SignedDistance, D>>(
+    fn fuse_distances<S: Store<SignedDistance, D>, C: Store<Color, D>>(
         &self,
-        map: &mut Tsdf<D, S>,
+        map: &mut Tsdf<D, S, C>,
         world_from_sensor: &Pose<D>,
     ) -> Result<ScanStats, MapError>;
 
@@ -42,9 +42,9 @@ pub trait ScanKind<const D: usize>: Fingerprint {
 }
 
 impl<const D: usize> ScanKind<D> for Scan<D> {
-    fn fuse_distances<S: Store<SignedDistance, D>>(
+    fn fuse_distances<S: Store<SignedDistance, D>, C: Store<Color, D>>(
         &self,
-        map: &mut Tsdf<D, S>,
+        map: &mut Tsdf<D, S, C>,
         world_from_sensor: &Pose<D>,
     ) -> Result<ScanStats, MapError> {
         let bytes = BEAM_CELL_BYTES * block_cells::<D>();
@@ -72,9 +72,9 @@ impl<const D: usize> ScanKind<D> for Scan<D> {
 }
 
 impl ScanKind<3> for RangeImage {
-    fn fuse_distances<S: Store<SignedDistance, 3>>(
+    fn fuse_distances<S: Store<SignedDistance, 3>, C: Store<Color, 3>>(
         &self,
-        map: &mut Tsdf<3, S>,
+        map: &mut Tsdf<3, S, C>,
         world_from_sensor: &Pose<3>,
     ) -> Result<ScanStats, MapError> {
         map.integrate_image(world_from_sensor, self)
@@ -98,9 +98,9 @@ impl ScanKind<3> for RangeImage {
 }
 
 impl ScanKind<3> for PointScan {
-    fn fuse_distances<S: Store<SignedDistance, 3>>(
+    fn fuse_distances<S: Store<SignedDistance, 3>, C: Store<Color, 3>>(
         &self,
-        map: &mut Tsdf<3, S>,
+        map: &mut Tsdf<3, S, C>,
         world_from_sensor: &Pose<3>,
     ) -> Result<ScanStats, MapError> {
         map.integrate_point_scan(world_from_sensor, self)
@@ -124,9 +124,9 @@ impl ScanKind<3> for PointScan {
 }
 
 impl ScanKind<3> for Frame {
-    fn fuse_distances<S: Store<SignedDistance, 3>>(
+    fn fuse_distances<S: Store<SignedDistance, 3>, C: Store<Color, 3>>(
         &self,
-        map: &mut Tsdf<3, S>,
+        map: &mut Tsdf<3, S, C>,
         world_from_sensor: &Pose<3>,
     ) -> Result<ScanStats, MapError> {
         match self {

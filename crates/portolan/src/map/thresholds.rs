@@ -1,7 +1,7 @@
 //! How much a cell must weigh to count as observed, by what observations weigh in its map.
 
 use super::{DenseTsdf, Tsdf};
-use crate::cell::SignedDistance;
+use crate::cell::{Color, SignedDistance};
 use crate::store::{Bricks, Dense, Store};
 use crate::sweep::WeightModel;
 use std::borrow::Cow;
@@ -66,7 +66,7 @@ impl<const D: usize> DistanceMap<D> for DenseTsdf<D> {
     }
 }
 
-impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
+impl<const D: usize, S: Store<SignedDistance, D>, C: Store<Color, D>> Tsdf<D, S, C> {
     /// How much cells must weigh to count, by what beams weigh in this map.
     pub fn min_weight(&self) -> f32 {
         least_weight(self.config().weights, self.config().carve_weight)

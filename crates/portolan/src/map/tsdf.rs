@@ -18,16 +18,16 @@ use crate::sweep::{CellCentre, Inside, March, PointRays, Projective, Sweep, Swep
 ///
 /// Distances are measured along rays and kept within the truncation: the map answers *where is the surface*, not *how far
 /// is it*; the distance field derived from it does that. Cells lie in bricks, which exist only where something was seen, or
-/// in a dense array ([`Tsdf2`](super::Tsdf2)). Colors lie beside them in bricks of their own, near surfaces only.
+/// in a dense array ([`Tsdf2`](super::Tsdf2)). Colors lie beside them in a store of their own, near surfaces only.
 ///
 /// A clone is a snapshot: bricks are shared until one side changes them, arrays are copied.
 #[derive(Clone, Debug)]
-pub struct Tsdf<const D: usize, S = Bricks<SignedDistance, D>> {
+pub struct Tsdf<const D: usize, S = Bricks<SignedDistance, D>, C = Bricks<Color, D>> {
     pub(super) config: TsdfConfig<D>,
     rule: TsdfRule,
     color_rule: ColorRule,
     pub(super) distances: S,
-    pub(super) colors: Option<Bricks<Color, D>>,
+    pub(super) colors: Option<C>,
     pub(super) bounds: Option<Aabb<D>>,
     limit: usize,
     pub(super) layout: LayoutFinder,
@@ -124,16 +124,12 @@ impl<const D: usize> Tsdf<D, Dense<SignedDistance, D>> {
     }
 }
 
-impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
+impl<const D: usize, S: Store<SignedDistance, D>, C: Store<Color, D>> Tsdf<D, S, C> {
     /// A field of stored cells; resolution and origin are taken from the store, and whether there are colors.
     ///
     /// # Errors
     /// Where a setting is not possible, or the two stores have not the same lattice.
-    pub fn from_stores(
-        distances: S,
-        colors: Option<Bricks<Color, D>>,
-        config: TsdfConfig<D>,
-    ) -> Result<Self, MapError> {
+    pub fn from_stores(distances: S, colors: Option<C>, config: TsdfConfig<D>) -> Result<Self, MapError> {
         let lattice = *distances.lattice();
         check_lattice(&lattice)?;
         if colors.as_ref().is_some_and(|c| *c.lattice() != lattice) {
@@ -249,9 +245,9 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
         &self.distances
     }
 
-    /// The distances, for a store that is told what to do with scans.
-    pub(crate) fn store_mut(&mut self) -> &mut S {
-        &mut self.distances
+    /// Distances and colors, for stores that are told what to do with scans.
+    pub(crate) fn stores_mut(&mut self) -> (&mut S, Option<&mut C>) {
+        (&mut self.distances, self.colors.as_mut())
     }
 
     /// Forgets what earlier scans taught about the next: rows and columns.
@@ -260,12 +256,12 @@ impl<const D: usize, S: Store<SignedDistance, D>> Tsdf<D, S> {
     }
 
     /// The colors beside them; `None` where the map keeps none.
-    pub fn colors(&self) -> Option<&Bricks<Color, D>> {
+    pub fn colors(&self) -> Option<&C> {
         self.colors.as_ref()
     }
 
     /// The stores of the map: distances, colors.
-    pub fn into_stores(self) -> (S, Option<Bricks<Color, D>>) {
+    pub fn into_stores(self) -> (S, Option<C>) {
         (self.distances, self.colors)
     }
 

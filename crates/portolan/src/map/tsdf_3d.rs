@@ -1,7 +1,7 @@
 //! Range images and points in a field of distances.
 
 use super::{MapError, PointSweep, Tsdf};
-use crate::cell::SignedDistance;
+use crate::cell::{Color, SignedDistance};
 use crate::geom::Pose;
 use crate::scan::{Origin, PointScan, RangeImage, ScanStats, SphericalLayout, Way, WhyRays, strips};
 use crate::store::Store;
@@ -10,7 +10,7 @@ use crate::sweep::PointRays;
 /// What the search for the blocks of an image keeps of each: a key, its octants, and their place.
 const IMAGE_BLOCK_BYTES: usize = 1024;
 
-impl<S: Store<SignedDistance, 3>> Tsdf<3, S> {
+impl<S: Store<SignedDistance, 3>, C: Store<Color, 3>> Tsdf<3, S, C> {
     pub(super) fn integrate_image(
         &mut self,
         world_from_image: &Pose<3>,

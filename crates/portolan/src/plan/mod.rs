@@ -28,7 +28,7 @@ pub use demand::{Cause, Demand};
 pub use error::PlanError;
 pub use motion::{Motion, MotionCheck, check_motion};
 pub use nearest_free::{NearestFree, SearchLimits, nearest_free, nearest_free_pose};
-pub use path::{PathCheck, PathClearance, PathViolation, check_path};
+pub use path::{PathCheck, PathClearance, PathViolation, check_path, path_violations};
 pub use pose_check::{BodyCheck, BodyClearance, check_pose};
 pub use profile::{ProfileSample, clearance_profile};
 pub use spline::Spline;

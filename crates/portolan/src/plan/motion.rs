@@ -195,7 +195,7 @@ pub fn check_motion<const D: usize>(
         // For the other spheres only the part before the first refusal matters.
         let mut walk =
             Walk::<_, _, D> { field, path: &path, demand: &demand, end, queries: demand.max_queries };
-        match walk.free() {
+        match walk.free(0.0) {
             Ok(found) => free.include(sphere, found.lower - s.radius, found.upper - s.radius),
             // Of two spheres refused at the same place the first one is reported.
             Err(stop) if first.is_none() || stop.at < end => {

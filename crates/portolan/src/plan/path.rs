@@ -31,11 +31,11 @@ pub struct PathClearance {
     pub at: f64,
 }
 
-/// The first part of a path that is not certified, in parameters of the curve: for [`Waypoints`](super::Waypoints) arc
+/// A part of a path that is not certified, in parameters of the curve: for [`Waypoints`](super::Waypoints) arc
 /// lengths (meters).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathViolation {
-    /// The path is certified up to here; 0 where the start is not certified.
+    /// The path is certified up to here, from its start or from the part before; 0 where the start is not certified.
     pub from: f64,
     /// The next parameter checked that is certified again, else the end of the path.
     pub to: f64,
@@ -93,10 +93,31 @@ pub fn check_path<const D: usize>(
     demand: &Demand,
 ) -> PathCheck {
     let mut walk = Walk::<_, _, D> { field, path, demand, end: path.end(), queries: demand.max_queries };
-    match walk.free() {
+    match walk.free(0.0) {
         Ok(least) => PathCheck::Certified(least),
         Err(stop) => PathCheck::Violated(walk.violation(stop)),
     }
+}
+
+/// All parts of a path that are not certified, in ascending order, none where [`check_path`] certifies it: what lies between them
+/// is certified. The first is that of [`check_path`]. The limit of queries is for all of them together; where it ends, the last part
+/// goes on to the end of the path.
+pub fn path_violations<const D: usize>(
+    field: &(impl ClearanceField<D> + ?Sized),
+    path: &(impl Curve<D> + ?Sized),
+    demand: &Demand,
+) -> Vec<PathViolation> {
+    let mut walk = Walk::<_, _, D> { field, path, demand, end: path.end(), queries: demand.max_queries };
+    let (mut all, mut from) = (Vec::new(), 0.0);
+    while let Err(stop) = walk.free(from) {
+        let found = walk.violation(stop);
+        all.push(found);
+        from = found.to;
+        if from >= walk.end {
+            break;
+        }
+    }
+    all
 }
 
 /// A check in progress.
@@ -119,11 +140,11 @@ pub(super) struct Stop {
 }
 
 impl<F: ClearanceField<D> + ?Sized, C: Curve<D> + ?Sized, const D: usize> Walk<'_, F, C, D> {
-    /// Advances in certified steps to the end.
-    pub(super) fn free(&mut self) -> Result<PathClearance, Stop> {
+    /// Advances in certified steps from a parameter to the end.
+    pub(super) fn free(&mut self, from: f64) -> Result<PathClearance, Stop> {
         let tolerance = self.demand.tolerance_in(self.field);
-        let mut least = PathClearance { lower: f64::INFINITY, upper: f64::INFINITY, at: 0.0 };
-        let mut t = 0.0;
+        let mut least = PathClearance { lower: f64::INFINITY, upper: f64::INFINITY, at: from };
+        let mut t = from;
         // Clearance where the step began, and its length.
         let mut step: Option<(f64, f64)> = None;
         loop {
@@ -277,9 +298,51 @@ mod tests {
     fn legs_and_splines<const D: usize>(scene: &Scene<D>, points: &[[f64; 3]], demand: &Demand) {
         let points: Vec<[f64; D]> = points.iter().map(|p| point(*p)).collect();
         is_true(scene, &Waypoints::new(points.clone()).unwrap(), demand);
+        all_parts_are_found(scene, &Waypoints::new(points.clone()).unwrap(), demand);
         if points.len() > 1 {
-            is_true(scene, &Spline::catmull_rom(&points).unwrap(), demand);
+            let spline = Spline::catmull_rom(&points).unwrap();
+            is_true(scene, &spline, demand);
+            all_parts_are_found(scene, &spline, demand);
         }
+    }
+
+    /// Between the parts, before and after them, every place is free; the first is that of the check.
+    fn all_parts_are_found<const D: usize>(scene: &Scene<D>, path: &impl Curve<D>, demand: &Demand) {
+        let all = path_violations(scene, path, demand);
+        match check_path(scene, path, demand) {
+            PathCheck::Certified(_) => assert!(all.is_empty()),
+            PathCheck::Violated(first) => assert_eq!(all.first(), Some(&first)),
+        }
+        assert!(all.iter().all(|part| part.from <= part.to && part.to <= path.end()));
+        assert!(all.windows(2).all(|w| w[0].to <= w[1].from && w[0].from < w[1].from));
+        for i in 0..=2000 {
+            let t = path.end() * f64::from(i) / 2000.0;
+            let free = || {
+                let truth = scene.truth(path.point(t), demand.unknown);
+                truth.is_some_and(|d| d >= demand.clearance - 1e-14)
+            };
+            assert!(all.iter().any(|part| (part.from..=part.to).contains(&t)) || free(), "{t} of {all:?}");
+        }
+    }
+
+    #[test]
+    fn every_obstacle_on_the_way_is_a_part_of_its_own() {
+        let mut scene = Scene::<2>::empty();
+        scene.balls = vec![([-2.0, 0.0], 0.5), ([0.0, 0.2], 0.5), ([3.0, 3.0], 0.2), ([2.0, -0.1], 0.5)];
+        let path = Waypoints::new(vec![[-4.0, 0.0], [4.0, 0.0]]).unwrap();
+        let demand = Demand::new(0.1);
+        let parts = path_violations(&scene, &path, &demand);
+        let middles: Vec<f64> = parts.iter().map(|part| (0.5 * (part.from + part.to)).round()).collect();
+        assert_eq!(middles, [2.0, 4.0, 6.0]);
+        assert!(parts.iter().all(|part| part.cause == Cause::TooNear && part.to - part.from > 1.0));
+        assert!(
+            path_violations(&scene, &Waypoints::new(vec![[-4.0, 2.0], [4.0, 2.0]]).unwrap(), &demand)
+                .is_empty()
+        );
+        // Few queries: what was not looked at counts as not certified.
+        let few = Demand { max_queries: 12, ..demand };
+        let parts = path_violations(&scene, &path, &few);
+        assert_eq!(parts.last().map(|part| part.to), Some(path.end()));
     }
 
     proptest! {

@@ -28,6 +28,22 @@ impl Mix {
         }
     }
 
+    fn bytes(&mut self, colors: &[[u8; 3]]) {
+        self.word(colors.len() as u64);
+        for pair in colors.chunks(2) {
+            let [[r, g, b], [s, h, c]] = [pair[0], pair.get(1).copied().unwrap_or_default()];
+            self.word(u64::from_le_bytes([r, g, b, s, h, c, 0, 0]));
+        }
+    }
+
+    fn colors(&mut self, image: &RangeImage) {
+        self.bytes(&image.colors);
+        self.word(image.colored.len() as u64);
+        for flags in image.colored.chunks(64) {
+            self.word(flags.iter().fold(0, |word, flag| word << 1 | u64::from(*flag)));
+        }
+    }
+
     fn image(&mut self, image: &RangeImage) {
         match &image.projection {
             Projection::Pinhole(p) => self.reals(&[p.fx, p.fy, p.cx, p.cy]),
@@ -48,6 +64,11 @@ impl Mix {
 pub trait Fingerprint {
     /// The same for the same readings; for others another one, but for one chance in 2^64.
     fn fingerprint(&self) -> u64;
+
+    /// The same of readings and colors.
+    fn fingerprint_with_colors(&self) -> u64 {
+        self.fingerprint()
+    }
 }
 
 impl<const D: usize> Fingerprint for Scan<D> {
@@ -75,6 +96,12 @@ impl Fingerprint for RangeImage {
     fn fingerprint(&self) -> u64 {
         let mut mix = Mix(2);
         mix.image(self);
+        mix.0
+    }
+
+    fn fingerprint_with_colors(&self) -> u64 {
+        let mut mix = Mix(self.fingerprint());
+        mix.colors(self);
         mix.0
     }
 }
@@ -105,6 +132,15 @@ impl Fingerprint for PointScan {
         }
         mix.0
     }
+
+    fn fingerprint_with_colors(&self) -> u64 {
+        let mut mix = Mix(self.fingerprint());
+        mix.bytes(&self.colors);
+        if let Some(image) = &self.image {
+            mix.colors(image);
+        }
+        mix.0
+    }
 }
 
 impl Fingerprint for Frame {
@@ -112,6 +148,13 @@ impl Fingerprint for Frame {
         match self {
             Self::Image(image) => image.fingerprint(),
             Self::Points(scan) => scan.fingerprint(),
+        }
+    }
+
+    fn fingerprint_with_colors(&self) -> u64 {
+        match self {
+            Self::Image(image) => image.fingerprint_with_colors(),
+            Self::Points(scan) => scan.fingerprint_with_colors(),
         }
     }
 }
@@ -130,6 +173,13 @@ mod tests {
         assert!(others.iter().all(|ranges| scan(ranges).fingerprint() != one));
         let points = |origin| PointScan::new([[1.0f32, 2.0, 3.0], [2.0, 0.0, 0.0]], origin).fingerprint();
         assert_ne!(points([0.0; 3]), points([0.0, 0.0, 0.1]));
+        let colored = |rgb| {
+            let mut scan = PointScan::new([[1.0f32, 2.0, 3.0], [2.0, 0.0, 0.0]], [0.0; 3]);
+            scan.colors = vec![[1, 2, 3], rgb];
+            (scan.fingerprint(), scan.fingerprint_with_colors())
+        };
+        let [(a, with_a), (b, with_b)] = [colored([9; 3]), colored([9, 9, 8])];
+        assert!(a == b && with_a != with_b && with_a == colored([9; 3]).1);
         // Kept in files: a change of the mixing would make every scan another one.
         assert_eq!(points([0.0; 3]), 0x8f9a_afce_fe07_9ca1);
     }

@@ -212,15 +212,23 @@ impl RangeImage {
 
     /// Origin and end of every reading in the sensor's frame, row by row, and whether a surface is at the end.
     pub fn readings(&self) -> impl Iterator<Item = ([f64; 3], [f64; 3], bool)> + '_ {
-        self.values.iter().enumerate().filter(|(_, v)| **v != 0.0).map(|(i, &v)| {
-            let (row, column) = (i / self.columns, i % self.columns);
-            let end = self.point(column, row, f64::from(v.abs()));
-            let origin = match &self.projection {
-                Projection::Orthographic { top, .. } => [end[0], end[1], *top],
-                _ => [0.0; 3],
-            };
-            (origin, end, v > 0.0)
-        })
+        (0..self.values.len()).filter_map(|pixel| self.reading(pixel))
+    }
+
+    /// Origin and end of a pixel's reading in the sensor's frame, and whether a surface is at the end; `None`: it has none.
+    #[inline]
+    pub fn reading(&self, pixel: usize) -> Option<([f64; 3], [f64; 3], bool)> {
+        let v = self.values[pixel];
+        if v == 0.0 {
+            return None;
+        }
+        let (row, column) = (pixel / self.columns, pixel % self.columns);
+        let end = self.point(column, row, f64::from(v.abs()));
+        let origin = match &self.projection {
+            Projection::Orthographic { top, .. } => [end[0], end[1], *top],
+            _ => [0.0; 3],
+        };
+        Some((origin, end, v > 0.0))
     }
 
     /// Whether the rays are parallel: there is no point that they come from.

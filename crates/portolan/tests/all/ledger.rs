@@ -8,7 +8,7 @@ use portolan::scan::{Frame, Scan};
 use portolan::store::Store;
 use portolan::{Ledger, MapperSettings, geom::Pose};
 use portolan_sim::building::{
-    BuildingConfig, BuildingSensor, SpinningLidar, building_log, moving_lidar_frame,
+    BuildingConfig, BuildingSensor, DepthCamera, SpinningLidar, building_log, moving_lidar_frame,
 };
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -44,25 +44,43 @@ static SCANS_MOVING: LazyLock<Vec<Taken<3, Frame>>> = LazyLock::new(|| {
         .collect()
 });
 
-/// Turns of a lidar through the Building: images, points whose rows are to be found, and points that are followed ray by ray.
+/// Turns of a lidar through the Building: images, points that have colors, and points whose rows are looked for in vain; then
+/// pictures of a camera. Two of three see colors.
 static SCANS_3D: LazyLock<Vec<Taken<3, Frame>>> = LazyLock::new(|| {
     let lidar = SpinningLidar { columns: 180, rings: 16, ..Default::default() };
     let sensor = BuildingSensor::Lidar(lidar);
-    let log = building_log(&BuildingConfig { scans: 9, sensor, ..Default::default() });
+    let log = building_log(&BuildingConfig { scans: 7, sensor, ..Default::default() });
     let as_points = |(i, (pose, frame)): (usize, (Pose<3>, Frame))| match frame {
         Frame::Points(mut scan) if i % 3 != 0 => {
             scan.image = None;
             let every = if i % 3 == 1 { 1 } else { 7 };
             scan.points = scan.points.iter().step_by(every).copied().collect();
+            if every == 1 {
+                scan.colors = colors(scan.points.len(), i);
+            }
+            (pose, Frame::Points(scan))
+        }
+        Frame::Points(mut scan) => {
+            scan.image = scan.image.map(|image| {
+                let pixels = image.values.len();
+                image.with_colors(colors(pixels, i))
+            });
             (pose, Frame::Points(scan))
         }
         frame => (pose, frame),
     };
-    log.scans.into_iter().enumerate().map(as_points).collect()
+    let sensor = BuildingSensor::Camera(DepthCamera::default().scaled(0.25));
+    let pictures = building_log(&BuildingConfig { scans: 2, sensor, ..Default::default() }).scans;
+    log.scans.into_iter().enumerate().map(as_points).chain(pictures).collect()
 });
 
+/// Colors that differ from pixel to pixel and from scan to scan.
+fn colors(count: usize, scan: usize) -> Vec<[u8; 3]> {
+    (0..count).map(|i| [(7 * i) as u8, (i / 13) as u8, (31 * scan) as u8]).collect()
+}
+
 fn settings<const D: usize>() -> MapperSettings<D> {
-    MapperSettings::new(if D == 2 { 0.1 } else { 0.2 })
+    MapperSettings { color: D == 3, ..MapperSettings::new(if D == 2 { 0.1 } else { 0.2 }) }
 }
 
 fn fused<const D: usize, S: ScanKind<D> + Sync>(
@@ -268,10 +286,66 @@ fn slips_are_refused_and_change_nothing() {
         assert!(matches!(ledger.merge(&other), Err(LedgerError::Different { .. })));
     }
     assert!(ledger == before);
+}
+
+/// Colors are readings, where they are kept.
+#[test]
+fn other_colors_are_other_readings() {
+    let (pose, Frame::Points(scan)) = &SCANS_3D[1] else { panic!("points") };
+    let mut other = scan.clone();
+    other.colors[17][2] ^= 1;
+    let plain = MapperSettings { color: false, ..settings() };
+    for how in [settings::<3>(), plain] {
+        let mut ledger = Ledger::new(how).unwrap();
+        ledger.add("log", 1, pose, scan).unwrap();
+        let before = ledger.clone();
+        let taken = ledger.subtract("log", 1, &other);
+        if how.color {
+            assert!(matches!(taken, Err(LedgerError::OtherReadings { index: 1, .. })) && ledger == before);
+        } else {
+            assert!(taken.is_ok() && ledger == Ledger::new(how).unwrap());
+        }
+    }
+    let mut colored = Ledger::new(settings::<3>()).unwrap();
     assert!(matches!(
-        Ledger::new(MapperSettings { color: true, ..settings::<3>() }),
-        Err(LedgerError::Without(_))
+        colored.merge(&Ledger::new(plain).unwrap()),
+        Err(LedgerError::Different { what: "colors", .. })
     ));
+}
+
+/// The same cells have colors as in a map that averages in floating point, and the same ones.
+#[test]
+fn colors_are_the_weighted_means() {
+    let sums = fused(&SCANS_3D, 0..SCANS_3D.len()).mapper().unwrap();
+    let tsdf = sums.tsdf().unwrap();
+    let config = TsdfConfig { w_max: f32::INFINITY, ..*tsdf.config() };
+    let mut means = Tsdf::<3>::new(config).unwrap();
+    for (pose, scan) in &*SCANS_3D {
+        means.integrate(pose, scan).unwrap();
+    }
+    let (ours, theirs) = (tsdf.colors().unwrap(), means.colors().unwrap());
+    let (mut cells, mut total, mut many) = (0u32, 0.0, 0u32);
+    for (key, brick) in theirs.bricks_by_age() {
+        for (i, &[r, g, b, weight]) in brick.words().iter().enumerate() {
+            let color = ours.cell(key.cell(i));
+            assert_eq!(color.is_some(), weight > 0);
+            let Some(color) = color else { continue };
+            let off: f64 = [r, g, b]
+                .iter()
+                .zip(color.rgb)
+                .map(|(&a, b)| (f64::from(a) - f64::from(b)).abs() / 257.0)
+                .sum();
+            (cells, total) = (cells + 1, total + off / 3.0);
+            many += u32::from(color.weight() > 1.5);
+        }
+    }
+    let observed = |b: &portolan::cell::ColorBrick| b.words().iter().filter(|w| w[3] > 0).count();
+    let held: usize = ours.bricks_by_age().map(|(_, b)| observed(b)).sum();
+    println!(
+        "{cells} colored cells, {many} seen more than once, {:.3} of 255 off in the mean",
+        total / f64::from(cells)
+    );
+    assert!(held == cells as usize && cells > 5000 && many > 1000 && total / f64::from(cells) < 0.3);
 }
 
 #[test]
@@ -358,6 +432,7 @@ fn what_sums_do_not_hold_is_not_taken_from_them() {
         let sums = LedgerSums {
             occupancy: a.occupancy_sums().cloned(),
             distances: a.distance_sums().cloned(),
+            colors: a.color_sums().cloned(),
             attenuation: a.attenuation_sums().cloned(),
         };
         let how = MapperSettings { origin: Some([0.0; D]), ..settings() };

@@ -18,6 +18,14 @@ pub(crate) fn lidar_log_in(other: &Pose<3>) -> (TempDir, PathBuf) {
     written(BuildingSensor::Lidar(lidar), 6, LogLayout::Kitti { camera_from_lidar: Pose::IDENTITY }, other)
 }
 
+/// The same with poses of a camera that looks forward beside the lidar, as KITTI's are: x right, y down, z forward.
+pub(crate) fn lidar_log_of_camera_poses() -> (TempDir, PathBuf) {
+    let rotation = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]];
+    let camera_from_lidar = Pose { rotation, translation: [0.0, -0.08, -0.27] };
+    let lidar = SpinningLidar { rings: 24, columns: 360, ..SpinningLidar::default() };
+    written(BuildingSensor::Lidar(lidar), 6, LogLayout::Kitti { camera_from_lidar }, &Pose::IDENTITY)
+}
+
 /// A short walk with a small depth camera, as 7-Scenes has it.
 pub(crate) fn camera_log() -> (TempDir, PathBuf) {
     written(

@@ -2,7 +2,9 @@
 
 use portolan::Answer;
 use portolan::field::{Clearance, Esdf, UnknownSpace};
-use portolan::plan::{Cause, Curve, Demand, PathCheck, Waypoints, check_path, clearance_profile};
+use portolan::plan::{
+    Cause, Curve, Demand, PathCheck, Waypoints, check_path, clearance_profile, path_violations,
+};
 use serde_json::{Value, json};
 
 use crate::engine::fusion::frame::Lines;
@@ -81,39 +83,27 @@ pub(super) fn demand(clearance: f64, unknown: UnknownSpace, length: f64) -> Dema
     Demand { unknown, tolerance, max_queries: 4 * STEPS as usize, ..Demand::new(clearance) }
 }
 
-/// The library's check of the whole path, and from where that ends the check of the rest, and so on.
+/// The library's check of the whole path, and what it says of every part.
 pub(super) fn pieces(field: &Esdf<2>, path: &Waypoints<2>, demand: &Demand) -> (PathCheck, Vec<Piece>) {
-    let whole = check_path(field, path, demand);
-    let (mut check, mut from, mut found) = (whole, 0.0, Vec::new());
-    loop {
-        let (certified, next) = match check {
-            PathCheck::Certified(_) => (path.end(), path.end()),
-            PathCheck::Violated(v) => (from + v.from, (from + v.to).min(path.end())),
-        };
-        if certified > from || check.is_certified() {
-            found.push(Piece { from, to: certified, cause: None });
-        }
-        if !check.is_certified() {
-            name(field, path, demand, [certified, next], &mut found);
-        }
-        if check.is_certified() || next >= path.end() || next <= from {
-            return (whole, found);
+    let parts = path_violations(field, path, demand);
+    let whole =
+        parts.first().map_or_else(|| check_path(field, path, demand), |first| PathCheck::Violated(*first));
+    let (mut from, mut found) = (0.0, Vec::new());
+    for part in &parts {
+        if part.from > from {
+            found.push(Piece { from, to: part.from, cause: None });
         }
         if found.len() >= MOST_PIECES {
-            found.push(Piece { from: next, to: path.end(), cause: Some(Cause::Undecided) });
+            found.push(Piece { from: part.from, to: path.end(), cause: Some(Cause::Undecided) });
             return (whole, found);
         }
-        from = next;
-        check = check_path(field, &rest(path, from), demand);
+        name(field, path, demand, [part.from, part.to], &mut found);
+        from = part.to;
     }
-}
-
-/// The path from an arc length on.
-fn rest(path: &Waypoints<2>, from: f64) -> Waypoints<2> {
-    let beyond = path.reached().partition_point(|&s| s <= from);
-    let points = [path.point(from)].into_iter().chain(path.points()[beyond..].iter().copied());
-    // Finite, as the path is.
-    Waypoints::new(points.collect()).unwrap_or_else(|_| path.clone())
+    if from < path.end() || parts.is_empty() {
+        found.push(Piece { from, to: path.end(), cause: None });
+    }
+    (whole, found)
 }
 
 /// Tells the parts of what is not certified apart by their causes, half a cell at a time.

@@ -64,8 +64,13 @@ fn rounded(distance: f32, weight: f32, steps_per_meter: f32) -> (i32, i32) {
     let limit = DISTANCE_STEPS as f32;
     // max/min instead of clamp: the compiler turns them into two vector instructions.
     let steps = nearest((distance * steps_per_meter).max(-limit).min(limit));
-    let units = nearest((weight * WEIGHT_UNITS as f32).max(1.0).min(MOST_WEIGHT_UNITS as f32));
-    (steps, units)
+    (steps, weight_units(weight))
+}
+
+/// A positive weight in units.
+#[inline(always)]
+pub(super) fn weight_units(weight: f32) -> i32 {
+    nearest((weight * WEIGHT_UNITS as f32).max(1.0).min(MOST_WEIGHT_UNITS as f32))
 }
 
 impl SumTsdfRule {
@@ -115,7 +120,7 @@ fn fuse_cells(brick: &mut SumBrick<2>, start: usize, observed: &[f32], gained: &
     if heaviest <= 0.0 {
         return;
     }
-    let (_, units) = rounded(0.0, heaviest, 1.0);
+    let units = weight_units(heaviest);
     let cells = brick.cells();
     let run = start..start + observed.len();
     let per_meter = rule.steps_per_meter();

@@ -8,17 +8,20 @@
 //! | cell | sums | estimate |
 //! |---|---|---|
 //! | [`DistanceSum`] | weight times distance, weight | [`SignedDistance`](super::SignedDistance) |
+//! | [`ColorSum`] | weight times red, green, blue, weight | [`Color`](super::Color) |
 //! | [`HitMissSum`] | scans that hit, scans that passed | [`LogOdds8`](super::LogOdds8), clamped once, at the end |
 //! | [`HitLengthSum`] | beams that ended, length of all beams, scans | [`HitLength`](super::HitLength) |
 //!
 //! Nothing is forgotten by a cell of sums: to forget is to take away what is old.
 
 mod brick;
+mod color;
 mod distance;
 mod hit_length;
 mod hit_miss;
 
 pub use brick::{MOST_SUM, SumBrick, SumWidth};
+pub use color::ColorSum;
 pub use distance::{DISTANCE_STEPS, DistanceSum, MOST_WEIGHT_UNITS, SumTsdfRule, WEIGHT_UNITS};
 pub use hit_length::HitLengthSum;
 pub use hit_miss::HitMissSum;

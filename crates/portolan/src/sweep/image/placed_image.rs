@@ -3,11 +3,13 @@
 use super::balls::BallWindows;
 use super::lanes::LANES;
 use super::pixels::{PixelProjector, Pixels};
+use super::range_pyramid::RangePyramid;
 use super::search::{Class, Classify, Cube};
 use super::sheet::Sheet;
 use super::steps::{STEP_BITS, STEPS};
 use super::window_minima::{RangeTables, WindowMinima, WindowSizes};
 use crate::geom::{BLOCK_EDGE, Lattice, Pose};
+use crate::parallel;
 use crate::scan::{Bridges, Projection, RangeImage};
 
 /// How far beyond a cell's center the beams must have seen, in cells. Half a cell is where a surface square to the beam
@@ -27,9 +29,10 @@ const LARGEST: i64 = 4 * BLOCK_EDGE as i64;
 pub(super) struct PlacedImage {
     projector: PixelProjector,
     tables: RangeTables,
-    /// Of `tables.fine` and `tables.nearest`.
+    /// Of `tables.fine`.
     fine_sizes: WindowSizes,
-    coarse_sizes: WindowSizes,
+    /// Readings without their sign, none as 0: for what lies in the windows of cubes.
+    pyramid: RangePyramid,
     /// For every pixel [`OWN`], where it has a reading, and [`BESIDE`], where it or one of the eight around it has one.
     readings: Vec<u8>,
     sheet: Sheet,
@@ -53,9 +56,12 @@ impl PlacedImage {
         lattice: &Lattice<3>,
         old: Option<Box<Self>>,
     ) -> Self {
-        let (projector, mut tables, mut sheet) = match old {
-            Some(old) => (Some(old.projector).filter(|p| p.projector.is_of(image)), old.tables, old.sheet),
-            None => (None, RangeTables::default(), Sheet::default()),
+        let (projector, mut tables, mut sheet, mut pyramid) = match old {
+            Some(old) => {
+                let projector = Some(old.projector).filter(|p| p.projector.is_of(image));
+                (projector, old.tables, old.sheet, old.pyramid)
+            }
+            None => Default::default(),
         };
         let projector = projector.unwrap_or_else(|| PixelProjector::of(image));
         let sensor_from_world = world_from_image.inverse();
@@ -75,11 +81,16 @@ impl PlacedImage {
             Bridges::of(rays, image.is_full_turn()).fill(&mut values, image.columns);
         }
         let turn = projector.projector.columns_of_turn();
-        sheet.fill(&values, &projector.projector);
-        tables.fill(&values, image.columns, turn, projector.rows_per_column());
+        parallel::join(
+            || tables.fill(&values, image.columns, turn, projector.rows_per_column()),
+            || {
+                sheet.fill(&values, &projector.projector);
+                pyramid.build(image.columns.max(1), &values, false);
+            },
+        );
         Self {
             fine_sizes: WindowSizes::of(&tables.fine),
-            coarse_sizes: WindowSizes::of(&tables.nearest),
+            pyramid,
             tables,
             projector,
             readings: readings(&values, image.columns),
@@ -111,13 +122,15 @@ impl PlacedImage {
 
     #[inline(always)]
     fn class(&self, windows: &BallWindows, i: usize) -> Class {
-        let (columns, rows) = (2.0 * windows.half_columns[i] + 2.0, 2.0 * windows.half_rows[i] + 2.0);
-        let Some(level) = self.coarse_sizes.level(columns, rows) else { return Class::Mixed };
-        let Some(at) = self.tables.nearest[level].around(windows.column[i], windows.row[i]) else {
+        let halves = [windows.half_columns[i], windows.half_rows[i]];
+        // Too near to the sensor.
+        if !halves.iter().all(|half| half.is_finite()) {
+            return Class::Mixed;
+        }
+        let Some([nearest, farthest]) = self.extremes([windows.column[i], windows.row[i]], halves) else {
             return Class::Nothing;
         };
-        let nearest = self.tables.nearest[level].minima[at];
-        if -self.tables.farthest[level].minima[at] <= windows.near[i] {
+        if farthest <= windows.near[i] {
             Class::Nothing
         } else if nearest > windows.far[i] + MARGIN * self.resolution && windows.near[i] > 0.0 {
             Class::Free
@@ -126,6 +139,48 @@ impl PlacedImage {
         } else {
             Class::Mixed
         }
+    }
+
+    /// Bounds of the nearest and the farthest reading in a window about a pixel coordinate; what has no reading, in the image or
+    /// outside of it, counts as 0. `None`: the window is outside of the image.
+    #[inline(always)]
+    fn extremes(&self, [column, row]: [f32; 2], [half_columns, half_rows]: [f32; 2]) -> Option<[f32; 2]> {
+        let (columns, rows) = (self.columns as i64, self.rows as i64);
+        // Far outside of any image, and no sum of two overflows.
+        let pixel = |v: f32| v.clamp(-1e12, 1e12) as i64;
+        let span = |at: f32, half: f32| [pixel((at - half).floor()), pixel((at + half).ceil())];
+        let [top, bottom] = span(row, half_rows);
+        let [mut left, mut right] = span(column, half_columns);
+        let turn = self.projector.projector.columns_of_turn().map(|turn| turn as i64);
+        let mut is_whole = top >= 0 && bottom < rows;
+        let mut over_the_seam = None;
+        if let Some(turn) = turn {
+            if right - left >= turn.min(columns) {
+                is_whole &= columns >= turn;
+                [left, right] = [0, columns - 1];
+            } else {
+                let turns = left.div_euclid(turn) * turn;
+                [left, right] = [left - turns, right - turns];
+                is_whole &= right < columns || columns >= turn;
+                over_the_seam = (right >= columns.max(turn)).then_some(right - turn);
+            }
+        } else {
+            is_whole &= left >= 0 && right < columns;
+        }
+        let within = |v: i64, n: i64| v.clamp(0, n - 1) as usize;
+        if bottom < 0 || top >= rows || right < 0 {
+            return None;
+        }
+        let rows = [within(top, rows), within(bottom, rows)];
+        let seen = (left < columns)
+            .then(|| self.pyramid.extremes([within(left, columns), within(right, columns)], rows));
+        let beyond = over_the_seam.map(|end| self.pyramid.extremes([0, within(end, columns)], rows));
+        let [nearest, farthest] = match (seen, beyond) {
+            (Some(a), Some(b)) => [a[0].min(b[0]), a[1].max(b[1])],
+            (Some(one), None) | (None, Some(one)) => one,
+            (None, None) => return None,
+        };
+        Some([if is_whole { nearest } else { 0.0 }, farthest])
     }
 
     /// The free cells among `4^3`, a bit each, x fastest. `complete`: whether all pixels that they see have a reading.

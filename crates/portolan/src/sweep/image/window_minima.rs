@@ -1,9 +1,5 @@
 //! The nearest reading of any window of pixels, by one read.
 
-use crate::parallel;
-
-/// Windows for bricks and larger: a window that is larger than needed only means to look closer.
-const COARSE: [usize; 11] = [2, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96];
 /// Windows for single cells, in steps of about a half: what is larger than needed frees less.
 const FINE: [usize; 11] = [2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64];
 
@@ -22,25 +18,25 @@ pub(super) struct WindowMinima {
 }
 
 impl WindowMinima {
-    /// The same for larger windows, at most twice as large along each axis, into `to`. `outside` counts for what is not in the
-    /// image; in a turning sensor's one they go on at the other side.
+    /// The same for larger windows, at most twice as large along each axis, into `to`. In a turning sensor's image they go on
+    /// at the other side.
     fn grow(&self, to: &mut Self, (columns, rows): (usize, usize), edge: Edge, wide: &mut Vec<f32>) {
         let (more_c, more_r) = (columns - self.columns, rows - self.rows);
         let stride = edge.columns + columns - 1;
         let lines = self.lines;
         wide.clear();
         wide.reserve(lines * stride);
-        let mut line = vec![edge.outside; stride + more_c];
+        let mut line = vec![OUTSIDE; stride + more_c];
         for from in self.minima.chunks_exact(self.stride) {
             line[more_c..more_c + self.stride].copy_from_slice(from);
             if let Some(turn) = edge.turn {
                 // Starts before the image are those before a turn's end, and the other way round.
                 let known = more_c + self.stride;
                 for i in (0..more_c).rev() {
-                    line[i] = if i + turn < known { line[i + turn] } else { edge.outside };
+                    line[i] = if i + turn < known { line[i + turn] } else { OUTSIDE };
                 }
                 for i in known..stride + more_c {
-                    line[i] = if i >= turn { line[i - turn] } else { edge.outside };
+                    line[i] = if i >= turn { line[i - turn] } else { OUTSIDE };
                 }
             }
             smaller(wide, &line[..stride], &line[more_c..]);
@@ -48,7 +44,7 @@ impl WindowMinima {
         (to.columns, to.rows, to.stride, to.lines) = (columns, rows, stride, lines + more_r);
         to.minima.clear();
         to.minima.reserve((lines + more_r) * stride);
-        let beyond = vec![edge.outside; stride];
+        let beyond = vec![OUTSIDE; stride];
         let of = |i: usize| match i.checked_sub(more_r) {
             Some(i) if i < lines => &wide[i * stride..(i + 1) * stride],
             _ => &beyond[..],
@@ -56,16 +52,6 @@ impl WindowMinima {
         for i in 0..lines + more_r {
             smaller(&mut to.minima, of(i), of(i + more_r));
         }
-    }
-
-    /// Index of the window whose middle is nearest to a pixel coordinate; `None` where it is outside of the image.
-    #[inline(always)]
-    pub(super) fn around(&self, column: f32, row: f32) -> Option<usize> {
-        let c = column + 0.5 * self.columns as f32;
-        let r = row + 0.5 * self.rows as f32;
-        let inside = c >= 0.0 && c < self.stride as f32 && r >= 0.0 && r < self.lines as f32;
-        // Small and positive: truncating is rounding down.
-        inside.then(|| (r as i32 as u32 * self.stride as u32 + c as i32 as u32) as usize)
     }
 }
 
@@ -75,8 +61,10 @@ struct Edge {
     columns: usize,
     /// Columns of a full turn, where windows go on beyond the border.
     turn: Option<usize>,
-    outside: f32,
 }
+
+/// What counts for what is not in the image.
+const OUTSIDE: f32 = f32::INFINITY;
 
 /// Appends the smaller of each pair.
 #[inline(always)]
@@ -89,10 +77,6 @@ fn smaller(to: &mut Vec<f32>, a: &[f32], b: &[f32]) {
 pub(super) struct RangeTables {
     /// Nearest reading; no reading counts as infinitely far.
     pub(super) fine: Vec<WindowMinima>,
-    /// Nearest reading; no reading counts as 0.
-    pub(super) nearest: Vec<WindowMinima>,
-    /// Farthest reading, negated; no reading counts as 0.
-    pub(super) farthest: Vec<WindowMinima>,
     /// The nearest reading of all.
     pub(super) overall: f32,
 }
@@ -101,45 +85,34 @@ impl RangeTables {
     /// Makes the tables of an image's values, with windows that are `rows_per_column` as high as wide. `turn`:
     /// columns of a full turn, whether the image has all of them or not; `None` where the sensor does not turn.
     pub(super) fn fill(&mut self, values: &[f32], columns: usize, turn: Option<usize>, rows_per_column: f32) {
-        let known = |v: f32| if v > 0.0 { v } else { f32::INFINITY };
-        let series = |all: &mut Vec<WindowMinima>, sizes: &[usize], value: fn(f32) -> f32, outside: f32| {
-            all.resize_with(sizes.len(), WindowMinima::default);
-            let minima = values.iter().map(|v| value(v.abs())).collect();
-            let mut first = WindowMinima {
-                columns: 1,
-                rows: 1,
-                stride: columns,
-                lines: values.len() / columns.max(1),
-                minima,
-            };
-            let mut wide = Vec::new();
-            for (i, &n) in sizes.iter().enumerate() {
-                let rows = ((n as f32 * rows_per_column).ceil() as usize).clamp(2, 64);
-                let edge = Edge { columns, turn: turn.filter(|&t| n < t.min(columns)), outside };
-                if i == 0 {
-                    // From single pixels in steps that at most double.
-                    while 2 * first.columns < n || 2 * first.rows < rows {
-                        let mut next = WindowMinima::default();
-                        let size = (n.min(2 * first.columns), rows.min(2 * first.rows));
-                        first.grow(&mut next, size, edge, &mut wide);
-                        first = next;
-                    }
-                    first.grow(&mut all[0], (n, rows), edge, &mut wide);
-                } else {
-                    let (done, rest) = all.split_at_mut(i);
-                    done[i - 1].grow(&mut rest[0], (n, rows), edge, &mut wide);
-                }
-            }
+        let known = |v: &f32| if *v != 0.0 { v.abs() } else { f32::INFINITY };
+        self.fine.resize_with(FINE.len(), WindowMinima::default);
+        let mut first = WindowMinima {
+            columns: 1,
+            rows: 1,
+            stride: columns,
+            lines: values.len() / columns.max(1),
+            minima: values.iter().map(known).collect(),
         };
-        let (fine, nearest, farthest) = (&mut self.fine, &mut self.nearest, &mut self.farthest);
-        parallel::join(
-            || series(fine, &FINE, |v| if v > 0.0 { v } else { f32::INFINITY }, f32::INFINITY),
-            || {
-                series(nearest, &COARSE, |v| v, 0.0);
-                series(farthest, &COARSE, |v| -v, 0.0);
-            },
-        );
-        self.overall = values.iter().map(|v| known(v.abs())).fold(f32::INFINITY, f32::min);
+        self.overall = first.minima.iter().copied().fold(f32::INFINITY, f32::min);
+        let mut wide = Vec::new();
+        for (i, &n) in FINE.iter().enumerate() {
+            let rows = ((n as f32 * rows_per_column).ceil() as usize).clamp(2, 64);
+            let edge = Edge { columns, turn: turn.filter(|&t| n < t.min(columns)) };
+            if i == 0 {
+                // From single pixels in steps that at most double.
+                while 2 * first.columns < n || 2 * first.rows < rows {
+                    let mut next = WindowMinima::default();
+                    let size = (n.min(2 * first.columns), rows.min(2 * first.rows));
+                    first.grow(&mut next, size, edge, &mut wide);
+                    first = next;
+                }
+                first.grow(&mut self.fine[0], (n, rows), edge, &mut wide);
+            } else {
+                let (done, rest) = self.fine.split_at_mut(i);
+                done[i - 1].grow(&mut rest[0], (n, rows), edge, &mut wide);
+            }
+        }
     }
 }
 

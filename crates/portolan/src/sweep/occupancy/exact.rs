@@ -185,9 +185,11 @@ fn trace_inside(
 fn extent(lattice: &Lattice<3>, rays: impl Iterator<Item = Ray<3>> + Clone) -> Aabb<3> {
     // Where the corners of the box of all have cells, all have.
     let (mut all, mut is_number) = (Aabb::EMPTY, true);
-    for p in rays.clone().flat_map(|ray| [ray.origin, ray.end]) {
-        is_number &= !p.iter().any(|v| v.is_nan());
-        all.include(p);
+    for ray in rays.clone() {
+        for p in [ray.origin, ray.end] {
+            is_number &= !(p[0].is_nan() | p[1].is_nan() | p[2].is_nan());
+            all.include(p);
+        }
     }
     if is_number && lattice.cell_of(all.min).is_some() && lattice.cell_of(all.max).is_some() {
         return all;

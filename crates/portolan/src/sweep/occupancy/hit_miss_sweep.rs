@@ -37,6 +37,8 @@ pub struct HitMissSweep<S: ?Sized> {
     layout: LayoutFinder,
     keys: Vec<BlockKey<3>>,
     parts: Vec<Parts>,
+    /// Where the readings of an image's pixels end (world).
+    ends: Vec<[f64; 3]>,
     scan: PhantomData<fn(&S)>,
 }
 
@@ -56,8 +58,10 @@ struct Parts {
 
 /// The rays of a scan.
 struct Rays<'a, F> {
-    /// The first so many end on surfaces.
+    /// So many of the readings end on surfaces.
     hits: usize,
+    readings: usize,
+    /// Rays of that many numbers, some of which may be no readings.
     count: usize,
     ray: F,
     /// The range image that free space is read from.
@@ -81,6 +85,7 @@ impl<S: ?Sized> HitMissSweep<S> {
             layout: LayoutFinder::default(),
             keys: Vec::new(),
             parts: Vec::new(),
+            ends: Vec::new(),
             scan: PhantomData,
         }
     }
@@ -123,7 +128,7 @@ impl<S: ?Sized> HitMissSweep<S> {
             tally = exact.plan(lattice, bounds, rays.count, passing, &[], most)?;
         }
         self.unite();
-        Ok(stats(rays.hits, rays.count, tally))
+        Ok(stats(rays.hits, rays.readings, tally))
     }
 
     /// Blocks of the rays and of the image together, ascending, as both are.
@@ -148,19 +153,30 @@ impl Sweep<3> for HitMissSweep<RangeImage> {
     ) -> Result<ScanStats, PlanError> {
         image.check().map_err(PlanError::BadImage)?;
         let passes = self.sweep == OccupancySweep::Exact;
-        let all: Vec<Ray<3>> = image
-            .readings()
-            .map(|(origin, end, hit)| Ray {
-                origin: world_from_sensor.transform_point(origin),
-                end: world_from_sensor.transform_point(end),
-                hit,
-                passes,
-            })
-            .collect();
-        let hits = all.iter().filter(|r| r.hit).count();
+        let to_world = |p| world_from_sensor.transform_point(p);
+        let at = world_from_sensor.translation;
+        // Says nothing of any cell.
+        let nothing = Ray { origin: at, end: at, hit: false, passes: false };
         let view = (!passes).then_some(View { world_from_image: world_from_sensor, image });
-        let rays = Rays { hits, count: all.len(), ray: |i| all[i], view };
-        let stats = self.plan_rays(&rays, lattice, limits)?;
+        let readings = image.values.iter().filter(|v| **v != 0.0).count();
+        let (hits, count) = (image.hits(), image.values.len());
+        let stats = if passes || image.has_parallel_rays() {
+            let ray = |pixel: usize| match image.reading(pixel) {
+                Some((origin, end, hit)) => Ray { origin: to_world(origin), end: to_world(end), hit, passes },
+                None => nothing,
+            };
+            self.plan_rays(&Rays { hits, readings, count, ray, view }, lattice, limits)?
+        } else {
+            let mut ends = std::mem::take(&mut self.ends);
+            fill_ends(&mut ends, image, world_from_sensor);
+            let ray = |pixel: usize| match image.values[pixel] {
+                0.0 => nothing,
+                v => Ray { end: ends[pixel], hit: v > 0.0, ..nothing },
+            };
+            let planned = self.plan_rays(&Rays { hits, readings, count, ray, view }, lattice, limits);
+            self.ends = ends;
+            planned?
+        };
         let way = if passes { Way::Rays(WhyRays::Asked) } else { Way::Stated };
         Ok(ScanStats { refused: stats.refused + image.refused, ..stats }.by(way))
     }
@@ -183,7 +199,8 @@ impl Sweep<3> for HitMissSweep<PointScan> {
         let view = image.as_deref().map(|image| View { world_from_image: &world_from_image, image });
         let passes = view.is_none() && way != Way::Points;
         let ray = |i: usize| Ray::of_points(scan, i, common, world_from_sensor, passes);
-        let rays = Rays { hits, count: hits + scan.free_ends.len(), ray, view };
+        let count = hits + scan.free_ends.len();
+        let rays = Rays { hits, readings: count, count, ray, view };
         let stats = self.plan_rays(&rays, lattice, limits)?;
         Ok(ScanStats { refused: stats.refused + scan.refused, ..stats }.by(way))
     }
@@ -203,7 +220,7 @@ impl Sweep<3> for HitMissSweep<[[f64; 3]]> {
         let origin = world_from_sensor.translation;
         let ray = |i: usize| Ray { origin, end: points_world[i], hit: true, passes: true };
         let count = points_world.len();
-        self.plan_rays(&Rays { hits: count, count, ray, view: None }, lattice, limits)
+        self.plan_rays(&Rays { hits: count, readings: count, count, ray, view: None }, lattice, limits)
     }
 }
 
@@ -231,11 +248,29 @@ impl<S: ?Sized> Swept<3> for HitMissSweep<S> {
     }
 }
 
+/// Where the readings of pixels end (world), row by row, on all threads; anything for those without one.
+fn fill_ends(ends: &mut Vec<[f64; 3]>, image: &RangeImage, world_from_image: &Pose<3>) {
+    const ROWS: usize = 16;
+    ends.resize(image.values.len(), [0.0; 3]);
+    let columns = image.columns.max(1);
+    let bands = ends.chunks_mut(ROWS * columns).zip(image.values.chunks(ROWS * columns)).enumerate();
+    parallel::each(bands, |(band, (ends, values))| {
+        let rows = ends.chunks_exact_mut(columns).zip(values.chunks_exact(columns));
+        for (row, (ends, values)) in rows.enumerate() {
+            for (column, (end, &v)) in ends.iter_mut().zip(values).enumerate() {
+                let point = image.point(column, ROWS * band + row, f64::from(v.abs()));
+                *end = world_from_image.transform_point(point);
+            }
+        }
+    });
+}
+
 /// The box around a sensor in which pixels without a surface mean that space is free, as its diagonal. Not those of more
 /// than `longest` meters, which are refused.
 fn free_reach(View { world_from_image, image }: View<'_>, longest: f64) -> Option<Ray<3>> {
-    let used = |v: &f32| f64::from(-v) <= longest;
-    let farthest = image.values.iter().copied().filter(used).fold(0.0f32, f32::min);
+    // Without a branch: as many pixels at once as the machine can compare.
+    let longest = -(longest as f32);
+    let farthest = image.values.iter().fold(0.0f32, |far, &v| far.min(if v >= longest { v } else { 0.0 }));
     if farthest == 0.0 || image.has_parallel_rays() {
         return None;
     }
