@@ -316,7 +316,7 @@ mod tests {
         assert!(all.iter().all(|part| part.from <= part.to && part.to <= path.end()));
         assert!(all.windows(2).all(|w| w[0].to <= w[1].from && w[0].from < w[1].from));
         for i in 0..=2000 {
-            let t = path.end() * f64::from(i) / 2000.0;
+            let t = path.end() * (f64::from(i) / 2000.0);
             let free = || {
                 let truth = scene.truth(path.point(t), demand.unknown);
                 truth.is_some_and(|d| d >= demand.clearance - 1e-14)
