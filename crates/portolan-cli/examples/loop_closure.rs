@@ -119,7 +119,7 @@ fn recorded(log: &Path, relations: &Path) -> anyhow::Result<Drive> {
         let off = |i: &usize| (times[*i] - time).abs();
         (0..times.len()).filter(|i| off(i) < 0.1).min_by(|a, b| off(a).total_cmp(&off(b)))
     };
-    let mut related = Vec::new();
+    let (mut related, mut lost) = (Vec::new(), 0);
     for (n, line) in text.lines().enumerate() {
         let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse).collect();
         let [t1, t2, x, y, _, _, _, yaw] =
@@ -130,8 +130,16 @@ fn recorded(log: &Path, relations: &Path) -> anyhow::Result<Drive> {
             && a != b
         {
             related.push((a, b, planar(x, y, yaw)));
+        } else {
+            lost += 1;
         }
     }
+    let name = match lost {
+        0 => name,
+        lost => {
+            format!("{name} ({lost} relations have no scan within 0.1 s of their times and are left out)")
+        }
+    };
     ensure!(!related.is_empty(), "{}: no relation is about a scan of {name}", relations.display());
     let mut keep = vec![false; log.len()];
     related.iter().for_each(|(a, b, _)| (keep[*a], keep[*b]) = (true, true));

@@ -21,32 +21,42 @@ const MOST: f64 = 0.02;
 /// Hits of scans in space that earlier scans had seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Agreement {
-    /// In cells whose distance was known.
+    /// In cells that were seen.
     seen: u64,
-    /// Of these, where all around, [`AROUND`] cells away, the next surface was a truncation away at least, too: a ray that grazes a
-    /// surface passes through cells that hold it, and not through those behind it.
+    /// Of these, in free space (a truncation from the next surface at least, where there are distances), on all sides of which
+    /// [`AROUND`] cells away is free, too: a ray that grazes a surface passes through cells that hold it, and not through those behind.
     in_free_space: u64,
 }
 
 impl Agreement {
-    /// Looks at some hits of a scan that is to be fused, given the signed distances up to now; `None`: there are none.
+    /// Looks at some hits of a scan that is to be fused. `is_free`: whether a place was seen free up to now; `None`: not seen.
     pub(super) fn look(
         &mut self,
         pose: &Pose<3>,
         frame: &Frame,
         resolution: f64,
-        distance: impl Fn([f64; 3]) -> Option<Answer<f64>>,
+        is_free: impl Fn([f64; 3]) -> Option<bool>,
     ) {
-        let is_free = |p| matches!(distance(p), Some(Answer::Saturated(d)) if d > 0.0);
         for hit in hits(frame).into_iter().map(|p| pose.transform_point(p)) {
-            let Some(Answer::Known(_) | Answer::Saturated(_)) = distance(hit) else { continue };
+            let Some(free) = is_free(hit) else { continue };
             self.seen += 1;
             let beside = |side: usize| {
                 let mut p = hit;
                 p[side / 2] += AROUND * resolution * [1.0, -1.0][side % 2];
                 p
             };
-            self.in_free_space += u64::from(is_free(hit) && (0..6).all(|side| is_free(beside(side))));
+            let all_around = || (0..6).all(|side| is_free(beside(side)) == Some(true));
+            self.in_free_space += u64::from(free && all_around());
+        }
+    }
+
+    /// Whether a place is free, by its signed distance, where the maps have any, else by its occupancy.
+    pub(super) fn is_free(distance: Option<Answer<f64>>, occupancy: Option<Answer<f64>>) -> Option<bool> {
+        match (distance, occupancy) {
+            (Some(Answer::Saturated(d)), _) => Some(d > 0.0),
+            (Some(Answer::Known(_)), _) => Some(false),
+            (None, Some(Answer::Known(p))) => Some(p < 0.5),
+            _ => None,
         }
     }
 

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::sync_channel;
 use std::time::Instant;
 
+use portolan::Mapper;
 use portolan::geom::Pose;
 use portolan::ledger::LedgerError;
 use portolan::map::MapError;
 use portolan::mapper::Fused;
 use portolan::scan::{BeamCounts, Frame, FrameFilter, Scan, ScanStats};
-use portolan::{Answer, Mapper};
 use portolan_io::IoError;
 use portolan_io::scan_log::ScanLog;
 
@@ -204,8 +204,8 @@ pub(super) trait TakesFrames {
         clock: &(dyn Fn() -> f64 + Sync),
     ) -> Result<Fused, LedgerError>;
 
-    /// The signed distance at a point, as of now; `None`: the maps hold no distances.
-    fn signed_distance(&self, p: [f64; 3]) -> Option<Answer<f64>>;
+    /// Whether a place was seen free up to now; `None`: not seen.
+    fn is_free(&self, p: [f64; 3]) -> Option<bool>;
 
     /// Edge of a cell (meters).
     fn resolution(&self) -> f64;
@@ -225,8 +225,9 @@ impl TakesFrames for Mapper<3> {
         Ok(self.integrate_timed(pose, frame, clock)?)
     }
 
-    fn signed_distance(&self, p: [f64; 3]) -> Option<Answer<f64>> {
-        self.tsdf().map(|tsdf| tsdf.signed_distance(p))
+    fn is_free(&self, p: [f64; 3]) -> Option<bool> {
+        let distance = self.tsdf().map(|map| map.signed_distance(p));
+        Agreement::is_free(distance, self.occupancy().map(|map| map.probability(p)))
     }
 
     fn resolution(&self) -> f64 {
@@ -280,7 +281,7 @@ fn fuse(
         }
         *report.seconds.entry("frames").or_default() += clock() - waiting;
         let take = |(frame, counts): (Frame, BeamCounts)| {
-            report.agreement.look(&pose, &frame, maps.resolution(), |p| maps.signed_distance(p));
+            report.agreement.look(&pose, &frame, maps.resolution(), |p| maps.is_free(p));
             (maps.take(i, &pose, &frame, &clock), frame, counts)
         };
         match read.map(take) {

@@ -15,6 +15,7 @@ use portolan_io::{LaserLog, MapFile};
 use std::path::Path;
 use std::time::Instant;
 
+use super::agreement::Agreement;
 use super::aside::Aside;
 use super::extent::Extent;
 use super::fuse::{Frames, FusionReport};
@@ -410,8 +411,8 @@ impl super::fuse::TakesFrames for Part<'_, 3> {
         self.add(index, pose, frame, clock)
     }
 
-    fn signed_distance(&self, p: [f64; 3]) -> Option<portolan::Answer<f64>> {
-        self.ledger.signed_distance(p)
+    fn is_free(&self, p: [f64; 3]) -> Option<bool> {
+        Agreement::is_free(self.ledger.signed_distance(p), self.ledger.probability(p))
     }
 
     fn resolution(&self) -> f64 {

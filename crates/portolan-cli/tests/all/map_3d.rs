@@ -129,8 +129,11 @@ fn scans_that_do_not_fit_their_poses_are_told() {
     assert!(hits > 200.0 && share < 0.01 && warning.is_empty(), "{hits} {share} {warning}");
     let camera_poses = folder.path().join("poses-of-the-camera.txt");
     std::fs::copy(log.join("poses.txt"), &camera_poses).unwrap();
-    for more in [&["--poses", arg(&camera_poses)][..], &["--poses", arg(&camera_poses), "--ledger"]] {
-        let (_, share, warning) = agreement(&log, more);
+    // By occupancy, where there are no distances.
+    let (_, share, warning) = agreement(&log, &["--maps", "tree"]);
+    assert!(share < 0.01 && warning.is_empty(), "{share} {warning}");
+    for more in [&[][..], &["--ledger"], &["--maps", "tree"], &["--maps", "tree", "--ledger"]] {
+        let (_, share, warning) = agreement(&log, &[&["--poses", arg(&camera_poses)], more].concat());
         assert!(warning.contains("the Tr of calib.txt"), "{share} {warning}");
     }
     let (_folder, log) = camera_log();

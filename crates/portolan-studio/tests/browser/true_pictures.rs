@@ -1,22 +1,13 @@
 //! What is on the screen is true at every moment: while colors change, while meshes come in, in every lap.
 
-use portolan_studio::engine::{Logs, Source3d};
-use portolan_studio::server::Settings;
+use portolan_studio::engine::BesideMap;
 
 use super::Studio;
-use super::view3d::gyroid;
+use super::view3d::studio_of_gyroid;
 
 #[test]
 fn old_colors_stay_until_all_of_the_new_ones_are_there() {
-    let source_3d = Source3d::Map {
-        name: "a gyroid".into(),
-        tsdf: Box::new(gyroid(120)),
-        up: [0.0, 0.0, 1.0],
-        beside: Box::default(),
-    };
-    let Some(studio) = Studio::with(Logs { source_3d, ..Logs::default() }, &Settings::default()) else {
-        return;
-    };
+    let Some(studio) = studio_of_gyroid(120, BesideMap::default()) else { return };
     let page = studio.open("view=3d");
     page.wait_for("document.getElementById('3d-canvas').dataset.pending === '0'");
     page.rest();

@@ -121,7 +121,7 @@ fn a_link_shows_the_same_and_files_can_be_taken_away() {
 }
 
 /// A surface that fills a cube of so many cells along each side; of 184, it is of four million triangles.
-pub(super) fn gyroid(cells: i32) -> Tsdf3 {
+fn gyroid(cells: i32) -> Tsdf3 {
     const PERIOD: f64 = 16.0;
     let mut store = Bricks::new(Lattice::new([0.0; 3], 0.05));
     let bricks = cells / 8;
@@ -137,6 +137,13 @@ pub(super) fn gyroid(cells: i32) -> Tsdf3 {
     Tsdf3::from_stores(store, None, TsdfConfig::textbook()).unwrap()
 }
 
+/// A studio that shows this surface, saved with that beside it; `None`: there is no browser.
+pub(super) fn studio_of_gyroid(cells: i32, beside: BesideMap) -> Option<Studio> {
+    let (tsdf, beside) = (Box::new(gyroid(cells)), Box::new(beside));
+    let source_3d = Source3d::Map { name: "a gyroid".into(), tsdf, up: [0.0, 0.0, 1.0], beside };
+    Studio::with(Logs { source_3d, ..Logs::default() }, &Settings::default())
+}
+
 #[test]
 fn what_moved_and_how_sure_the_surface_is_are_shown() {
     let beside = BesideMap {
@@ -144,15 +151,7 @@ fn what_moved_and_how_sure_the_surface_is_are_shown() {
         movers: (0..500).map(|i| [0.01 * f64::from(i), 0.5, 0.5]).collect(),
         ..BesideMap::default()
     };
-    let source_3d = Source3d::Map {
-        name: "a gyroid".into(),
-        tsdf: Box::new(gyroid(48)),
-        up: [0.0, 0.0, 1.0],
-        beside: Box::new(beside),
-    };
-    let Some(studio) = Studio::with(Logs { source_3d, ..Logs::default() }, &Settings::default()) else {
-        return;
-    };
+    let Some(studio) = studio_of_gyroid(48, beside) else { return };
     let page = studio.open("view=3d");
     page.wait_for("document.getElementById('3d-canvas').dataset.pending === '0'");
     page.wait_text("3d-movers", "500 returns");
@@ -174,15 +173,7 @@ fn what_moved_and_how_sure_the_surface_is_are_shown() {
 
 #[test]
 fn millions_of_triangles_are_one_draw_call() {
-    let source_3d = Source3d::Map {
-        name: "a gyroid".into(),
-        tsdf: Box::new(gyroid(184)),
-        up: [0.0, 0.0, 1.0],
-        beside: Box::default(),
-    };
-    let Some(studio) = Studio::with(Logs { source_3d, ..Logs::default() }, &Settings::default()) else {
-        return;
-    };
+    let Some(studio) = studio_of_gyroid(184, BesideMap::default()) else { return };
     let page = studio.open("view=3d");
     page.wait_for("document.getElementById('3d-canvas').dataset.pending === '0'");
     page.rest();

@@ -12,6 +12,11 @@ impl<const D: usize> Ledger<D> {
         self.tsdf.as_ref().map(|map| map.signed_distance(p_world))
     }
 
+    /// P(occupied) at a point, as [`Occupancy::probability`] of [`Ledger::mapper`] would answer now; `None`: there is no occupancy. O(1).
+    pub fn probability(&self, p_world: impl Into<[f64; D]>) -> Option<Answer<f64>> {
+        self.occupancy.as_ref().map(|map| map.probability(p_world))
+    }
+
     /// The maps that follow from the sums: log odds clamped once, weighted means, hits per meter. They answer what a mapper's
     /// answer, and are the same bytes for equal ledgers. O(cells), memory beside the ledger's. Scans that are added to them
     /// are not added here.

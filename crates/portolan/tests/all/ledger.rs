@@ -472,6 +472,13 @@ fn the_maps_of_a_ledger_answer_like_any_other() {
     let esdf = maps.esdf().unwrap();
     let p = SCANS_2D[3].0.translation;
     assert!(esdf.distance(p).known().unwrap() > 0.1);
+    // Asked at once, without making the maps.
+    for (_, scan) in [&SCANS_2D[3], &SCANS_2D[9]] {
+        for q in scan.hits_world(&SCANS_2D[3].0).chain([p, [-50.0; 2]]).step_by(7) {
+            assert_eq!(ledger.signed_distance(q), maps.tsdf().map(|map| map.signed_distance(q)));
+            assert_eq!(ledger.probability(q), maps.occupancy().map(|map| map.probability(q)));
+        }
+    }
     assert!(maps.contour().length() > 20.0);
     for (i, (_, scan)) in SCANS_2D.iter().enumerate() {
         ledger.subtract("log", i as u64, scan).unwrap();
