@@ -121,7 +121,7 @@ fn a_link_shows_the_same_and_files_can_be_taken_away() {
 }
 
 /// A surface that fills a cube of so many cells along each side; of 184, it is of four million triangles.
-fn gyroid(cells: i32) -> Tsdf3 {
+pub(super) fn gyroid(cells: i32) -> Tsdf3 {
     const PERIOD: f64 = 16.0;
     let mut store = Bricks::new(Lattice::new([0.0; 3], 0.05));
     let bricks = cells / 8;

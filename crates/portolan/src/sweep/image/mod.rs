@@ -5,14 +5,14 @@
 //! | the image fits together | [`crate::scan::RangeImage::check`] | the same |
 //! | its projection | `projector`, `rings`, and `project` (`lanes` of 64 points) | the same, and `pixels`, `sine_rows` (in `steps`) |
 //! | readings made ready | `padded_image`: cleaned, torn where surfaces end | `window_minima`: the nearest within any window |
-//! | nearest and farthest reading that a cube of cells may fall on | `window` of its box, in `range_pyramid` | `balls` around it, in `window_minima` |
+//! | nearest and farthest reading that a cube of cells may fall on | `window` of its box, in `range_pyramid` | `balls` around it, in `window_readings` |
 //! | cubes of cells against them | `depth_bounds` | `placed_image` |
 //! | blocks that are observed, by such cubes | `search` | `search` |
 //! | their cells | `observe`: interpolated at centers | `placed_image`: the nearest within a cell's width |
 //! | the sweep, which makes these steps | `distances` | `misses` |
 //!
 //! Distances need the smallest and the largest value of few windows, of any size: a pyramid costs a third of the image.
-//! Misses need the smallest one around *every* cell: tables over all places of a few sizes answer that by one read.
+//! Misses need the same for cubes, and the smallest one around *every* cell: tables over all places of a few sizes answer that by one read.
 
 mod balls;
 mod bands;
@@ -35,6 +35,7 @@ mod sine_rows;
 mod steps;
 mod window;
 mod window_minima;
+mod window_readings;
 
 pub use distances::{Projective, ProjectiveSettings};
 pub(super) use lengths::ProjectiveLengths;

@@ -3,11 +3,11 @@
 use super::balls::BallWindows;
 use super::lanes::LANES;
 use super::pixels::{PixelProjector, Pixels};
-use super::range_pyramid::RangePyramid;
 use super::search::{Class, Classify, Cube};
 use super::sheet::Sheet;
 use super::steps::{STEP_BITS, STEPS};
 use super::window_minima::{RangeTables, WindowMinima, WindowSizes};
+use super::window_readings::WindowReadings;
 use crate::geom::{BLOCK_EDGE, Lattice, Pose};
 use crate::parallel;
 use crate::scan::{Bridges, Projection, RangeImage};
@@ -31,8 +31,8 @@ pub(super) struct PlacedImage {
     tables: RangeTables,
     /// Of `tables.fine`.
     fine_sizes: WindowSizes,
-    /// Readings without their sign, none as 0: for what lies in the windows of cubes.
-    pyramid: RangePyramid,
+    /// For the windows of cubes.
+    window_readings: WindowReadings,
     /// For every pixel [`OWN`], where it has a reading, and [`BESIDE`], where it or one of the eight around it has one.
     readings: Vec<u8>,
     sheet: Sheet,
@@ -56,10 +56,10 @@ impl PlacedImage {
         lattice: &Lattice<3>,
         old: Option<Box<Self>>,
     ) -> Self {
-        let (projector, mut tables, mut sheet, mut pyramid) = match old {
+        let (projector, mut tables, mut sheet, mut window_readings) = match old {
             Some(old) => {
                 let projector = Some(old.projector).filter(|p| p.projector.is_of(image));
-                (projector, old.tables, old.sheet, old.pyramid)
+                (projector, old.tables, old.sheet, old.window_readings)
             }
             None => Default::default(),
         };
@@ -85,12 +85,12 @@ impl PlacedImage {
             || tables.fill(&values, image.columns, turn, projector.rows_per_column()),
             || {
                 sheet.fill(&values, &projector.projector);
-                pyramid.build(image.columns.max(1), &values, false);
+                window_readings.fill(&values, image.columns, turn);
             },
         );
         Self {
             fine_sizes: WindowSizes::of(&tables.fine),
-            pyramid,
+            window_readings,
             tables,
             projector,
             readings: readings(&values, image.columns),
@@ -127,7 +127,8 @@ impl PlacedImage {
         if !halves.iter().all(|half| half.is_finite()) {
             return Class::Mixed;
         }
-        let Some([nearest, farthest]) = self.extremes([windows.column[i], windows.row[i]], halves) else {
+        let at = [windows.column[i], windows.row[i]];
+        let Some([nearest, farthest]) = self.window_readings.extremes(at, halves) else {
             return Class::Nothing;
         };
         if farthest <= windows.near[i] {
@@ -139,48 +140,6 @@ impl PlacedImage {
         } else {
             Class::Mixed
         }
-    }
-
-    /// Bounds of the nearest and the farthest reading in a window about a pixel coordinate; what has no reading, in the image or
-    /// outside of it, counts as 0. `None`: the window is outside of the image.
-    #[inline(always)]
-    fn extremes(&self, [column, row]: [f32; 2], [half_columns, half_rows]: [f32; 2]) -> Option<[f32; 2]> {
-        let (columns, rows) = (self.columns as i64, self.rows as i64);
-        // Far outside of any image, and no sum of two overflows.
-        let pixel = |v: f32| v.clamp(-1e12, 1e12) as i64;
-        let span = |at: f32, half: f32| [pixel((at - half).floor()), pixel((at + half).ceil())];
-        let [top, bottom] = span(row, half_rows);
-        let [mut left, mut right] = span(column, half_columns);
-        let turn = self.projector.projector.columns_of_turn().map(|turn| turn as i64);
-        let mut is_whole = top >= 0 && bottom < rows;
-        let mut over_the_seam = None;
-        if let Some(turn) = turn {
-            if right - left >= turn.min(columns) {
-                is_whole &= columns >= turn;
-                [left, right] = [0, columns - 1];
-            } else {
-                let turns = left.div_euclid(turn) * turn;
-                [left, right] = [left - turns, right - turns];
-                is_whole &= right < columns || columns >= turn;
-                over_the_seam = (right >= columns.max(turn)).then_some(right - turn);
-            }
-        } else {
-            is_whole &= left >= 0 && right < columns;
-        }
-        let within = |v: i64, n: i64| v.clamp(0, n - 1) as usize;
-        if bottom < 0 || top >= rows || right < 0 {
-            return None;
-        }
-        let rows = [within(top, rows), within(bottom, rows)];
-        let seen = (left < columns)
-            .then(|| self.pyramid.extremes([within(left, columns), within(right, columns)], rows));
-        let beyond = over_the_seam.map(|end| self.pyramid.extremes([0, within(end, columns)], rows));
-        let [nearest, farthest] = match (seen, beyond) {
-            (Some(a), Some(b)) => [a[0].min(b[0]), a[1].max(b[1])],
-            (Some(one), None) | (None, Some(one)) => one,
-            (None, None) => return None,
-        };
-        Some([if is_whole { nearest } else { 0.0 }, farthest])
     }
 
     /// The free cells among `4^3`, a bit each, x fastest. `complete`: whether all pixels that they see have a reading.
